@@ -205,6 +205,3 @@ OTHERS: dict[str, Callable[[], Pair]] = {
     "registration-worst-case": _worst_case,
     "registration-yield": _yield,
 }
-
-PICTURED = CHOSEN.keys() | OTHERS.keys()
-"""Rules that have a pair of pictures."""

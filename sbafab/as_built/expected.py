@@ -1,7 +1,8 @@
-"""Contours that files draw alike made one: what lies within 1 um of what was meant is as meant.
+"""The expected laminate of a folder, and agreement of contours with it.
 
-Programs that save a file anew round its coordinates, and not alike in every layer. Rules would
-take what is left between two such edges for a bond, or for a leak.
+Contours within 1 um of each other become one: programs that save a file again round its coordinates
+differently in every layer, and rules would take the gap between two such edges for a bond or a
+leak.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from sbafab.actuators import build
-from sbafab.as_built.kerf_removed import uncut
+from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import CutSettings, curves_of
@@ -31,20 +32,20 @@ from sbafab.rules.finding import Finding
 from sbafab.rules.limits import TOLERANCE, Limits
 from sbafab.rules.measures import Measures
 
-AGREED = 2 * TOLERANCE
-"""mm between two contours that are each within TOLERANCE of the one that was meant."""
+AGREEMENT = 2 * TOLERANCE
+"""Largest distance of two contours that are each within TOLERANCE of the expected one, mm."""
 SAME = 1e-8
-"""mm: coordinates that differ by less were written as one."""
+"""Coordinates that differ by less are equal, mm."""
 
 
 def with_circles(region: Region) -> Region:
-    """The region with every contour that stays within TOLERANCE of a circle as that circle."""
+    """Return the region with circles for contours that stay within TOLERANCE of one."""
     return Region(tuple(map(_rounded, region.contours)))
 
 
 def _rounded(contour: Contour) -> Contour:
     low_x, low_y, high_x, high_y = contour.bounds
-    if contour.circle is not None or abs(high_x - low_x - high_y + low_y) > 2 * AGREED:
+    if contour.circle is not None or abs(high_x - low_x - high_y + low_y) > 2 * AGREEMENT:
         return contour
     centre = centroid(Region((contour,)))
     least = min(math.dist(edge.nearest(centre), centre) for edge in contour.edges)
@@ -56,50 +57,52 @@ def _rounded(contour: Contour) -> Contour:
 
 
 def without_specks(region: Region) -> Region:
-    """The region without edges shorter than AGREED, which rounded corners leave when uncut."""
-    return Region(tuple(map(_unspecked, region.contours)))
+    """Return the region without edges shorter than AGREEMENT, which rounded corners leave."""
+    return Region(tuple(map(_without_specks, region.contours)))
 
 
-def _unspecked(contour: Contour) -> Contour:
-    kept = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREED]
-    if len(kept) == len(contour.edges) or len(kept) < 3:
+def _without_specks(contour: Contour) -> Contour:
+    edges = [edge for edge in contour.edges if math.dist(edge.start, edge.end) >= AGREEMENT]
+    if len(edges) == len(contour.edges) or len(edges) < 3:
         return contour
-    ends = [edge.start for edge in (*kept[1:], kept[0])]
+    ends = [edge.start for edge in (*edges[1:], edges[0])]
     return Contour(
         tuple(
             edge if edge.end == end else edge_from_bulge(edge.start, end, edge.bulge)
-            for edge, end in zip(kept, ends, strict=True)
+            for edge, end in zip(edges, ends, strict=True)
         )
     )
 
 
 @dataclass
-class _Alike:
-    """Contours that agree with the ``first``; ``members`` are drawn like it, edge by edge."""
+class _ContourGroup:
+    """Contours that agree with the ``first``; ``members`` agree with it edge by edge."""
 
     first: Contour
     members: list[Contour] = field(default_factory=list)
 
     def takes(self, contour: Contour) -> bool:
-        """Whether a contour agrees; it is then counted."""
-        apart = zip(contour.bounds, self.first.bounds, strict=True)
-        if contour.is_hole != self.first.is_hole or any(abs(a - b) > 2 * AGREED for a, b in apart):
+        """Return True if a contour agrees with the first; it may become a member."""
+        bounds = zip(contour.bounds, self.first.bounds, strict=True)
+        if contour.is_hole != self.first.is_hole or any(
+            abs(a - b) > 2 * AGREEMENT for a, b in bounds
+        ):
             return False
-        member = _drawn_like(self.first, contour)
+        member = _matching_edges(self.first, contour)
         if member is not None:
             self.members.append(member)
         return member is not None or _lies_on(self.first, contour)
 
     @cached_property
     def agreed(self) -> Contour:
-        """The median of the members; the first where all are written alike."""
+        """The median of the members, or the first contour if all have equal coordinates."""
         if self.first.circle is not None:
-            found = [c.circle for c in self.members if c.circle is not None]
-            x, y, radius = (_median([(*p, r)[i] for p, r in found]) for i in range(3))
+            circles = [c.circle for c in self.members if c.circle is not None]
+            x, y, radius = (_median([(*p, r)[i] for p, r in circles]) for i in range(3))
             whole = circle((x, y), radius)
             return whole.reversed() if self.first.is_hole else whole
         rows = [contour.vertices for contour in self.members]
-        if max(_off(rows[0], row) for row in rows) < SAME:
+        if max(_largest_difference(rows[0], row) for row in rows) < SAME:
             return self.first
         corners = [
             tuple(_median([row[i][j] for row in rows]) for j in range(3))
@@ -120,74 +123,74 @@ def _median(values: Sequence[float]) -> float:
     return median(values)
 
 
-def _off(
-    one: Sequence[tuple[float, float, float]], other: Sequence[tuple[float, float, float]]
+def _largest_difference(
+    first: Sequence[tuple[float, float, float]], second: Sequence[tuple[float, float, float]]
 ) -> float:
     return max(
-        abs(a - b) for p, q in zip(one, other, strict=True) for a, b in zip(p, q, strict=True)
+        abs(a - b) for p, q in zip(first, second, strict=True) for a, b in zip(p, q, strict=True)
     )
 
 
-def _drawn_like(first: Contour, other: Contour) -> Contour | None:
-    """The other contour from where the first one starts, if each of its edges agrees with one."""
-    if first.circle is not None and other.circle is not None:
-        (p, r), (q, s) = first.circle, other.circle
-        return other if math.dist(p, q) + abs(r - s) <= AGREED else None
-    if len(first.edges) != len(other.edges):
+def _matching_edges(first: Contour, contour: Contour) -> Contour | None:
+    """Return the contour from the first one's start if all edges agree, else None."""
+    if first.circle is not None and contour.circle is not None:
+        (p, r), (q, s) = first.circle, contour.circle
+        return contour if math.dist(p, q) + abs(r - s) <= AGREEMENT else None
+    if len(first.edges) != len(contour.edges):
         return None
     start = first.edges[0].start
-    ways = [math.dist(edge.start, start) for edge in other.edges]
+    ways = [math.dist(edge.start, start) for edge in contour.edges]
     offset = ways.index(min(ways))
-    edges = (*other.edges[offset:], *other.edges[:offset])
+    edges = (*contour.edges[offset:], *contour.edges[:offset])
     agree = all(
-        math.dist(a.start, b.start) <= AGREED and math.dist(a.at(0.5), b.at(0.5)) <= AGREED
+        math.dist(a.start, b.start) <= AGREEMENT and math.dist(a.at(0.5), b.at(0.5)) <= AGREEMENT
         for a, b in zip(first.edges, edges, strict=True)
     )
     return Contour(edges) if agree else None
 
 
-def _lies_on(first: Contour, other: Contour) -> bool:
-    """Whether two contours that are drawn by other edges run along each other."""
+def _lies_on(first: Contour, contour: Contour) -> bool:
+    """Return True if two contours with different edges run along each other."""
     try:
-        check_contours(Region((other,)), Region((first,)), AGREED)
+        check_contours(Region((contour,)), Region((first,)), AGREEMENT)
     except OutputError:
         return False
     return True
 
 
 def in_agreement(regions: Sequence[Region]) -> list[Region]:
-    """The regions with all contours that agree, within AGREED mm, replaced by their median."""
-    groups: list[_Alike] = []
-    homes: list[list[_Alike]] = []
+    """Return the regions with contours that agree within AGREEMENT replaced by their median."""
+    groups: list[_ContourGroup] = []
+    homes: list[list[_ContourGroup]] = []
     for region in regions:
-        own = []
+        region_groups = []
         for contour in region.contours:
             home = next((group for group in groups if group.takes(contour)), None)
             if home is None:
-                home = _Alike(contour, [contour])
+                home = _ContourGroup(contour, [contour])
                 groups.append(home)
-            own.append(home)
-        homes.append(own)
-    return [Region(tuple(home.agreed for home in own)) for own in homes]
+            region_groups.append(home)
+        homes.append(region_groups)
+    return [Region(tuple(home.agreed for home in region_groups)) for region_groups in homes]
 
 
-# Whether a laminate still holds its limits where chords stand for its arcs.
+# Check of laminates cut in chords against their limits.
 
 
 def refuse_coarse(
     laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings, limits: Limits
 ) -> None:
-    """Raises DesignError where the laminate holds and what its ``paths`` in chords cut does not."""
+    """Raise DesignError if a passing laminate fails a rule when its ``paths`` are cut in chords."""
     error = settings.curves.chord_error
     try:
-        found = _first_failure(as_cut(laminate, paths, settings), limits)
+        failed = _first_failure(as_cut(laminate, paths, settings), limits)
     except (OutputError, GeometryError) as failure:
-        raise DesignError(_refused(error, f"leave no sound contours: {failure}")) from failure
-    if found is not None:
-        raise DesignError(_refused(error, f"break {found.rule}: {found.message}"))
+        raise DesignError(_refusal(error, f"leave no sound contours: {failure}")) from failure
+    if failed is not None:
+        raise DesignError(_refusal(error, f"break {failed.rule}: {failed.message}"))
 
 
-def _refused(error: float, why: str) -> str:
+def _refusal(error: float, why: str) -> str:
     return (
         f"chords within {error:g} mm {why}; take a smaller --chord-error, or true arcs with "
         "--dxf-profile bulges or arcs"
@@ -195,22 +198,22 @@ def _refused(error: float, why: str) -> str:
 
 
 def as_cut(laminate: Laminate, paths: Mapping[str, Region], settings: CutSettings) -> Laminate:
-    """The laminate of the parts that a beam leaves which is led along the paths."""
+    """Return the laminate of the parts that a beam along the paths leaves."""
     cut = []
     for pattern, path in paths.items():
         check_clear(path.contours)
         material = laminate.patterns[pattern][0].film.material
-        part = uncut(with_circles(path), settings.kerf_width(material) or 0.0)
+        part = remove_kerf(with_circles(path), settings.kerf_width(material) or 0.0)
         cut.append(with_circles(part.region))
     profiles = dict(zip(paths, in_agreement(cut), strict=True))
     return replace(
         laminate,
-        layers=tuple(replace(one, profile=profiles[one.pattern]) for one in laminate.layers),
+        layers=tuple(replace(layer, profile=profiles[layer.pattern]) for layer in laminate.layers),
     )
 
 
 def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
-    """The first failure that is not waived; how many random builds hold is not counted again."""
+    """Return the first failure that is not waived, without the yield, or None."""
     measures = Measures(laminate, limits)
     return next(
         (
@@ -224,26 +227,26 @@ def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
     )
 
 
-# What a folder's design makes: the laminate that every cut file is held against.
+# The expected laminate of a folder's design.
 
 
 class Expected(NamedTuple):
-    """A layer's profile, and the path on which the beam leaves it."""
+    """A layer's profile and the beam's path for it."""
 
     profile: Region
     path: Region
 
 
 class Meant(NamedTuple):
-    """A design's laminate, and the path of the beam for each of its patterns."""
+    """A design's laminate, and the beam's path for each of its patterns."""
 
     laminate: Laminate
     paths: Mapping[str, Region]
 
     def layers(self, count: int) -> Sequence[Expected | None]:
-        """What ``count`` layers, bottom to top, should be; None where the design has not so many.
+        """Return the expected ``count`` layers, bottom to top; all None if the count differs.
 
-        A layer too many or too few may be missing anywhere, so that none has its place then.
+        A surplus or missing layer may be anywhere, so that no layer has a certain place.
         """
         layers = self.laminate.layers
         if len(layers) != count:
@@ -252,16 +255,16 @@ class Meant(NamedTuple):
 
 
 class RunWork(NamedTuple):
-    """What a run that has just written a folder knows of it: its design's part and findings."""
+    """The design that a run has just written: laminate, paths and findings."""
 
-    meant: Meant
+    expected: Meant
     findings: tuple[Finding, ...]
 
 
-def meant_by(design: Design, curves: str | None) -> Meant | None:
-    """The laminate of a design, drawn with such ``curves``; None where it cannot be built or cut.
+def expected_laminate(design: Design, curves: str | None) -> Meant | None:
+    """Return the laminate of a design drawn with ``curves``; None if it cannot be built or cut.
 
-    Of one in chords, the laminate that these cut.
+    With chords, the laminate that these cut.
     """
     try:
         settings = drawn_settings(design, (), curves)
@@ -275,15 +278,12 @@ def meant_by(design: Design, curves: str | None) -> Meant | None:
 
 
 def drawn_settings(design: Design, waived: tuple[str, ...], curves: str | None) -> CutSettings:
-    """How a design's files are drawn with what the manifest says of their ``curves``."""
+    """Return the cut settings of a design for the manifest's claim on ``curves``."""
     return cut_settings(design, waived, curves_of(curves))
 
 
 def departure(path: Region, expected: Region) -> str:
-    """Where a path that was read back is not the expected one; empty where they agree.
-
-    They agree where no edge is further off than the cut files promise (1 um).
-    """
+    """Return the difference of a path read back from the expected one; "" within 1 um."""
     try:
         check_contours(path, expected, TOLERANCE)
     except OutputError as error:

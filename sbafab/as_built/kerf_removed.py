@@ -1,4 +1,4 @@
-"""The kerf undone: the part that a beam leaves which is led along a path."""
+"""Parts computed from beam paths by removing the kerf, and chords replaced by arcs."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from sbafab.geometry.offset import Kerf, rim, shrink, widths
 from sbafab.geometry.region import Region
 
 KINK = 0.05
-"""Radians: arcs along one curve turn less where they join, corners of a path more."""
+"""Smallest turn of a corner, radians; arcs along one curve turn less where they join."""
 STEP = math.radians(5)
-"""Most that a chord turns round a corner."""
-SHARPEST = math.radians(88)
-"""Half the turn of the sharpest corner whose rounding is reckoned with."""
-STILL = 0.15
-"""Share of its way on the path that the part's edge covers less of, where it has a corner."""
+"""Largest turn of a chord round a corner."""
+MAX_HALF_TURN = math.radians(88)
+"""Half the turn of the sharpest corner in `_corner_room`."""
+CORNER_SHARE = 0.15
+"""At a corner, the part's edge is shorter than this share of the path's."""
 
 
-class UncutPart(NamedTuple):
-    """What is left, and the most area that corners lose or gain because the beam rounds them."""
+class CutResult(NamedTuple):
+    """The part, and the largest area that rounded corners lose or gain, mm2."""
 
     region: Region
     corner_room: float
 
 
-def uncut(path: Region, kerf: Kerf) -> UncutPart:
-    """The part inside a path; empty or OutputError where such a beam cannot have left one."""
+def remove_kerf(path: Region, kerf: Kerf) -> CutResult:
+    """Return the part inside a path; raises OutputError, or is empty, if no such part exists."""
     a, b = (width / 2 for width in widths(kerf))
     if a == b:
         region = shrink(path, a)
         rounded = sum(
             isinstance(e, Arc) and not e.ccw and abs(e.radius - a) < 5e-5 for e in region.edges
         )
-        return UncutPart(region, rounded * a * a)
-    region = Region(tuple(_inside(contour, a, b) for contour in path.contours))
+        return CutResult(region, rounded * a * a)
+    region = Region(tuple(_part_contour(contour, a, b) for contour in path.contours))
     check_clear(region.contours)
     joints = [joint for contour in path.contours for joint in _joints(contour)]
-    return UncutPart(region, sum(_corner_room(*joint, a, b) for joint in joints))
+    return CutResult(region, sum(_corner_room(*joint, a, b) for joint in joints))
 
 
-class _Spot(NamedTuple):
-    """A point of the path and of the part; whether a straight edge ends there, or starts."""
+class _Vertex(NamedTuple):
+    """A point of the path and of the part; True if a straight edge ends, or starts, there."""
 
     path: Point
     part: Point
@@ -55,46 +55,48 @@ class _Spot(NamedTuple):
     goes_straight: bool
 
 
-def _inside(contour: Contour, a: float, b: float) -> Contour:
-    """The contour of the part: each vertex of the path lies on the exact curve."""
-    kept: list[_Spot] = []
-    for spot in (spot for joint in _joints(contour) for spot in _spots(*joint, a, b)):
-        if kept and _at_one_corner(kept[-1], spot):
+def _part_contour(contour: Contour, a: float, b: float) -> Contour:
+    """Return the contour of the part: each vertex of the path lies on the exact curve."""
+    vertices: list[_Vertex] = []
+    for vertex in (vertex for joint in _joints(contour) for vertex in _vertices(*joint, a, b)):
+        if vertices and _share_corner(vertices[-1], vertex):
             # The ends of straight edges tell the corner best.
-            best = spot if spot.is_straight else kept[-1]
-            kept[-1] = best._replace(path=spot.path, goes_straight=spot.goes_straight)
+            best = vertex if vertex.is_straight else vertices[-1]
+            vertices[-1] = best._replace(path=vertex.path, goes_straight=vertex.goes_straight)
         else:
-            kept.append(spot)
-    if len(kept) > 1 and _at_one_corner(kept[-1], kept[0]):
-        kept.pop() if kept[0].is_straight else kept.pop(0)
-    inside = tidy(with_arcs(_chords(kept)).edges) if _is_sound(kept) else None
-    if inside is None or inside.is_hole != contour.is_hole:
+            vertices.append(vertex)
+    if len(vertices) > 1 and _share_corner(vertices[-1], vertices[0]):
+        vertices.pop() if vertices[0].is_straight else vertices.pop(0)
+    part = tidy(with_arcs(_chords(vertices)).edges) if _is_sound(vertices) else None
+    if part is None or part.is_hole != contour.is_hole:
         x, y = contour.edges[0].start
         raise OutputError(f"the contour at x {x:.3f}, y {y:.3f} is lost in its kerf")
-    return inside
+    return part
 
 
-def _chords(spots: Sequence[_Spot]) -> Contour:
-    """Lines from spot to spot; a straight edge is two, so that it is no chord of any circle."""
+def _chords(vertices: Sequence[_Vertex]) -> Contour:
+    """Return lines between the vertices; a straight edge is two, and so no chord of a circle."""
     points: list[Point] = []
-    for spot, after in zip(spots, (*spots[1:], spots[0]), strict=True):
+    for spot, after in zip(vertices, (*vertices[1:], vertices[0]), strict=True):
         (x, y), (u, v) = spot.part, after.part
         points += [(x, y), ((x + u) / 2, (y + v) / 2)] if spot.goes_straight else [(x, y)]
     return Contour(tuple(map(Line, points, (*points[1:], points[0]))))
 
 
-def _is_sound(spots: Sequence[_Spot]) -> bool:
-    """Whether the part's edge runs the way its path does."""
-    return len(spots) > 2 and all(
+def _is_sound(vertices: Sequence[_Vertex]) -> bool:
+    """Return True if the part's edges run in the directions of its path."""
+    return len(vertices) > 2 and all(
         (q.part[0] - p.part[0]) * (q.path[0] - p.path[0])
         + (q.part[1] - p.part[1]) * (q.path[1] - p.path[1])
         > -EPSILON
-        for p, q in zip(spots, (*spots[1:], spots[0]), strict=True)
+        for p, q in zip(vertices, (*vertices[1:], vertices[0]), strict=True)
     )
 
 
-def _at_one_corner(one: _Spot, other: _Spot) -> bool:
-    return math.dist(one.part, other.part) < STILL * math.dist(one.path, other.path)
+def _share_corner(vertex: _Vertex, following: _Vertex) -> bool:
+    return math.dist(vertex.part, following.part) < CORNER_SHARE * math.dist(
+        vertex.path, following.path
+    )
 
 
 def _joints(contour: Contour) -> Iterator[tuple[Edge, Edge]]:
@@ -107,16 +109,16 @@ def _turn(before: Edge, after: Edge) -> float:
 
 
 def _corner_room(before: Edge, after: Edge, a: float, b: float) -> float:
-    """The area between a corner to the right and its rounding; it grows as the corner closes."""
+    """Return the area between a corner to the right and its rounding, mm2."""
     if _turn(before, after) > -KINK:
         return 0.0
     (ux, uy), (vx, vy) = before.direction(after.start), after.direction(after.start)
     turn = math.atan2((ux * vy - uy * vx) * a * b, ux * vx * b * b + uy * vy * a * a)
-    return a * b * math.tan(min(abs(turn) / 2, SHARPEST))
+    return a * b * math.tan(min(abs(turn) / 2, MAX_HALF_TURN))
 
 
-def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
-    """A vertex of the path; a corner to the right is rounded by the beam, and makes many spots."""
+def _vertices(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Vertex]:
+    """Yield the vertices of a joint; a corner to the right is rounded by the beam and has many."""
     q, turn = after.start, _turn(before, after)
     if turn > KINK:
         raise OutputError(
@@ -136,17 +138,17 @@ def _spots(before: Edge, after: Edge, a: float, b: float) -> Iterator[_Spot]:
     for more in turns:
         x, y = rim(a, b, first + more)
         last = more == turns[-1] and isinstance(after, Line)
-        yield _Spot(q, (q[0] - x, q[1] - y), straight, last)
+        yield _Vertex(q, (q[0] - x, q[1] - y), straight, last)
 
 
 # Runs of chords that are meant as an arc: found where none should be, and made one again.
 
 
 ON_CIRCLE = 1e-5
-"""mm by which the ends of chords may miss their circle."""
-LEAST_CHORDS = 5
-WIDEST_STEP = math.radians(20)
-"""So many chords, each turning less than this on one circle, are meant as an arc."""
+"""Largest distance of the ends of chords from their circle, mm."""
+MIN_CHORDS = 5
+MAX_STEP = math.radians(20)
+"""As many chords on one circle, each turning less than this, replace an arc."""
 
 
 class ChordRun(NamedTuple):
@@ -157,18 +159,18 @@ class ChordRun(NamedTuple):
     radius: float
 
 
-def chorded_place(region: Region) -> Point | None:
-    """Where a run of chords stands in for an arc; None if there is none."""
+def chords_for_arc(region: Region) -> Point | None:
+    """Return the start of a run of chords that replaces an arc, or None."""
     for contour in region.contours:
-        for run in _runs(_ends(contour)):
-            if len(run.points) > LEAST_CHORDS:
+        for run in _runs(_line_starts(contour)):
+            if len(run.points) > MIN_CHORDS:
                 return run.points[0]
     return None
 
 
 def with_arcs(contour: Contour) -> Contour:
-    """The contour of lines with arcs through every run of chords that are meant as one."""
-    points = _ends(contour)
+    """Return a contour of lines with arcs through every run of chords."""
+    points = _line_starts(contour)
     if len(points) != len(contour.edges):
         return contour
     runs = list(_runs(points))
@@ -186,8 +188,8 @@ def with_arcs(contour: Contour) -> Contour:
     return Contour(tuple(rebuilt))
 
 
-def _ends(contour: Contour) -> list[Point]:
-    """Where the contour's lines start; arcs leave a point that lies on no circle."""
+def _line_starts(contour: Contour) -> list[Point]:
+    """Return the starts of the contour's lines; an arc adds a point that lies on no circle."""
     points: list[Point] = []
     for edge in contour.edges:
         points.append(edge.start)
@@ -197,7 +199,7 @@ def _ends(contour: Contour) -> list[Point]:
 
 
 def _arcs(run: ChordRun) -> tuple[Edge, ...]:
-    """The run as arcs of at most a quarter turn."""
+    """Return the run as arcs of at most a quarter turn."""
     stops, swept = [run.points[0]], 0.0
     for a, b in pairwise(run.points):
         step = 2 * math.asin(min(1.0, math.dist(a, b) / (2 * run.radius)))
@@ -211,48 +213,48 @@ def _arcs(run: ChordRun) -> tuple[Edge, ...]:
 
 
 def _runs(points: list[Point]) -> Iterator[ChordRun]:
-    """Longest runs of at least three short chords on one circle, turning one way."""
+    """Yield the longest runs of at least three short chords on one circle, turning one way."""
     count = len(points)
     if count < 4:
         return
-    first = next((i for i in range(count) if not _is_run(points, i - 1)), None)
+    first = next((i for i in range(count) if not _on_one_circle(points, i - 1)), None)
     if first is None:
-        found = _circle(points[0], points[count // 3], points[2 * count // 3])
-        if found is not None:
-            yield ChordRun((*points, points[0]), *found)
+        fitted = _circle(points[0], points[count // 3], points[2 * count // 3])
+        if fitted is not None:
+            yield ChordRun((*points, points[0]), *fitted)
         return
     # No run reaches over both ends of this ring, whose first chord comes again as its last.
     ring = [points[(first + i) % count] for i in range(count + 2)]
     start, last = 0, count + 1
     while start + 2 <= last:
         end = start + 2
-        while end + 1 <= last and _is_run(ring, end - 2):
+        while end + 1 <= last and _on_one_circle(ring, end - 2):
             end += 1
         run = tuple(ring[start : end + 1])
-        found = _circle(run[0], run[len(run) // 2], run[-1])
-        if found is None or len(run) < 4:
+        fitted = _circle(run[0], run[len(run) // 2], run[-1])
+        if fitted is None or len(run) < 4:
             start += 1
             continue
         if start == 0:
             last -= 1
-        yield ChordRun(run, *found)
+        yield ChordRun(run, *fitted)
         start = end
 
 
-def _is_run(points: list[Point], first: int) -> bool:
-    """Whether four points from ``first`` on lie on one circle, near each other, turning one way."""
+def _on_one_circle(points: list[Point], first: int) -> bool:
+    """Return True if four points from ``first`` on are ends of short chords of one circle."""
     a, b, c, d = (points[(first + i) % len(points)] for i in range(4))
-    found = _circle(a, b, c)
-    if found is None or _angle_between(a, b, c) * _angle_between(b, c, d) <= 0:
+    fitted = _circle(a, b, c)
+    if fitted is None or _angle_between(a, b, c) * _angle_between(b, c, d) <= 0:
         return False
-    centre, radius = found
+    centre, radius = fitted
     longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, d))
-    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _narrow(longest, radius)
+    return abs(math.dist(d, centre) - radius) < ON_CIRCLE and _is_short(longest, radius)
 
 
-def _narrow(length: float, radius: float) -> bool:
-    """Whether a chord is short enough, beside its circle, to stand for an arc."""
-    return length < 2 * math.sin(WIDEST_STEP / 2) * radius
+def _is_short(length: float, radius: float) -> bool:
+    """Return True if a chord is short enough on its circle to replace an arc."""
+    return length < 2 * math.sin(MAX_STEP / 2) * radius
 
 
 def _angle_between(a: Point, b: Point, c: Point) -> float:
@@ -260,7 +262,7 @@ def _angle_between(a: Point, b: Point, c: Point) -> float:
 
 
 def _circle(a: Point, b: Point, c: Point) -> tuple[Point, float] | None:
-    """Centre and radius of the circle through three points; None if they lie on a line."""
+    """Return centre and radius of the circle through three points; None if they lie on a line."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]
     cross = 2 * (ux * vy - uy * vx)
     if abs(cross) < 1e-9:

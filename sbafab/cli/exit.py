@@ -1,4 +1,4 @@
-"""How a command ends when it does not end well: one sentence, an exit code, no traceback."""
+"""Ends of commands: exit codes, one sentence for an error or a signal, and no traceback."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import click
 
-from sbafab.cli.options import Request
 from sbafab.errors import (
     BY_SIGNAL,
     ERROR_SCHEMA,
@@ -28,41 +27,41 @@ from sbafab.errors import (
 )
 
 if TYPE_CHECKING:
-    from sbafab.cutting.properties import Curves
-    from sbafab.output.checked import RunPart
-    from sbafab.runs.run import Conforming, Run, RunRequest
+    pass
 
+RULE_FAILED = 1
 BAD_INPUT = 2
-LATER = 0.01
-"""Seconds after which an interrupt that got lost is raised once more."""
+RAISE_AGAIN_SECONDS = 0.01
+"""Seconds after which a lost interrupt is raised again."""
 
 
 class Exit(NamedTuple):
-    """What ended a command: its kind, one sentence, the exit code."""
+    """The end of a command: kind of error, one sentence, exit code."""
 
     kind: str
     sentence: str
     code: int
 
 
-def end(ending: Exit, as_json: bool) -> NoReturn:
-    """Says what ended the command, for programs as well where they asked, and leaves."""
-    say(ending.sentence)
+def end(outcome: Exit, as_json: bool) -> NoReturn:
+    """Print the error, with ``as_json`` also as JSON on standard output, and exit with its code."""
+    print_error(outcome.sentence)
     if as_json:
-        kind, sentence, code = ending
-        found = {"kind": kind, "message": " ".join(sentence.split()), "exit_code": code}
-        # Where standard output is what failed, there is nobody to tell.
+        kind, sentence, code = outcome
+        document = {"kind": kind, "message": " ".join(sentence.split()), "exit_code": code}
+        # Standard output may be what failed.
         with suppress(OSError):
-            click.echo(json.dumps({"schema": ERROR_SCHEMA, "error": found}, indent=1))
-    sys.exit(ending.code)
+            click.echo(json.dumps({"schema": ERROR_SCHEMA, "error": document}, indent=1))
+    sys.exit(outcome.code)
 
 
-def say(sentence: str) -> None:
+def print_error(sentence: str) -> None:
+    """Print a sentence on standard error, on one line."""
     click.echo(f"sbafab: {' '.join(sentence.split())}", err=True)
 
 
 def prepared_streams() -> None:
-    """Streams that are there, and that print what they cannot encode as escapes."""
+    """Replace closed standard streams, and escape characters that they cannot encode."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
@@ -73,17 +72,17 @@ def prepared_streams() -> None:
 
 
 @contextmanager
-def ended_plainly(as_json: bool = False) -> Iterator[None]:
-    """Turns what may stop a command into one sentence and an exit code; as JSON too if asked."""
-    asked: list[int] = []
+def exit_plainly(as_json: bool = False) -> Iterator[None]:
+    """Turn any error or signal in the block into one sentence and an exit code."""
+    received: list[int] = []
     try:
         try:
-            with _stopped_by_signals(asked):
+            with _interrupted_by_signals(received):
                 yield
         finally:
             # An interrupt amid an import or a callback may come out as any error, or as none.
-            if asked and not isinstance(sys.exception(), Stopped):
-                raise KeyboardInterrupt(asked[0])
+            if received and not isinstance(sys.exception(), Stopped):
+                raise KeyboardInterrupt(received[0])
             sys.stdout.flush()
     except click.UsageError as error:
         sentence = error.format_message().rstrip(".")
@@ -102,49 +101,51 @@ def ended_plainly(as_json: bool = False) -> Iterator[None]:
         sentence = stop.sentence if isinstance(stop, Stopped) else STOPPED
         end(Exit("stopped", sentence, code), as_json)
     except BrokenPipeError:
-        # The reader of standard output has seen enough (``| head``); the files are written.
-        _silence()
+        # The reader of standard output has closed it (``| head``); the files are written.
+        _discard_output()
         sys.exit(BY_SIGNAL + getattr(signal, "SIGPIPE", 13))
     except MemoryError:
         sentence = "there is not enough memory; make the design smaller"
         end(Exit("memory", sentence, BAD_INPUT), as_json)
     except OSError as error:
         if error.filename is None:
-            _silence()
+            _discard_output()
         where = error.filename or "standard output"
         reason = error.strerror or str(error)
-        told = f"{where}: {reason[:1].lower()}{reason[1:]}; make room there or name another place"
-        end(Exit("files", told, BAD_INPUT), as_json)
+        message = (
+            f"{where}: {reason[:1].lower()}{reason[1:]}; free space there or name another folder"
+        )
+        end(Exit("files", message, BAD_INPUT), as_json)
 
 
-def _silence() -> None:
-    """Sends what is left of standard output nowhere, so that leaving does not fail on it."""
+def _discard_output() -> None:
+    """Discard the rest of standard output, so that flushing it at exit does not fail."""
     with suppress(io.UnsupportedOperation), Path(os.devnull).open("wb") as nowhere:
         os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 @contextmanager
-def _stopped_by_signals(asked: list[int]) -> Iterator[None]:
-    """Lets Ctrl-C, a polite kill and a closed terminal stop a run alike: tidied up.
+def _interrupted_by_signals(received: list[int]) -> Iterator[None]:
+    """Raise KeyboardInterrupt for SIGINT, SIGTERM and SIGHUP, so that a run tidies up.
 
-    ``asked`` receives the numbers of the signals that came.
+    ``received`` collects the numbers of the signals.
     """
 
     def stop(number: int, frame: FrameType | None) -> None:
-        asked.append(number)
+        received.append(number)
         if number != signal.SIGINT:
-            # Batch systems ask twice; what is being kept then must not be lost to the second time.
+            # Batch systems send it twice; the second must not cut short what the first tidies up.
             signal.signal(number, signal.SIG_IGN)
         raise KeyboardInterrupt(number)
 
     def lost(unraisable: sys.UnraisableHookArgs) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            threading.Timer(LATER, signal.raise_signal, [signal.SIGINT]).start()
+            threading.Timer(RAISE_AGAIN_SECONDS, signal.raise_signal, [signal.SIGINT]).start()
         else:
             sys.__unraisablehook__(unraisable)
 
     numbers = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
-    # One that is ignored (nohup) stays so.
+    # An ignored signal (nohup) stays ignored.
     before = {n: signal.getsignal(n) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
     hook = sys.unraisablehook
     try:
@@ -156,55 +157,3 @@ def _stopped_by_signals(asked: list[int]) -> Iterator[None]:
         for number, handler in before.items():
             signal.signal(number, handler)
         sys.unraisablehook = hook
-
-
-# What the commands that write a folder do alike: load, run, print, choose the exit code.
-
-
-RULE_FAILED = 1
-
-
-def run_parts(
-    request: Request,
-    parts: Sequence[RunPart],
-    curves: Curves | None = None,
-    conforming: Conforming | None = None,
-) -> None:
-    """Generates the parts of a design and exits with 1 if a rule failed."""
-    from sbafab.actuators import load_design
-    from sbafab.cutting.properties import TRUE_ARCS
-    from sbafab.runs.run import RunRequest
-
-    design = load_design(request.designs[0], request.assignments, request.waivers)
-    run_request(
-        RunRequest(design, request.out, parts, curves or TRUE_ARCS, conforming=conforming), request
-    )
-
-
-def run_request(asked: RunRequest, request: Request) -> None:
-    """Writes a folder, prints what was made and exits with 1 if a rule failed."""
-    from sbafab.cli.printing import print_assembly, print_run, run_json, shown_progress
-    from sbafab.runs.run import generate
-
-    with shown_progress(request.as_json) as progress:
-        run = generate(asked, progress)
-    for name, reason in run.left_out:
-        say(f"nothing for {name}: {reason}")
-    tell(run, request, run_json, print_run if run.between is None else print_assembly)
-
-
-def tell(
-    run: Run,
-    request: Request,
-    as_json: Callable[[Run], object],
-    show: Callable[[Run], None],
-) -> None:
-    """Prints what a run made, for programs or people, and exits with 1 if a rule failed."""
-    from sbafab.cli.printing import print_json
-
-    if request.as_json:
-        print_json(as_json(run))
-    else:
-        show(run)
-    if run.failed:
-        click.get_current_context().exit(RULE_FAILED)

@@ -30,8 +30,8 @@ from sbafab.reports.assembly_prediction import (
 )
 from sbafab.results.records import Record
 from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tolerance
-from sbafab.rules.explained import Explanation
 from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.rules.rule import Explanation
 from sbafab.search.find import Binding, RangeEnd, Spare
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -236,7 +236,8 @@ def pressure_basis(
 ) -> str:
     """Return the sentence that explains the estimated pressures."""
     return (
-        f"estimate: {platen_kpa:g} kPa on the platen are about {estimate.film:.0f} on the films, as "
+        f"estimate: {platen_kpa:g} kPa on the platen are about {estimate.film:.0f} on the films, "
+        "as "
         f"the pad ({thickness:g} mm, {pad.modulus / 1000:.2f} MPa) gives way {under.height:.3f} mm "
         f"more there; {estimate.edge:.0f} within {estimate.free:.1f} mm of their edge, "
         f"{estimate.bond:.0f} over the lowest bond, {estimate.plate:.0f} beside them"

@@ -85,14 +85,16 @@ def summary(findings: Iterable[Finding]) -> dict[str, object]:
     return {"holds": counts["fail"] == 0, **{name: counts[name] for name in verdicts}}
 
 
-def counted(findings: Iterable[Finding]) -> str:
-    """Return in words how many rules pass, warn, are waived by the design, or fail."""
-    counts = summary(findings)
+def counted(*groups: Iterable[Finding]) -> str:
+    """Return the number of rules in groups of findings, and of warnings, waived and failed ones."""
+    counts: Counter[str] = Counter()
+    for findings in groups:
+        counts.update(finding.verdict for finding in decisive(findings).values())
     words = [
-        f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
-        f"{counts['warn']} warning{'' if counts['warn'] == 1 else 's'}" if counts["warn"] else "",
+        "1 rule" if counts.total() == 1 else f"{counts.total()} rules",
+        f"{counts['warn']} warning{'s' if counts['warn'] > 1 else ''}" if counts["warn"] else "",
         f"{counts['waived']} waived" if counts["waived"] else "",
-        f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
+        f"{counts['fail']} failed" if counts["fail"] else "",
     ]
     return ", ".join(word for word in words if word)
 
@@ -133,7 +135,7 @@ class Findings(tuple[Finding, ...]):
         ]
 
     def __repr__(self) -> str:
-        return f"Findings({counted(self) or 'none'})"
+        return f"Findings({counted(self)})"
 
     def _repr_html_(self) -> str:
         rows = [(f.rule, f.verdict, f.measured, f.limit, f.unit, f.message) for f in self]

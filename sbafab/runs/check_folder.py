@@ -1,7 +1,7 @@
-"""An output folder read back, made again from its design and compared.
+"""An output folder read back, made again from its design and compared: texts, tables, meshes.
 
-The design is that of the folder's ``design.toml``, whose layers the cut files have been held
-against; the places of the parts on their film sheets are those of the folder's ``nest.json``.
+The design is that of ``design.toml``; the places of parts on film sheets are those of
+``nest.json``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sbafab.as_built.check import FolderReadBack, as_designed, read_back
 from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
 from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.expected import drawn_settings
-from sbafab.as_built.records import DESIGNED, Problem, is_job, is_joined
+from sbafab.as_built.records import DESIGNED, Problem, is_assembly, is_job
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
 from sbafab.cutting.dxf_read import ReadBack, read_profile
@@ -71,12 +71,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 INDEX = "manifest.json"
-UNMADE = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
-"""What a doctored design can raise where a sound one is made."""
+DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
+"""Errors of a doctored design."""
 BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
-"""Folders and files of an earlier run that lie beside what is made again."""
+"""Folders and files of other commands, which are not made again."""
 NOT_COMPARED = ("files", "mesh_statistics", "meshes")
-"""Keys of a manifest with hashes, and with meshes of more than one command."""
+"""Keys of a manifest that hold hashes, or meshes of several commands."""
 
 
 def check_folder(folder: Path) -> tuple[Finding, ...]:
@@ -99,27 +99,27 @@ def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:
     if read.job is not None:
         return [*read.problems, *_job_problems(folder, read.job, whole, read.designs[0].claims)]
     (built,) = read.designs
-    assert built.meant is not None
-    return [*read.problems, *_problems(folder, built.claims, whole[0], built.meant.paths)]
+    assert built.expected is not None
+    return [*read.problems, *_problems(folder, built.claims, whole[0], built.expected.paths)]
 
 
 def _problems(
     folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region]
 ) -> list[Problem]:
-    """Files of one design that are not what it makes; of a job's design, all but its sheets.
+    """Return the files of a design that differ from those made again; no sheets of a job's design.
 
-    ``paths`` holds the beam's path for every pattern of the design's laminate.
+    ``paths`` holds the beam's path for every pattern of the laminate.
     """
     of_job = is_job(folder.absolute().parent)
-    with _made_anew(folder) as (fresh, problems):
+    with _temporary_folder(folder) as (fresh, problems):
         order = checked.design.order
         parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
-        index = _write_anew(folder, fresh, claims, checked, paths, None if of_job else parts)
-        made = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
+        index = _regenerate(folder, fresh, claims, checked, paths, None if of_job else parts)
+        regenerated = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
         # The pages of a job's design show the sheets of the job, and are compared there.
-        others = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
-        problems.extend(_foreign_problems(claims, made, others))
-        problems.extend(_differences(folder, fresh, claims.files, claims.generator))
+        excluded = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
+        problems.extend(_foreign_problems(claims, regenerated, excluded))
+        problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))
         problems.extend(_prediction_problems(folder, fresh, claims, checked))
     return problems
@@ -128,55 +128,55 @@ def _problems(
 def _job_problems(
     folder: Path, job: JobManifest, checked: Sequence[Checked], claims: Manifest
 ) -> list[Problem]:
-    """Files of a job, and of its designs' folders, that are not what the designs make.
+    """Return the files of a job and of its designs' folders that differ from those made again.
 
     ``claims`` are those of one of the designs, which say how chords were drawn.
     """
     curves = curves_of(claims.curves)
-    with _made_anew(folder) as (fresh, problems):
+    with _temporary_folder(folder) as (fresh, problems):
         whole = CheckedJob(job.schema_name, job.name, tuple(checked))
-        if is_joined(job):
+        if is_assembly(job):
             whole = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), checked)
-        wanted = PICTURES if is_joined(job) and whole.failed else EVERYTHING
-        designs = [plan_design(design, wanted, curves) for design in checked]
+        parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
+        designs = [plan_design(design, parts, curves) for design in checked]
         write_folder(plan_job(whole, designs, folder, unheard), fresh, unheard)
         problems.extend(_foreign_problems(job, file_names(fresh)))
-        problems.extend(_differences(folder, fresh, job.files, job.generator))
+        problems.extend(_file_problems(folder, fresh, job.files, job.generator))
     return problems
 
 
 def _foreign_problems(
-    claims: Manifest | JobManifest, made: Collection[str], others: Collection[str] = ()
+    claims: Manifest | JobManifest, regenerated: Collection[str], excluded: Collection[str] = ()
 ) -> list[Problem]:
     """Return the files that a manifest lists and its design does not make.
 
-    ``others``: folders and files of commands that are not run again here; what could be cut is not
-    theirs either.
+    ``excluded``: folders and files of other commands, except files that could be cut.
     """
     return [
-        _other(
+        _problem(
             f"{path} is listed and is no file of this design",
             claims.generator,
             is_done=path.lower().endswith(CUT_ENDINGS),
         )
         for path in claims.files
-        if path not in made and (could_be_cut(path) or path.partition("/")[0] not in others)
+        if path not in regenerated
+        and (could_be_cut(path) or path.partition("/")[0] not in excluded)
     ]
 
 
 @contextmanager
-def _made_anew(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
-    """An empty folder, and problems to be added to: also that the design could not be made."""
+def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
+    """Yield an empty folder and a list of problems; an error of the design is added to it."""
     problems: list[Problem] = []
     with TemporaryDirectory() as name:
         try:
             yield Path(name), problems
-        except UNMADE as error:
+        except DESIGN_ERRORS as error:
             message = f"{folder.name} could not be made again to be compared: {error}"
             problems.append(Problem(DESIGNED, message))
 
 
-def _write_anew(
+def _regenerate(
     folder: Path,
     fresh: Path,
     claims: Manifest,
@@ -184,28 +184,30 @@ def _write_anew(
     paths: Mapping[str, Region],
     parts: Sequence[NestPart] | None,
 ) -> dict[str, Any]:
-    """Writes what a run would have put beside the layers' files; its manifest, without hashes.
+    """Write the files of a run beside the layers to ``fresh``; return its manifest without hashes.
 
-    The ``parts`` go on film sheets of their own; a design of a job has none.
+    ``parts`` are placed on film sheets; None for a design of a job.
     """
     design = checked.design
     settings = drawn_settings(design, checked.waived, claims.curves)
-    wanted = _parts(claims.files)
+    parts_of_run = _parts(claims.files)
     # Pictures come with a run that makes everything: then there is a page as well.
-    has_page = parts is not None and (TRAVELLER in claims.files or {"press", "preview"} <= wanted)
-    wanted |= {"press", "preview"} if has_page else set()
+    has_page = parts is not None and (
+        TRAVELLER in claims.files or {"press", "preview"} <= parts_of_run
+    )
+    parts_of_run |= {"press", "preview"} if has_page else set()
     sheets: list[SheetFile] = []
     if parts is not None:
         nests = find_nests(parts, design, folder, unheard)
         sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
     write_plates(checked, paths, fresh, settings)
-    pressing = schedule_of(checked) if "press" in wanted else None
-    plan = DesignPlan(checked, frozenset(wanted), settings, pressing)
+    pressing = schedule_of(checked) if "press" in parts_of_run else None
+    plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
     return write_design(DesignFolder(plan, sheets, fresh, unheard, parts is not None))
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
-    """The parts of a run that a folder's files are of."""
+    """Return the parts of a run that wrote these files."""
     parts: set[RunPart] = {"cut"}
     if any(path in files for path in PRESS):
         parts.add("press")
@@ -216,13 +218,12 @@ def _parts(files: Collection[str]) -> set[RunPart]:
     return parts
 
 
-def _differences(
+def _file_problems(
     folder: Path, fresh: Path, listed: Collection[str], generator: str
 ) -> list[Problem]:
-    """Files that are not as they are made again.
+    """Return the files that differ from those made again.
 
-    What another version of this program has written may read otherwise and be right: then it is a
-    warning, but for what is cut and pressed.
+    A difference of a file of another version is a warning, unless it is cut or pressed.
     """
     problems = []
     for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
@@ -230,56 +231,64 @@ def _differences(
         if name == INDEX or (path.parent.name == LAYERS and path.suffix == ".dxf"):
             continue
         if name not in listed or not (folder / name).is_file():
-            said = f"{name} is missing"
+            difference = f"{name} is missing"
         elif name.endswith(f"/{INDEX}"):
-            said = index_difference(_index(folder / name), _index(path), ("files",))
-            said = f"{name}: {said}" if said else ""
+            difference = index_difference(_read_index(folder / name), _read_index(path), ("files",))
+            difference = f"{name}: {difference}" if difference else ""
         else:
-            said = file_difference(folder / name, path, name)
-        if said:
+            difference = file_difference(folder / name, path, name)
+        if difference:
             is_done = name.endswith((*PRESS, *CUT_ENDINGS))
-            problems.append(_other(said, generator, is_done))
+            problems.append(_problem(difference, generator, is_done))
     return problems
 
 
-def _other(said: str, generator: str, is_done: bool) -> Problem:
+def _problem(message: str, generator: str, is_done: bool) -> Problem:
     if generator == GENERATOR or is_done:
-        return Problem(DESIGNED, f"{said}; regenerate the folder")
-    said = f"{said}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
-    return Problem(DESIGNED, said, verdict="warn")
+        return Problem(DESIGNED, f"{message}; regenerate the folder")
+    message = (
+        f"{message}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
+    )
+    return Problem(DESIGNED, message, verdict="warn")
 
 
-def _index(path: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
+def _read_index(path: Path) -> dict[str, Any]:
+    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return index
 
 
 def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
-    """Where the manifest is not the design's; sheets of a job are claimed by the job."""
+    """Return the differences of the manifest from the design's, without sheets of a job."""
     left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
-    found, wanted = _index(folder / INDEX), json.loads(as_json(index))
-    said = index_difference(found, wanted, left_out) or _mesh_difference(folder, found, wanted)
-    return [Problem(DESIGNED, f"manifest.json: {said}; regenerate the folder")] if said else []
+    actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
+    difference = index_difference(actual, expected, left_out) or _mesh_difference(
+        folder, actual, expected
+    )
+    return (
+        [Problem(DESIGNED, f"manifest.json: {difference}; regenerate the folder")]
+        if difference
+        else []
+    )
 
 
-def _mesh_difference(folder: Path, found: dict[str, Any], wanted: dict[str, Any]) -> str:
-    """Surfaces that the manifest lists otherwise; a library may make other triangles of them."""
-    said = [one for one in found.get("meshes", []) if isinstance(one, dict)]
-    listed = [one for one in said if one.get("kind") in ("solid", "cavity")]
-    if len(listed) != len(wanted["meshes"]):
-        return f"it lists {len(listed)} surfaces, not {len(wanted['meshes'])}"
-    for mesh in wanted["meshes"]:
-        own: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
+def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
+    """Return a difference of the listed surfaces; numbers of triangles may depend on libraries."""
+    meshes = [entry for entry in actual.get("meshes", []) if isinstance(entry, dict)]
+    listed = [entry for entry in meshes if entry.get("kind") in ("solid", "cavity")]
+    if len(listed) != len(expected["meshes"]):
+        return f"it lists {len(listed)} surfaces, not {len(expected['meshes'])}"
+    for mesh in expected["meshes"]:
+        listed_mesh: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
         count = mesh["elements"]
-        if own.get("elements") != count:
+        if listed_mesh.get("elements") != count:
             count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
-        off = index_difference(own, {**mesh, "elements": count}, ())
-        if off:
-            return f"{mesh['file']}: {off}"
+        difference = index_difference(listed_mesh, {**mesh, "elements": count}, ())
+        if difference:
+            return f"{mesh['file']}: {difference}"
     return ""
 
 
-class _Wish(BaseModel):
+class _PredictionRequest(BaseModel):
     pressures_kpa: tuple[float, ...]
     flow_ml_min: float
     volumes_ul: tuple[float, ...]
@@ -289,67 +298,65 @@ class _Wish(BaseModel):
     modulus_mpa: float | None
 
 
-class _Predicted(BaseModel):
-    """What of ``predict.json`` says what was asked for."""
+class _PredictionFile(BaseModel):
+    """The request in ``predict.json``."""
 
-    asked: _Wish
+    asked: _PredictionRequest
 
 
 def _prediction_problems(
     folder: Path, fresh: Path, claims: Manifest, checked: Checked
 ) -> list[Problem]:
-    """The prediction, asked for again what the file says that was asked for."""
+    """Return differences of the prediction from one for the same request."""
     if "predict.json" not in claims.files:
         return []
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict
 
     try:
-        told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
-        measured = told.pocket_loss, told.modulus_mpa
-        factors = Factors(told.press_factor, told.contact_factor, *measured)
-        wish = Asked(told.pressures_kpa, told.flow_ml_min, told.volumes_ul, factors)
-        apart = fresh / "prediction"
-        apart.mkdir()
+        request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
+        measured = request.pocket_loss, request.modulus_mpa
+        factors = Factors(request.press_factor, request.contact_factor, *measured)
+        wish = Asked(request.pressures_kpa, request.flow_ml_min, request.volumes_ul, factors)
+        written = fresh / "prediction"
+        written.mkdir()
         settings = drawn_settings(checked.design, checked.waived, claims.curves)
         prediction = predict(checked.design, wish)
         plan = DesignPlan(checked, frozenset(("predict",)), settings, prediction=prediction)
         rows = [row for row in ARTEFACTS if row.part == "predict"]
-        write_artefacts(DesignFolder(plan, (), apart, unheard), rows)
+        write_artefacts(DesignFolder(plan, (), written, unheard), rows)
     except (ValueError, OSError) as error:
-        said = f"predict.json does not say what was asked for ({error})"
-        return [_other(said, claims.generator, is_done=False)]
-    return _differences(folder, apart, claims.files, claims.generator)
+        message = f"predict.json does not say what was asked for ({error})"
+        return [_problem(message, claims.generator, is_done=False)]
+    return _file_problems(folder, written, claims.files, claims.generator)
 
 
-# Whether two files hold the same: bytes first, then what a reader takes from them.
-#
-# Bytes may differ where another program has saved a drawing, or another version of a library has
-# made a mesh or a picture, and nothing differs that is cut, pressed or read.
+# Comparison of two files: bytes first, then contents, since another program or another version of a
+# library may write the same contents in other bytes.
 
 
-SHARE, LEAST = 1e-6, 1e-6
-"""Numbers that differ by less, relatively or at all, say the same: libraries round otherwise."""
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
+"""Tolerances of numbers, since libraries round differently."""
 GREY = 1.0
-"""Mean difference of two pictures, of 255 levels, that antialiasing may make."""
-SEEN, FEW = 48, 2e-4
-"""A pixel that differs by as much is seen; that share of them may be."""
+"""Mean difference of two pictures by antialiasing, of 255 levels."""
+VISIBLE, VISIBLE_SHARE = 48, 2e-4
+"""Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
 UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 LONGEST_SHOWN = 40
 
 
-def file_difference(found: Path, meant: Path, name: str) -> str:
-    """What differs between a file and what it should be, in a sentence; empty where nothing does.
+def file_difference(actual: Path, expected: Path, name: str) -> str:
+    """Return the difference of a file from the expected one in a sentence; "" if none.
 
-    ``name`` is what the sentence calls the file.
+    ``name``: the file's name in the sentence.
     """
-    data, wanted = found.read_bytes(), meant.read_bytes()
-    if data == wanted:
+    data, expected_data = actual.read_bytes(), expected.read_bytes()
+    if data == expected_data:
         return ""
     try:
-        said = _readers()[meant.suffix](found, meant)
+        difference = _readers()[expected.suffix](actual, expected)
     except (
         OutputError,
         ValueError,
@@ -358,28 +365,30 @@ def file_difference(found: Path, meant: Path, name: str) -> str:
         RecursionError,
         csv.Error,
     ) as error:
-        said = f"it cannot be read ({error})"
-    return f"{name} is not what design.toml makes: {said}" if said else ""
+        difference = f"it cannot be read ({error})"
+    return f"{name} is not what design.toml makes: {difference}" if difference else ""
 
 
-def index_difference(found: Any, meant: Any, left_out: Collection[str]) -> str:
-    """Where a manifest differs from one, but for the keys left out; empty where nowhere."""
-    if not isinstance(found, dict):
+def index_difference(actual: Any, expected: Any, left_out: Collection[str]) -> str:
+    """Return the first difference of two manifests, except the keys ``left_out``; "" if none."""
+    if not isinstance(actual, dict):
         return "it is no index"
-    own, wanted = (
+    actual_index, expected_index = (
         {key: value for key, value in index.items() if key not in left_out}
-        for index in (found, meant)
+        for index in (actual, expected)
     )
-    return _value_difference(own, wanted, "")
+    return _value_difference(actual_index, expected_index, "")
 
 
 def _readers() -> dict[str, Callable[[Path, Path], str]]:
     return {
         ".json": _json_difference,
         ".dxf": _drawing_difference,
-        ".png": lambda found, meant: _picture_difference(found.read_bytes(), meant.read_bytes()),
+        ".png": lambda path, expected: _picture_difference(
+            path.read_bytes(), expected.read_bytes()
+        ),
         ".csv": _table_difference,
-        ".pdf": lambda found, meant: "it shows something else",
+        ".pdf": lambda path, expected: "it shows something else",
         **dict.fromkeys((".svg", ".toml", ".html", ENDING), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }
@@ -390,26 +399,32 @@ def _text(path: Path) -> str:
         return file.read()
 
 
-def _json_difference(found: Path, meant: Path) -> str:
-    own, wanted = (json.loads(_text(path)) for path in (found, meant))
-    return _value_difference(own, wanted, "")
+def _json_difference(actual: Path, expected: Path) -> str:
+    actual_json, expected_json = (json.loads(_text(path)) for path in (actual, expected))
+    return _value_difference(actual_json, expected_json, "")
 
 
-def _table_difference(found: Path, meant: Path) -> str:
-    """Where two tables differ, by row and column; rows are counted below the columns' names."""
-    own, wanted = ([*csv.reader(_text(path).splitlines(True))] for path in (found, meant))
-    if own[:1] != wanted[:1]:
-        names, others = (", ".join(row) for table in (own, wanted) for row in table[:1] or [[]])
-        return f"its columns are {_shown(names)}, not {_shown(others)}"
-    if len(own) != len(wanted):
-        return f"it has {_rows(len(own) - 1)}, not {len(wanted) - 1}"
-    for number, (row, other) in enumerate(zip(own[1:], wanted[1:], strict=True), start=1):
-        if len(row) != len(other):
-            return f"row {number} has {len(row)} cells, not {len(other)}"
-        for name, cell, meant_cell in zip(wanted[0], row, other, strict=True):
-            said = _value_difference(cell, meant_cell, f"row {number}, column {name}")
-            if said:
-                return said
+def _table_difference(actual: Path, expected: Path) -> str:
+    """Return the first difference of two tables by row and column; row 1 is below the names."""
+    rows, expected_rows = (
+        [*csv.reader(_text(path).splitlines(True))] for path in (actual, expected)
+    )
+    if rows[:1] != expected_rows[:1]:
+        names, expected_names = (
+            ", ".join(row) for table in (rows, expected_rows) for row in table[:1] or [[]]
+        )
+        return f"its columns are {_shown(names)}, not {_shown(expected_names)}"
+    if len(rows) != len(expected_rows):
+        return f"it has {_rows(len(rows) - 1)}, not {len(expected_rows) - 1}"
+    for number, (row, expected_row) in enumerate(
+        zip(rows[1:], expected_rows[1:], strict=True), start=1
+    ):
+        if len(row) != len(expected_row):
+            return f"row {number} has {len(row)} cells, not {len(expected_row)}"
+        for name, cell, expected_cell in zip(expected_rows[0], row, expected_row, strict=True):
+            difference = _value_difference(cell, expected_cell, f"row {number}, column {name}")
+            if difference:
+                return difference
     return ""
 
 
@@ -417,36 +432,38 @@ def _rows(count: int) -> str:
     return f"{count} row{'' if count == 1 else 's'}"
 
 
-def _value_difference(found: Any, meant: Any, where: str) -> str:
-    if isinstance(meant, dict) and isinstance(found, dict):
-        for key in meant | found:
-            if key not in found or key not in meant:
-                return f"{where}{key} is {'missing' if key not in found else 'one too many'}"
-            said = _value_difference(found[key], meant[key], f"{where}{key}.")
-            if said:
-                return said
+def _value_difference(actual: Any, expected: Any, where: str) -> str:
+    if isinstance(expected, dict) and isinstance(actual, dict):
+        for key in expected | actual:
+            if key not in actual or key not in expected:
+                return f"{where}{key} is {'missing' if key not in actual else 'one too many'}"
+            difference = _value_difference(actual[key], expected[key], f"{where}{key}.")
+            if difference:
+                return difference
         return ""
-    if isinstance(meant, list) and isinstance(found, list):
-        if len(meant) != len(found):
-            return f"{where.rstrip('.')} has {len(found)} entries, not {len(meant)}"
-        pairs = zip(found, meant, strict=True)
-        told = (_value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1))
-        return next(filter(None, told), "")
-    if _is_number(meant) and _is_number(found):
-        same = _alike(float(found), float(meant))
-    elif isinstance(meant, str) and isinstance(found, str):
-        same = not _words_difference(found, meant)
+    if isinstance(expected, list) and isinstance(actual, list):
+        if len(expected) != len(actual):
+            return f"{where.rstrip('.')} has {len(actual)} entries, not {len(expected)}"
+        pairs = zip(actual, expected, strict=True)
+        differences = (
+            _value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1)
+        )
+        return next(filter(None, differences), "")
+    if _is_number(expected) and _is_number(actual):
+        same = _is_close(float(actual), float(expected))
+    elif isinstance(expected, str) and isinstance(actual, str):
+        same = not _words_difference(actual, expected)
     else:
-        same = type(found) is type(meant) and found == meant
-    return "" if same else f"{where.rstrip('.')} is {_shown(found)}, not {_shown(meant)}"
+        same = type(actual) is type(expected) and actual == expected
+    return "" if same else f"{where.rstrip('.')} is {_shown(actual)}, not {_shown(expected)}"
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _alike(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=SHARE, abs_tol=LEAST)
+def _is_close(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=RELATIVE_TOLERANCE, abs_tol=ABSOLUTE_TOLERANCE)
 
 
 def _shown(value: object) -> str:
@@ -454,28 +471,34 @@ def _shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
-def _text_difference(found: Path, meant: Path) -> str:
-    own, wanted = _text(found), _text(meant)
-    pictures, others = PICTURE.findall(own), PICTURE.findall(wanted)
-    if len(pictures) != len(others):
-        return f"it has {len(pictures)} pictures, not {len(others)}"
-    for number, (one, other) in enumerate(zip(pictures, others, strict=True), start=1):
-        said = _picture_difference(base64.b64decode(one), base64.b64decode(other))
-        if said:
-            return f"picture {number}: {said}"
-    return _words_difference(PICTURE.sub("", own), PICTURE.sub("", wanted))
+def _text_difference(actual: Path, expected: Path) -> str:
+    text, expected_text = _text(actual), _text(expected)
+    pictures, expected_pictures = PICTURE.findall(text), PICTURE.findall(expected_text)
+    if len(pictures) != len(expected_pictures):
+        return f"it has {len(pictures)} pictures, not {len(expected_pictures)}"
+    for number, (picture, expected_picture) in enumerate(
+        zip(pictures, expected_pictures, strict=True), start=1
+    ):
+        difference = _picture_difference(
+            base64.b64decode(picture), base64.b64decode(expected_picture)
+        )
+        if difference:
+            return f"picture {number}: {difference}"
+    return _words_difference(PICTURE.sub("", text), PICTURE.sub("", expected_text))
 
 
-def _words_difference(found: str, meant: str) -> str:
-    """The first word or number that differs; how texts are broken into lines does not count."""
-    own, wanted = [*_tokens(found)], [*_tokens(meant)]
-    for one, other in zip(own, wanted, strict=False):
-        if one != other and not (
-            NUMBER.fullmatch(one) and NUMBER.fullmatch(other) and _alike(float(one), float(other))
+def _words_difference(actual: str, expected: str) -> str:
+    """Return the first different word or number; line breaks do not count."""
+    words, expected_words = [*_tokens(actual)], [*_tokens(expected)]
+    for word, expected_word in zip(words, expected_words, strict=False):
+        if word != expected_word and not (
+            NUMBER.fullmatch(word)
+            and NUMBER.fullmatch(expected_word)
+            and _is_close(float(word), float(expected_word))
         ):
-            return f"{_shown(one)} stands where {_shown(other)} should"
-    if len(own) != len(wanted):
-        return f"it has {len(own)} words and numbers, not {len(wanted)}"
+            return f"{_shown(word)} stands where {_shown(expected_word)} should"
+    if len(words) != len(expected_words):
+        return f"it has {len(words)} words and numbers, not {len(expected_words)}"
     return ""
 
 
@@ -488,106 +511,118 @@ def _tokens(text: str) -> Iterator[str]:
     yield from text[last:].split()
 
 
-def _picture_difference(found: bytes, meant: bytes) -> str:
-    """Pixels are compared, so that another library's compression is no difference."""
+def _picture_difference(actual: bytes, expected: bytes) -> str:
+    """Compare the pixels of two pictures, since compression depends on the library."""
     import numpy as np
     from PIL import Image, UnidentifiedImageError
 
     try:
-        own, wanted = (
+        pixels, expected_pixels = (
             np.asarray(Image.open(BytesIO(data)).convert("RGBA"), dtype=np.int16)
-            for data in (found, meant)
+            for data in (actual, expected)
         )
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
         return f"it is no sound picture ({error})"
-    if own.shape != wanted.shape:
-        return f"it measures {own.shape[1]} x {own.shape[0]} pixels"
-    off = np.abs(own - wanted).max(axis=2)
-    seen = np.argwhere(off >= SEEN)
-    if off.mean() > GREY or len(seen) > FEW * off.size:
-        y, x = seen[0] if len(seen) else np.unravel_index(int(off.argmax()), off.shape)
+    if pixels.shape != expected_pixels.shape:
+        return f"it measures {pixels.shape[1]} x {pixels.shape[0]} pixels"
+    difference = np.abs(pixels - expected_pixels).max(axis=2)
+    visible = np.argwhere(difference >= VISIBLE)
+    if difference.mean() > GREY or len(visible) > VISIBLE_SHARE * difference.size:
+        y, x = (
+            visible[0]
+            if len(visible)
+            else np.unravel_index(int(difference.argmax()), difference.shape)
+        )
         return f"pixels differ, as at {x}, {y}"
     return ""
 
 
-def _drawing_difference(found: Path, meant: Path) -> str:
-    """Contours, strokes and properties of two drawings."""
-    sound_digest(found)
-    own, wanted = read_profile(found), read_profile(meant)
+def _drawing_difference(actual: Path, expected: Path) -> str:
+    """Return a difference of contours, strokes or properties of two drawings; "" if none."""
+    sound_digest(actual)
+    drawing, expected_drawing = read_profile(actual), read_profile(expected)
     try:
-        check_contours(own.region, wanted.region, TOLERANCE)
+        check_contours(drawing.region, expected_drawing.region, TOLERANCE)
     except OutputError as error:
         return str(error).rstrip(".")
     # A version of DXF that knows no properties drops all of them, which is told once elsewhere.
-    for name, value in wanted.properties.items() if own.properties else ():
-        if own.properties.get(name) != value:
-            return f"custom property {name} is {own.properties.get(name)!r}, not {value!r}"
-    return _stroke_difference(own, wanted)
+    for name, value in expected_drawing.properties.items() if drawing.properties else ():
+        if drawing.properties.get(name) != value:
+            return f"custom property {name} is {drawing.properties.get(name)!r}, not {value!r}"
+    return _stroke_difference(drawing, expected_drawing)
 
 
-def _stroke_difference(own: ReadBack, wanted: ReadBack) -> str:
-    """Engraving, parting cut, frame or datum that another drawing has, or has not."""
-    left = [*wanted.strokes]
-    for layer, edges in own.strokes:
+def _stroke_difference(drawing: ReadBack, expected: ReadBack) -> str:
+    """Return a stroke (engraving, cut, frame or datum) that only one drawing has; "" if none."""
+    missing = [*expected.strokes]
+    for layer, edges in drawing.strokes:
         points = [edges[0].start, *(edge.end for edge in edges)]
-        match = next((one for one in left if one[0] == layer and _follows(points, one[1])), None)
+        match = next(
+            (
+                stroke
+                for stroke in missing
+                if stroke[0] == layer and _same_points(points, stroke[1])
+            ),
+            None,
+        )
         if match is None:
             x, y = points[0]
             return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} should not be there"
-        left.remove(match)
-    if left:
-        (x, y) = left[0][1][0].start
-        return f"the stroke on {left[0][0]} at x {x:.3f}, y {y:.3f} is missing"
+        missing.remove(match)
+    if missing:
+        (x, y) = missing[0][1][0].start
+        return f"the stroke on {missing[0][0]} at x {x:.3f}, y {y:.3f} is missing"
     return ""
 
 
-def _follows(points: list[tuple[float, float]], edges: Any) -> bool:
-    wanted = [edges[0].start, *(edge.end for edge in edges)]
-    return len(wanted) == len(points) and any(
+def _same_points(points: list[tuple[float, float]], edges: Any) -> bool:
+    expected = [edges[0].start, *(edge.end for edge in edges)]
+    return len(expected) == len(points) and any(
         all(math.dist(p, q) <= TOLERANCE for p, q in zip(points, run, strict=True))
-        for run in (wanted, wanted[::-1])
+        for run in (expected, expected[::-1])
     )
 
 
 # Surfaces read back from STL, 3MF and GLB files, and compared.
 
 
-NEAR = 2e-5
-"""mm by which a point stored in single precision, or to 6 decimals, may be off."""
+POINT_TOLERANCE = 2e-5
+"""Rounding error of points in single precision or with 6 decimals, mm."""
 MESH_SHARE = 1e-5
-"""Share of a volume by which two triangulations of one solid may differ."""
-MOST_BYTES = 500_000_000
-MOST_SIZE = 1e5
-"""mm from the origin."""
+"""Relative difference of volume between triangulations of one solid."""
+MAX_MESH_BYTES = 500_000_000
+MAX_COORDINATE = 1e5
+"""Largest coordinate, mm."""
 MODEL = "3D/3dmodel.model"
 VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
 TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
 
 
-class Body(NamedTuple):
-    """A surface, and what its file says of it beside points and faces."""
+class MeshBody(NamedTuple):
+    """A surface, and the other data of its body in the file as text."""
 
     surface: Surface
-    said: str
+    metadata: str
 
 
-def mesh_difference(found: Path, meant: Path) -> str:
-    """What differs between two mesh files of one format; empty where they hold the same bodies.
+def mesh_difference(actual: Path, expected: Path) -> str:
+    """Return a difference of two mesh files of one format; "" if they hold the same bodies.
 
-    Triangles may lie otherwise, as another version of a library lays them; points, enclosed
-    volume, area and watertightness may not differ.
+    Points, enclosed volume, area and watertightness are compared; triangles may differ.
     """
-    own, wanted = bodies(found), bodies(meant)
-    if len(own) != len(wanted):
-        return f"it holds {len(own)} bodies, not {len(wanted)}"
-    pairs = zip(own, wanted, strict=True)
-    return next(filter(None, (_difference(one, other) for one, other in pairs)), "")
+    mesh_bodies, expected_bodies = bodies(actual), bodies(expected)
+    if len(mesh_bodies) != len(expected_bodies):
+        return f"it holds {len(mesh_bodies)} bodies, not {len(expected_bodies)}"
+    pairs = zip(mesh_bodies, expected_bodies, strict=True)
+    return next(
+        filter(None, (_body_difference(body, expected_body) for body, expected_body in pairs)), ""
+    )
 
 
-def bodies(path: Path) -> list[Body]:
-    """The bodies of a mesh file, in mm. Raises OutputError for what is none."""
-    if path.stat().st_size > MOST_BYTES:
-        raise OutputError(f"larger than {MOST_BYTES:,} bytes")
+def bodies(path: Path) -> list[MeshBody]:
+    """Read the bodies of a mesh file, mm. Raises OutputError for an unsound file."""
+    if path.stat().st_size > MAX_MESH_BYTES:
+        raise OutputError(f"larger than {MAX_MESH_BYTES:,} bytes")
     readers = {".stl": _stl, ".3mf": _3mf, ".glb": _glb}
     try:
         return readers[path.suffix](path)
@@ -595,22 +630,25 @@ def bodies(path: Path) -> list[Body]:
         raise OutputError(f"no sound mesh: {error}") from error
 
 
-def _difference(own: Body, wanted: Body) -> str:
-    if own.said != wanted.said:
+def _body_difference(body: MeshBody, expected: MeshBody) -> str:
+    if body.metadata != expected.metadata:
         return "names, materials or scales of its bodies are others"
-    surface, meant = own.surface, wanted.surface
-    said = _unsound(surface)
-    if said:
-        return said
-    for one, other, what in ((surface, meant, "too many"), (meant, surface, "missing")):
-        stray = _stray(one.points, other.points)
-        if stray is not None:
-            x, y, z = stray
-            return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {what}"
-    if abs(surface.volume - meant.volume) > MESH_SHARE * abs(meant.volume):
-        return f"it encloses {surface.volume:.4f} mm3, not {meant.volume:.4f}"
-    if abs(_area(surface) - _area(meant)) > MESH_SHARE * _area(meant):
-        return f"its surface is {_area(surface):.3f} mm2, not {_area(meant):.3f}"
+    surface, expected_surface = body.surface, expected.surface
+    defect = _unsound(surface)
+    if defect:
+        return defect
+    for present, compared, fault in (
+        (surface, expected_surface, "too many"),
+        (expected_surface, surface, "missing"),
+    ):
+        point = _unmatched_point(present.points, compared.points)
+        if point is not None:
+            x, y, z = point
+            return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {fault}"
+    if abs(surface.volume - expected_surface.volume) > MESH_SHARE * abs(expected_surface.volume):
+        return f"it encloses {surface.volume:.4f} mm3, not {expected_surface.volume:.4f}"
+    if abs(_area(surface) - _area(expected_surface)) > MESH_SHARE * _area(expected_surface):
+        return f"its surface is {_area(surface):.3f} mm2, not {_area(expected_surface):.3f}"
     return ""
 
 
@@ -620,7 +658,7 @@ def _unsound(surface: Surface) -> str:
     points, faces = surface.points, surface.faces
     if not len(points) or not len(faces):
         return "it is empty"
-    if not np.isfinite(points).all() or float(np.abs(points).max()) > MOST_SIZE:
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > MAX_COORDINATE:
         return "it has a point that is nowhere"
     if int(faces.min()) < 0 or int(faces.max()) >= len(points):
         return "it has a face of a point that is not there"
@@ -634,27 +672,29 @@ def _area(surface: Surface) -> float:
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def _stray(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """A point with none of the others nearer than NEAR."""
+def _unmatched_point(
+    points: NDArray[np.float64], reference: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return a point farther than POINT_TOLERANCE from all reference points, or None."""
     import numpy as np
 
     def cells(of: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.int64]:
-        return np.floor(of / (4 * NEAR) + shift).astype(np.int64)
+        return np.floor(of / (4 * POINT_TOLERANCE) + shift).astype(np.int64)
 
     # A point and its like share a cell of one grid or of another one shifted by half a cell.
-    left = np.unique(points, axis=0)
+    unmatched = np.unique(points, axis=0)
     for shift in np.ndindex(2, 2, 2):
-        if not len(left):
+        if not len(unmatched):
             return None
         by = np.array(shift) / 2
-        known = {row.tobytes() for row in cells(others, by)}
-        own = cells(left, by)
-        left = left[[row.tobytes() not in known for row in own]]
-    stray: NDArray[np.float64] | None = left[0] if len(left) else None
+        reference_cells = {row.tobytes() for row in cells(reference, by)}
+        point_cells = cells(unmatched, by)
+        unmatched = unmatched[[row.tobytes() not in reference_cells for row in point_cells]]
+    stray: NDArray[np.float64] | None = unmatched[0] if len(unmatched) else None
     return stray
 
 
-def _stl(path: Path) -> list[Body]:
+def _stl(path: Path) -> list[MeshBody]:
     import numpy as np
 
     data = path.read_bytes()
@@ -670,24 +710,24 @@ def _stl(path: Path) -> list[Body]:
     against = np.einsum("ij,ij->i", normal, rows["normal"].astype(np.float64))
     if (against < 0).any():
         raise OutputError("a triangle's normal points inward")
-    return [Body(surface, "")]
+    return [MeshBody(surface, "")]
 
 
-def _3mf(path: Path) -> list[Body]:
+def _3mf(path: Path) -> list[MeshBody]:
     import numpy as np
 
     with ZipFile(path) as archive:
-        if sum(info.file_size for info in archive.infolist()) > MOST_BYTES:
-            raise OutputError(f"holds more than {MOST_BYTES:,} bytes")
+        if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
+            raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
         parts = {name: archive.read(name).decode() for name in sorted(archive.namelist())}
     model = parts.pop(MODEL)
     points = np.array(VERTEX.findall(model), dtype=np.float64).reshape(-1, 3)
     faces = np.array(TRIANGLE.findall(model), dtype=np.int64).reshape(-1, 3)
     frame = TRIANGLE.sub("", VERTEX.sub("", model)).split()
-    return [Body(Surface(points, faces), json.dumps([parts, frame]))]
+    return [MeshBody(Surface(points, faces), json.dumps([parts, frame]))]
 
 
-def _glb(path: Path) -> list[Body]:
+def _glb(path: Path) -> list[MeshBody]:
     import numpy as np
 
     data = path.read_bytes()
@@ -696,7 +736,7 @@ def _glb(path: Path) -> list[Body]:
         raise OutputError("no binary glTF")
     document: dict[str, Any] = json.loads(data[20 : 20 + size])
     start = 28 + size
-    found = []
+    mesh_bodies = []
     for node in document["nodes"]:
         (primitive,) = document["meshes"][node["mesh"]]["primitives"]
         arrays = []
@@ -712,6 +752,8 @@ def _glb(path: Path) -> list[Body]:
             )
         material = document["materials"][primitive["material"]]
         surface = Surface(arrays[0].astype(np.float64), arrays[1].astype(np.int64))
-        own = {key: value for key, value in node.items() if key != "mesh"}
-        found.append(Body(surface, json.dumps([own, material, document["scenes"]])))
-    return found
+        attributes = {key: value for key, value in node.items() if key != "mesh"}
+        mesh_bodies.append(
+            MeshBody(surface, json.dumps([attributes, material, document["scenes"]]))
+        )
+    return mesh_bodies

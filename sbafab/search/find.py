@@ -429,12 +429,12 @@ def found_file(out: Path) -> Path:
     if is_file and not out.parent.is_dir():
         raise DesignError(f"{out.parent} is no folder; make it first, or name another with -o")
     if not is_file and out.exists() and not out.is_dir():
-        raise DesignError(f"{out} is a file; name a folder with -o, or a file that ends in .toml")
+        raise DesignError(f"{out} is a file; name a folder with -o, or a .toml file with --to")
     target = out if is_file else out / FOUND
     if target.exists():
         raise DesignError(
-            f"{target} exists; name another file or folder with -o, or remove it first: a search "
-            "may take minutes and overwrites nothing"
+            f"{target} exists and is not overwritten; name another folder with -o or file with "
+            "--to, or remove it first"
         )
     return target
 

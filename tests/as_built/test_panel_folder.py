@@ -51,7 +51,7 @@ def failing(folder: Path) -> dict[str, str]:
 def test_a_written_folder_passes_and_is_read_back_as_the_design(whole: Path) -> None:
     assert failing(whole) == {}
     built = read_folder(whole)
-    assert built.is_meant
+    assert built.is_expected
     assert built.laminate is not None
     assert built.laminate.panel is not None
     panel = json.loads((whole / "manifest.json").read_text())["panel"]
@@ -153,7 +153,7 @@ def test_a_copy_that_is_cut_otherwise_stands_for_its_layer(whole: Path, tmp_path
     # the kerf besides, on three sides of the notch.
     doctor.redraw(7, lambda sheet: sheet - strip((x, y + 2.9), (x, y + 3.6), 1.0))
     built = read_folder(doctor.folder)
-    assert not built.is_meant
+    assert not built.is_expected
     assert built.laminate is not None
     cap = built.laminate.layer(7).profile
     assert clean.layer(7).profile.area - cap.area == pytest.approx(

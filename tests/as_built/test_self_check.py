@@ -13,7 +13,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.as_built import check as as_built
 from sbafab.as_built.check import FolderReadBack
-from sbafab.cli.exit import ended_plainly
+from sbafab.cli.exit import exit_plainly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
@@ -94,7 +94,7 @@ def test_rules_are_not_run_twice_on_what_is_as_designed(tmp_path: Path) -> None:
 
 
 def test_a_defect_ends_with_the_code_of_a_failed_rule(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop, ended_plainly():
+    with pytest.raises(SystemExit) as stop, exit_plainly():
         raise DefectError("the files do not hold")
     assert stop.value.code == 1
     assert "the files do not hold" in capsys.readouterr().err

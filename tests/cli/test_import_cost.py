@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sbafab.cli.fetching import NAMES
+from sbafab.cli import NAMES
 
 HEAVY = {
     "PIL",

@@ -47,7 +47,7 @@ def test_json_says_where_each_balloon_is(
 ) -> None:
     file = tmp_path / "map.json"
     code, out, _ = run(["map", "3dof-15mm", "--points", "3", "--to", str(file)], capsys)
-    assert (code, out) == (0, f"written to {file}\n")
+    assert (code, out) == (0, f"3dof-15mm mapped up to 110 kPa. Written to {file}\n")
     found = json.loads(file.read_text())
     hold("balloon-map", found)
     assert found["levels"] == [1] * 15

@@ -22,7 +22,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 
     That is what a design makes, what the rules find in it, and what it writes beside cut files.
     """
-    deck, write = as_built._deck, derived._write_anew
+    deck, write = as_built._run_deck, derived._regenerate
     measured = _remembered(deck, _asked_of_deck)
     meant_by = _remembered(as_built.meant_by, lambda d, curves: f"{design_sha256(d)} {curves}")
     run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
@@ -44,20 +44,20 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def context() -> Iterator[None]:
         with (
-            patch.object(as_built, "_deck", lambda b: (measured if b.is_meant else deck)(b)),
-            patch.object(as_built, "meant_by", meant_by),
+            patch.object(as_built, "_run_deck", lambda b: (measured if b.is_expected else deck)(b)),
+            patch.object(as_built, "expected_laminate", meant_by),
             patch.object(as_built, "run_deck", run_deck),
-            patch.object(derived, "_write_anew", write_once),
+            patch.object(derived, "_regenerate", write_once),
         ):
             yield
 
     return context
 
 
-def _asked_of_deck(built: as_built.AsBuilt) -> str:
+def _asked_of_deck(built: as_built.AsBuiltFolder) -> str:
     """Design, limits, and the rules that are run: some checks leave out all or some."""
     names = [rule.name for rule in as_built.RULES]
-    return design_sha256(built.design) + repr((built.limits, built.known, names))
+    return design_sha256(built.design) + repr((built.limits, built.design_findings, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:

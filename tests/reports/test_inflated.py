@@ -168,7 +168,7 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
         (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
-        (["--motion", "circle", "--to", "a.png"], "--motion is for a moving picture"),
+        (["--motion", "circle", "--to", "a.png"], "--motion is for an animation"),
     ):
         refused = run(app, [*asked, *extra])
         assert refused.exit_code != 0
@@ -185,7 +185,7 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
         path = tmp_path / f"shown{ending}"
         result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
-        assert f"{name}, flat, not inflated: no model inflates pockets" in result.output
+        assert f"{name} drawn flat, since no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
         assert image.size == (160, 128)
     # Unnamed, it is named as what it is.

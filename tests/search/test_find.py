@@ -145,12 +145,12 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 1
     assert "Nearest miss: chamber.diameter = 2.6" in ended.output
-    assert "outline_diameter 4.1 mm, not at most 4 mm" in ended.output
+    assert "outline_diameter 4.1 mm; at most 4 mm: MISSED" in ended.output
     assert not target.exists()
     target.write_text("mine")
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 2
-    assert "exists; name another file" in ended.output
+    assert "exists and is not overwritten" in ended.output
     assert target.read_text() == "mine"
 
 
@@ -199,6 +199,9 @@ def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(tmp_path / "new" / "found.toml").name == "found"
     assert CliRunner().invoke(app, asked).exit_code == 2
+    named = [*asked[:-2], "--to", str(tmp_path / "tip.toml")]
+    assert CliRunner().invoke(app, named).exit_code == 0
+    assert sbafab.load(tmp_path / "tip.toml").name == "tip"
     (tmp_path / "file").write_text("mine")
     ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
     assert ended.exit_code == 2
@@ -284,7 +287,7 @@ def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
     ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
-    assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
+    assert "force@200mm@1kPa none, it does not rise that far; at least 1 N: MISSED" in ended.output
 
 
 def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -379,7 +382,7 @@ def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
     asked = ["find", "3dof-15mm", "--max", "overall_diameter=10", "--tries", "8"]
     ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
-    assert "overall_diameter counts the inlet tabs" in ended.output
+    assert "overall_diameter includes the inlet tabs" in ended.output
 
 
 def test_keys_are_freed_and_fixed_by_name() -> None:

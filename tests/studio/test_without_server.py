@@ -263,7 +263,7 @@ def test_the_command_says_what_was_written_and_what_it_goes_without(
     done = CliRunner().invoke(studio, ["--static", site, "--pyodide", str(pyodide)])
     assert done.exit_code == 0
     assert f"python -m http.server --bind 127.0.0.1 --directory {site}" in done.output
-    assert "Without numpy it has no prediction" in done.output
+    assert "Without numpy the page has no prediction" in done.output
     for wrong in (["3dof-15mm", "--static", site], ["--pyodide", str(pyodide)]):
         assert CliRunner().invoke(studio, wrong).exit_code == 2
 

@@ -220,7 +220,7 @@ def test_assemblies_hold_them() -> None:
 def test_pictures_say_them(tmp_path: Path) -> None:
     asked = ["picture", "3dof-15mm", "--pressure", "chamber1=10", "--width", "200"]
     ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "tip.png")])
-    said = _joined(ended.output).partition("bent 128")[2]
+    said = _joined(ended.output).partition("bent 128")[0]
     assert "(the paper measured 81 +- 6 deg" in said
     assert "(the paper measured 17.5 mm" in said
 

@@ -1,8 +1,8 @@
-"""What long work says of itself: time gone, time left, and silence where it is quick or -q."""
+"""What long work says of itself: time elapsed, time left, and silence where it is quick or -q."""
 
 from __future__ import annotations
 
-from sbafab.cli.progress_line import Pace, Stages, plain_lines
+from sbafab.cli.progress import Pace, Stages, plain_lines
 
 
 class Clock:
@@ -15,19 +15,23 @@ class Clock:
 
 
 def test_time_left_is_that_of_the_pace_so_far() -> None:
-    assert Pace("designs", 25, 100, 60.0, 50.0).left == 150.0
-    said = "designs: 25 of 100, 30 a minute, 1 min 00 s gone, about 2 min 30 s left"
-    assert Pace("designs", 25, 100, 60.0, 50.0).said == said
-    assert Pace("designs", 100, 200, 50.0, 50.0).said.startswith("designs: 100 of 200, 2 a second")
-    assert Pace("designs", 100, 400, 5000.0, 5000.0).said.endswith("about 4 h 10 min left")
+    assert Pace("designs", 25, 100, 60.0, 50.0).remaining == 150.0
+    said = "designs: 25 of 100, 30 per minute, 1 min 00 s elapsed, about 2 min 30 s left"
+    assert Pace("designs", 25, 100, 60.0, 50.0).text == said
+    assert Pace("designs", 100, 200, 50.0, 50.0).text.startswith(
+        "designs: 100 of 200, 2 per second"
+    )
+    assert Pace("designs", 100, 400, 5000.0, 5000.0).text.endswith("about 4 h 10 min left")
     # Nothing done yet, too early to tell, or nobody knows of how many.
     for done, total, in_stage in ((0, 100, 50.0), (3, 100, 0.5), (0, 0, 50.0)):
-        assert Pace("designs", done, total, 60.0, in_stage).left is None
-    assert Pace("trial 3", 0, 0, 61.0, 50.0).said == "trial 3, 1 min 01 s gone"
+        assert Pace("designs", done, total, 60.0, in_stage).remaining is None
+    assert Pace("trial 3", 0, 0, 61.0, 50.0).text == "trial 3, 1 min 01 s elapsed"
 
 
 def test_quick_work_shows_no_line_on_a_terminal() -> None:
-    assert [Pace("bond-width", 0, 16, gone, gone).is_shown for gone in (0.0, 0.9, 1.0)] == [
+    assert [
+        Pace("bond-width", 0, 16, elapsed, elapsed).is_shown for elapsed in (0.0, 0.9, 1.0)
+    ] == [
         False,
         False,
         True,
@@ -37,12 +41,12 @@ def test_quick_work_shows_no_line_on_a_terminal() -> None:
 def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
     clock = Clock()
     stages = Stages(clock)
-    assert stages.told("bond-width", 0, 16)
+    assert stages.report("bond-width", 0, 16)
     clock.now += 4
-    assert not stages.told("mask-overhang", 1, 16)
-    assert (stages.pace().gone, stages.pace().in_stage) == (4, 4)
-    assert stages.told("sheets", 0, 3)
-    assert (stages.pace().gone, stages.pace().in_stage) == (4, 0)
+    assert not stages.report("mask-overhang", 1, 16)
+    assert (stages.pace().elapsed, stages.pace().stage_elapsed) == (4, 4)
+    assert stages.report("sheets", 0, 3)
+    assert (stages.pace().elapsed, stages.pace().stage_elapsed) == (4, 0)
 
 
 def test_plain_lines_come_now_and_then_and_verbose_ones_at_every_stage() -> None:
