@@ -16,11 +16,11 @@ STEPS = [(0.95 * SAME * i, 0.0) for i in range(5)]
 
 def groups(points: list[Point]) -> set[frozenset[Point]]:
     pool = PointPool(points)
-    found: dict[Point, set[Point]] = {}
+    by_leader: dict[Point, set[Point]] = {}
     for p in points:
-        found.setdefault(pool.snapped(p), set()).add(p)
-    assert all(leader == min(group) for leader, group in found.items())
-    return {frozenset(group) for group in found.values()}
+        by_leader.setdefault(pool.snapped(p), set()).add(p)
+    assert all(leader == min(group) for leader, group in by_leader.items())
+    return {frozenset(group) for group in by_leader.values()}
 
 
 def test_a_chain_of_points_is_one_point_in_any_order() -> None:

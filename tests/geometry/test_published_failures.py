@@ -111,13 +111,13 @@ PAIRS: dict[str, tuple[Vertices, Vertices]] = {
 }
 
 
-@pytest.mark.parametrize("what", OPERATIONS)
+@pytest.mark.parametrize("operation", OPERATIONS)
 @pytest.mark.parametrize("case", PAIRS)
-def test_booleans(case: str, what: str) -> None:
+def test_booleans(case: str, operation: str) -> None:
     a, b = (outline(vertices) for vertices in PAIRS[case])
     for seed in range(5):
-        assert complaint(what, a, b, Random(seed)) is None
-        assert complaint(what, b, a, Random(seed)) is None
+        assert complaint(operation, a, b, Random(seed)) is None
+        assert complaint(operation, b, a, Random(seed)) is None
 
 
 OFFSETS: dict[str, tuple[Vertices, tuple[float, ...]]] = {

@@ -56,8 +56,8 @@ def test_a_spiral_of_arcs_is_no_circle() -> None:
             Arc((centre + radius, 0.0), (centre - radius, 0.0), (centre, 0.0), radius, True)
         )
     assert all(same_support(a, b) for a, b in pairwise(spiral))
-    found = list(runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))))
-    for run in found:
+    result = list(runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))))
+    for run in result:
         radii = [edge.radius for edge in run if isinstance(edge, Arc)]
         assert max(radii, default=0.0) - min(radii, default=0.0) <= 1.7e-5
 

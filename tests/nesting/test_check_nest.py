@@ -21,12 +21,12 @@ STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
 
 
 def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:
-    wanted = len(shifts) if count is None else count
+    placements = len(shifts) if count is None else count
     return Nest(
         engine="bottom-left",
         material="TPE",
         stock=STOCK,
-        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, wanted),),
+        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, placements),),
         placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
     )
 
@@ -36,7 +36,7 @@ def test_a_sound_nest_passes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("faulty", "told"),
+    ("faulty", "message"),
     [
         (nest_of((5, 5, 0), (15.9, 5, 0)), r"are 0\.9000 mm apart at x 15\.\d+, y \d+\.\d+"),
         (nest_of((5, 5, 0), (12, 8, 0)), r"overlap at x"),
@@ -50,8 +50,8 @@ def test_a_sound_nest_passes() -> None:
         (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"too many parts or sheets"),
     ],
 )
-def test_a_faulty_nest_is_refused(faulty: Nest, told: str) -> None:
-    with pytest.raises(OutputError, match=told):
+def test_a_faulty_nest_is_refused(faulty: Nest, message: str) -> None:
+    with pytest.raises(OutputError, match=message):
         check_nest(faulty)
 
 
@@ -133,9 +133,9 @@ lines = st.builds(Line, spots, spots).filter(lambda line: line.length > 0.1)
 def test_edge_distances_are_what_dense_samples_find(a: Arc | Line, b: Arc | Line) -> None:
     count = 400
     sampled = min(math.dist(b.nearest(p), p) for p in (a.at(i / count) for i in range(count + 1)))
-    found = edge_distance(a, b).value
-    assert found <= sampled + 1e-6
-    assert found >= sampled - a.length / count
+    result = edge_distance(a, b).value
+    assert result <= sampled + 1e-6
+    assert result >= sampled - a.length / count
 
 
 sizes = st.floats(0.5, 3)

@@ -47,16 +47,16 @@ def test_the_same_as_laying_all_over_each_other(seed: int) -> None:
         clear += sum(group.is_alone for group in groups)
         met += sum(not group.is_alone for group in groups)
         outside, inside = divided(a, b)
-        for found, other in (
+        for result, whole in (
             (union(shapes), laid_over(0, *shapes)),
             (a & b, laid_over(1, a, b)),
             (inside, laid_over(1, a, b)),
             (a - b, laid_over(0, a, back(b))),
             (outside, laid_over(0, a, back(b))),
         ):
-            assert found == other
-            assert found.area == pytest.approx(other.area, abs=1e-9)
-            assert [c.is_hole for c in found.contours] == [c.is_hole for c in other.contours]
+            assert result == whole
+            assert result.area == pytest.approx(whole.area, abs=1e-9)
+            assert [c.is_hole for c in result.contours] == [c.is_hole for c in whole.contours]
     assert met > 5
     assert clear > 40
 
@@ -89,9 +89,9 @@ def test_circles_the_other_way_round_cancel_each_other() -> None:
 @pytest.mark.parametrize("gap", [FAR / 2, 2 * FAR])
 def test_what_comes_near_is_laid_over(gap: float) -> None:
     pair = circle((0, 0), 1), circle((2 + gap, 0), 1)
-    groups = grouped(chains_of((one, 1) for one in pair))
+    groups = grouped(chains_of((a, 1) for a in pair))
     assert len(groups) == (1 if gap < FAR else 2)
-    assert union([Region((one,)) for one in pair]).area == pytest.approx(2 * math.pi)
+    assert union([Region((a,)) for a in pair]).area == pytest.approx(2 * math.pi)
 
 
 def closed(*points: tuple[float, float]) -> Contour:
