@@ -134,7 +134,7 @@ def build(design: Design) -> Laminate:
         return laminate
     from sbafab.design.outline import understood
 
-    note = understood(design.drawing).said
+    note = understood(design.drawing).description
     return replace(laminate, notes=(note, *laminate.notes))
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a design file, in one sentence: field, value, what is allowed."""
+"""Design files: TOML in and out, changes to keys, messages for faults, hashes, and templates."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
 
 
 def listed(values: Iterable[object]) -> str:
+    """Return values in quotes, separated by commas."""
     return ", ".join(f'"{value}"' for value in values)
 
 
 def shown(value: object) -> str:
-    """A value as it may appear in a message: short, on one line."""
+    """Return a value as it may appear in a message: short, on one line."""
     try:
         text = repr(str(value)) if isinstance(value, str | Path) else str(value)
         if isinstance(value, bool):
@@ -120,12 +121,12 @@ def _unknown_key(
     where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[Design]]
 ) -> str:
     field = ".".join(where)
-    other = [name for name, model in families.items() if field in key_paths(model)]
-    if other:
-        return f"{field} is not a key of this family; it belongs to {listed(other)}"
-    known = key_paths(record)
-    siblings = [path for path in known if path.split(".")[:-1] == list(where[:-1])]
-    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], known, 0.75)
+    families_with_key = [name for name, model in families.items() if field in key_paths(model)]
+    if families_with_key:
+        return f"{field} is not a key of this family; it belongs to {listed(families_with_key)}"
+    paths = key_paths(record)
+    siblings = [path for path in paths if path.split(".")[:-1] == list(where[:-1])]
+    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], paths, 0.75)
     if near:
         return f"{field} is not a key of a design file; did you mean {near}?"
     return f"{field} is not a key of a design file; known here: {', '.join(siblings)}"
@@ -139,14 +140,14 @@ def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
 
 
 def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
-    """Every dotted key a record knows, as a file spells it, with its annotation."""
-    found: dict[str, object] = {}
+    """Return every dotted key of a record, as a file spells it, with its annotation."""
+    paths: dict[str, object] = {}
     for name, info in record.model_fields.items():
         key = info.alias or name
-        found[prefix + key] = info.annotation
+        paths[prefix + key] = info.annotation
         if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
-            found.update(key_paths(info.annotation, f"{prefix}{key}."))
-    return found
+            paths.update(key_paths(info.annotation, f"{prefix}{key}."))
+    return paths
 
 
 # Design files and templates in: TOML to validated records, and one clear sentence if not.
@@ -172,7 +173,7 @@ _UNQUOTED = re.compile(r"[^=#]*=\s*([-+.\d]+\s*[A-Za-z\u00b5\u03bc]+)\s*(?:#.*)?
 
 
 def design_path(source: str | Path) -> Path:
-    """The file behind a template's name or a path. Raises DesignError if there is none."""
+    """Return the file behind a template's name or a path. Raises DesignError if there is none."""
     names = template_names()
     if str(source) in names:
         return templates_folder() / f"{source}.toml"
@@ -189,7 +190,7 @@ def design_path(source: str | Path) -> Path:
 
 
 def _hint(missing: Path) -> str:
-    """What may have been meant by a design that is not there."""
+    """Suggestion for a design that does not exist."""
     names = template_names()
     with suppress(OSError, ValueError):
         beside = [path.name for path in missing.parent.iterdir() if _may_be_a_design(path)]
@@ -206,7 +207,7 @@ def _may_be_a_design(path: Path) -> bool:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The tables of a design file. Raises DesignError where it cannot be read."""
+    """Return the tables of a design file. Raises DesignError where it cannot be read."""
     try:
         with path.open("rb") as opened:
             content = opened.read(MOST_BYTES + 1)
@@ -254,9 +255,9 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
-    """``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
+    """Return ``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
 
-    The value in a text is TOML, or else plain text. Raises DesignError for what is no change.
+    The value in a text is TOML, or else plain text. Raises DesignError for an invalid change.
     """
     changed = _copied(data)
     for change in changes:
@@ -300,15 +301,15 @@ def _set(table: dict[str, Any], key: str, value: Any) -> None:
         if not isinstance(inner, dict):
             raise DesignError(f"--set {key}: {part} is a value, not a table")
         table = inner
-    own = table.get(parts[-1])
+    current = table.get(parts[-1])
     if isinstance(value, Mapping):
-        table[parts[-1]] = override(own if isinstance(own, dict) else {}, [value])
+        table[parts[-1]] = override(current if isinstance(current, dict) else {}, [value])
     else:
         table[parts[-1]] = list(value) if isinstance(value, tuple) else value
 
 
 def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change]) -> None:
-    """The path of a drawing or a kit that a change names starts there, not at the design file."""
+    """Make the paths of drawings and kits that a change names relative to the working directory."""
     keys = set(changed_keys(changes))
     if OUTLINE in keys:
         chamber = data["chamber"]
@@ -318,7 +319,7 @@ def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change])
 
 
 def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
-    """A change to what the design must fit opens its chamber, unless a change names that too."""
+    """Clear ``chamber.diameter`` if changes set ``fits`` and not the diameter."""
     keys = set(changed_keys(changes))
     chamber = data.get("chamber")
     fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
@@ -327,7 +328,7 @@ def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
 
 
 def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
-    """The same design with changes made to its keys. Raises DesignError with one sentence."""
+    """Return the design with changes made to its keys. Raises DesignError with one sentence."""
     from sbafab.design.kits import under_kit, without_kit
 
     changes = list(changes)
@@ -346,18 +347,22 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
 
 
 def add_waivers(
-    data: dict[str, Any], waivers: Sequence[str], known: Sequence[str] = get_args(RuleName)
+    data: dict[str, Any], waivers: Sequence[str], rule_names: Sequence[str] = get_args(RuleName)
 ) -> dict[str, Any]:
-    """``data`` with rule names added to ``rules.waive``.
+    """Return ``data`` with rule names added to ``rules.waive``.
 
-    Raises DesignError for a name that is not among the ``known``, in the command line's words.
+    Raises DesignError for a name that is not among ``rule_names``, in the command line's words.
     """
     for name in waivers:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 3) or [
-                rule for rule in known if rule.startswith(name)
+        if name not in rule_names:
+            near = difflib.get_close_matches(name, rule_names, 3) or [
+                rule for rule in rule_names if rule.startswith(name)
             ]
-            hint = f"did you mean {' or '.join(near)}" if near else f"it may be {', '.join(known)}"
+            hint = (
+                f"did you mean {' or '.join(near)}"
+                if near
+                else f"it may be {', '.join(rule_names)}"
+            )
             raise DesignError(f"--waive {shown(name)}: no rule has that name; {hint}")
     rules = data.get("rules", {})
     if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):
@@ -381,9 +386,9 @@ def _value(text: str) -> Any:
 def validated(
     data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
 ) -> Design:
-    """The design record of the family that ``data`` names.
+    """Return the design record of the family that ``data`` names.
 
-    Raises DesignError with one sentence: field, value, what is allowed, what would fix it.
+    Raises DesignError with one sentence: field, value, allowed values, remedy.
     """
     family = data.get("family")
     if family is None:
@@ -430,7 +435,7 @@ FIRST_SPARES = 2
 
 
 def resolved(design: Design) -> dict[str, Any]:
-    """The design with every default written out, as plain TOML values."""
+    """Return the design with every default written out, as plain TOML values."""
     return _tables(design.completed())
 
 
@@ -459,7 +464,7 @@ def _without_none(table: dict[str, Any]) -> dict[str, Any]:
 
 
 def keys_of(design: Design) -> list[tuple[str, object, object]]:
-    """Dotted key, value and default of every key, the default only where the value differs."""
+    """Return dotted key, value and default of every key, the default only if the value differs."""
     plain = type(design).model_validate({"name": design.name, "family": design.family})
     usual = dict(dotted(resolved(plain)))
     return [
@@ -469,7 +474,7 @@ def keys_of(design: Design) -> list[tuple[str, object, object]]:
 
 
 def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Dotted key and value of every key of nested tables."""
+    """Yield dotted key and value of every key of nested tables."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from dotted(value, f"{prefix}{key}.")
@@ -478,16 +483,16 @@ def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, objec
 
 
 def design_toml(design: Design) -> str:
-    """``design.toml`` of an output folder."""
+    """Return the text of ``design.toml`` of an output folder."""
     import tomli_w
 
     return tomli_w.dumps(resolved(design))
 
 
 def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the kit's hash for its path, and without what came later and is not used.
+    """The table with the kit's hash for its path, and without later keys that have their defaults.
 
-    A design that says nothing of kit and layup keeps the hash that it had before there were any.
+    A design that names no kit and no layup keeps the hash that it had before there were any.
     """
     from sbafab.design.kits import DEFAULT, kit_of
 
@@ -517,7 +522,7 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
 
 
 def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
-    """Take out keys that came later and have their defaults, and what only allows a method."""
+    """Remove later keys that have their defaults, and keys that only permit a method."""
     table["registration"].pop("experimental")
     has_usual_spares = all(
         getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
@@ -525,20 +530,20 @@ def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
     if has_usual_spares:
         table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
     for section, keys in LATER.items():
-        asked = getattr(design, section)
-        usual = type(asked)()
+        current = getattr(design, section)
+        default = type(current)()
         for key in keys:
-            if getattr(asked, key) == getattr(usual, key):
+            if getattr(current, key) == getattr(default, key):
                 table[section][key] = None
 
 
 def design_sha256(design: Design) -> str:
-    """Hash of all that decides the output; a drawn outline counts by its content, not its path."""
+    """Return the hash of all that decides the output; a drawn outline counts by its content."""
     return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
 
 
 def actuator_sha256(design: Design) -> str:
-    """Return the hash of what an actuator of the design is, however many are made, and on what.
+    """Return the hash of an actuator of the design, however many are made, and on which tools.
 
     It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
     registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
@@ -574,7 +579,7 @@ BONDED = (
 
 
 def _films(design: Design) -> dict[str, list[object]]:
-    """What a film is, by its table's name: kind, product, thickness, and if its kerf is known."""
+    """Films by table name: kind, product, thickness, and True if the kerf is measured."""
     kerfs = {name: film.kerf for name, film in design.films.others.items()}
     kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
     return {
@@ -604,7 +609,7 @@ KITS = "kits"
 
 @cache
 def templates_folder() -> Path:
-    """The designs that ship: in the installed package, or beside it in a source checkout."""
+    """Return the folder of the templates: in the installed package, or beside it in a checkout."""
     packaged = Path(__file__).parents[1] / "templates"
     return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
 
@@ -614,7 +619,7 @@ def template_names() -> list[str]:
 
 
 def kit_names() -> list[str]:
-    """The kits that ship."""
+    """Return the names of the kits that ship."""
     return list(_designs_in(templates_folder() / KITS))
 
 
@@ -625,7 +630,7 @@ def _designs_in(folder: Path) -> tuple[str, ...]:
 
 
 def template_text(name: str) -> str:
-    """The commented text of a design that ships. Raises DesignError if there is none."""
+    """Return the commented text of a template. Raises DesignError if there is none."""
     if name not in template_names():
         raise DesignError(
             f"{shown(name)} is not a template; there are {', '.join(template_names())}"
@@ -634,7 +639,7 @@ def template_text(name: str) -> str:
 
 
 def template_summaries() -> dict[str, str]:
-    """Template names with the first comment line of each."""
+    """Return template names with the first comment line of each."""
     return {
         name: (templates_folder() / f"{name}.toml")
         .read_text(encoding="utf-8")
@@ -645,7 +650,7 @@ def template_summaries() -> dict[str, str]:
 
 
 def write_new(template: str, file: Path | None) -> Path:
-    """Copies a template's commented file, named after the new file; never over an old one."""
+    """Copy a template's commented file, named after the new file; never over an old one."""
     names = template_names()
     if template not in names:
         near = difflib.get_close_matches(template, names, 1)
@@ -655,12 +660,12 @@ def write_new(template: str, file: Path | None) -> Path:
 
 
 def name_of(file: Path) -> str:
-    """A design's name from that of its file; empty where nothing of it may be in a name."""
+    """Return a design's name from that of its file; empty if no character of it is allowed."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
 
 
 def write_copy(source: Path, target: Path) -> Path:
-    """Copies a commented file, named after the new one; never over an old one."""
+    """Copy a commented file, named after the new one; never over an old one."""
     text = source.read_text(encoding="utf-8")
     name = name_of(target) or source.stem
     text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)

@@ -42,10 +42,10 @@ SMALLEST = 1.0
 
 
 class Outline(NamedTuple):
-    """A drawn outline, and one sentence on the size that was understood."""
+    """A drawn outline, and one sentence on its size."""
 
     region: Region
-    said: str
+    description: str
 
 
 def read_outline(path: Path) -> Region:
@@ -60,7 +60,7 @@ def read_outline(path: Path) -> Region:
 
 
 def understood(path: Path) -> Outline:
-    """The same with the size that was understood, in words. Raises DesignError."""
+    """Return a drawn outline with its size in words. Raises DesignError."""
     try:
         return _understood(path, _content(path))
     except FitError as error:
@@ -81,7 +81,7 @@ def _understood(path: Path, content: bytes) -> Outline:
 
 
 def _content(path: Path) -> bytes:
-    """What the file holds, if it is no larger than an outline may be."""
+    """Content of the file, if it is no larger than an outline may be."""
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0
@@ -126,17 +126,17 @@ def _one_loop(strands: list[Strand]) -> Strand:
 
 
 def _refuse_doubles(strands: list[Strand]) -> None:
-    seen = set()
+    drawn = set()
     for strand in strands:
         for edge in strand:
             x, y = edge.at(0.5)
             ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
             key = (*ends, round(x, 4), round(y, 4))
-            if key in seen:
+            if key in drawn:
                 raise DesignError(
                     f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
                 )
-            seen.add(key)
+            drawn.add(key)
 
 
 def _checked(loop: Strand) -> Region:
@@ -270,7 +270,7 @@ def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Str
 
 
 def _is_shown(entity: Any, drawing: Drawing) -> bool:
-    """Whether a program shows the entity: it is visible, and its layer on and thawed."""
+    """Return True if a program shows the entity: it is visible, and its layer on and thawed."""
     if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
         return True  # no entity at all, such as a BLOCK: refused by its kind
     name = str(entity.dxf.get("layer", "0"))
@@ -309,10 +309,10 @@ def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
 
 def _refuse_compensated(drawing: Drawing) -> None:
     """Raises DesignError for a cut path: it would be compensated for its kerf once more."""
-    said = dict(drawing.header.custom_vars.properties)
-    if said.get("KERF_STATE") == COMPENSATED:
+    properties = dict(drawing.header.custom_vars.properties)
+    if properties.get("KERF_STATE") == COMPENSATED:
         raise DesignError(
-            f"is a cut file compensated for a kerf of {said.get('KERF_WIDTH')} mm; give the "
+            f"is a cut file compensated for a kerf of {properties.get('KERF_WIDTH')} mm; give the "
             "outline itself, without kerf"
         )
 

@@ -56,8 +56,8 @@ class Page(NamedTuple):
     has_view: bool
 
     @property
-    def said(self) -> str:
-        """How large a unit was taken to be, in words."""
+    def description(self) -> str:
+        """Size of a unit in words."""
         if not self.physical:
             return "read at 1 mm a unit, for the page has no size in mm"
         if self.across == self.down:
@@ -92,33 +92,33 @@ def numbers(text: str) -> Iterator[str]:
             raise ValueError(",")
 
 
-def length(text: str, what: str) -> SvgLength:
-    """A length as it is written. Raises DesignError where programs do not agree on it."""
+def length(text: str, attribute: str) -> SvgLength:
+    """Return a length as written. Raises DesignError where programs do not agree on it."""
     match = _LENGTH.fullmatch(text)
     if match is None or (match[2] not in PER_PIXEL and match[2] not in ("", "px", "%")):
         raise DesignError(
-            f'has {what} "{text.strip()[:40]}"; write a number, alone or with mm, cm, in, pt, pc, '
-            "px or %"
+            f'has {attribute} "{text.strip()[:40]}"; write a number, alone or with mm, cm, in, '
+            "pt, pc, px or %"
         )
     number = float(match[1])
     if not math.isfinite(number):
-        raise DesignError(f'has {what} "{match[1][:40]}", a coordinate out of all bounds')
+        raise DesignError(f'has {attribute} "{match[1][:40]}", a coordinate out of all bounds')
     return SvgLength(number, "" if match[2] == "px" else match[2])
 
 
-def user_units(size: SvgLength, whole: float | None, what: str) -> float:
-    """A length in user units; ``whole`` is what a percentage is of."""
+def user_units(size: SvgLength, whole: float | None, attribute: str) -> float:
+    """Return a length in user units; a percentage is of ``whole``."""
     if size.unit != "%":
         return size.number * PER_PIXEL.get(size.unit, 1.0)
     if whole is None:
         raise DesignError(
-            f'has {what} "{size.number:g}%" on a page without a size; write it as a number'
+            f'has {attribute} "{size.number:g}%" on a page without a size; write it as a number'
         )
     return size.number / 100 * whole
 
 
 def diagonal(page: Page) -> float | None:
-    """What a percentage that is neither across nor down is of."""
+    """Return the length that percentages neither across nor down refer to."""
     if page.width is None or page.height is None:
         return None
     return math.hypot(page.width, page.height) / math.sqrt(2)
@@ -132,8 +132,8 @@ def page_of(root: ElementTree.Element) -> Page:
         None if size is None or size.unit == "%" else user_units(size, None, "a page of")
         for size in sizes
     ]
-    for found in pixels:
-        if found is not None and not 0 < found < FARTHEST_PAGE:
+    for pixel_count in pixels:
+        if pixel_count is not None and not 0 < pixel_count < FARTHEST_PAGE:
             raise DesignError("has a width or height that is not positive; give the page's size")
     physical = any(size is not None and size.is_physical for size in sizes)
     if physical and any(size is not None and size.unit == "%" for size in sizes):
@@ -190,7 +190,7 @@ def _view(root: ElementTree.Element) -> tuple[float, float] | None:
 
 
 def _fit(root: ElementTree.Element) -> tuple[bool, bool]:
-    """Whether the view is stretched to the page, and whether it covers it."""
+    """True if the view is stretched to the page, and True if it covers it."""
     text = root.get("preserveAspectRatio", "xMidYMid")
     match = _FIT.fullmatch(text)
     if match is None:
@@ -241,17 +241,17 @@ class Sized(NamedTuple):
 def sized(element: ElementTree.Element) -> Sized:
     """The shape of an element. Raises DesignError where programs would not agree on it."""
     name = local(element)
-    found: dict[str, SvgLength | None] = {}
+    lengths: dict[str, SvgLength | None] = {}
     for key in LENGTHS.get(name, ()):
         text = element.get(key, "").strip(WHITE)
         absent = text == "" or (text == "auto" and key in SIZES)
-        found[key] = None if absent else length(text, f"<{name}> with {key}")
-    for key, value in found.items():
+        lengths[key] = None if absent else length(text, f"<{name}> with {key}")
+    for key, value in lengths.items():
         if key in SIZES and value is not None and value.number < 0:
             raise DesignError(f"has <{name}> with {key} {value.number:g}, which is negative")
-    if name == "ellipse" and (found["rx"] is None) != (found["ry"] is None):
+    if name == "ellipse" and (lengths["rx"] is None) != (lengths["ry"] is None):
         raise DesignError("has <ellipse> with only one of rx and ry; give both")
-    return Sized(name, found, element.get("points" if name.startswith("poly") else "d", ""))
+    return Sized(name, lengths, element.get("points" if name.startswith("poly") else "d", ""))
 
 
 def path_of(shape: Sized, page: Page) -> str:
@@ -259,15 +259,15 @@ def path_of(shape: Sized, page: Page) -> str:
     whole = {**dict.fromkeys(ACROSS, page.width), **dict.fromkeys(DOWN, page.height)}
     value = {
         key: None
-        if one is None
-        else user_units(one, whole.get(key, diagonal(page)), f"<{shape.name}> with {key}")
-        for key, one in shape.lengths.items()
+        if quantity is None
+        else user_units(quantity, whole.get(key, diagonal(page)), f"<{shape.name}> with {key}")
+        for key, quantity in shape.lengths.items()
     }
     if shape.name == "path":
         return " ".join(_commands(shape.text))
     if shape.name in ("polyline", "polygon"):
         return _corners(shape.text, shape.name)
-    number = {key: one or 0.0 for key, one in value.items()}
+    number = {key: quantity or 0.0 for key, quantity in value.items()}
     if shape.name == "line":
         return "M {x1!r} {y1!r} L {x2!r} {y2!r}".format_map(number)
     if shape.name == "rect":
@@ -304,16 +304,16 @@ def _rect(number: dict[str, float], rx: float, ry: float) -> str:
 
 def _corners(text: str, name: str) -> str:
     try:
-        found = list(numbers(text))
+        coordinates = list(numbers(text))
     except ValueError as error:
         raise DesignError(
             f'has <{name}> with points that stop at "{error}"; draw it again'
         ) from None
-    if len(found) % 2:
+    if len(coordinates) % 2:
         raise DesignError(f"has <{name}> with an odd count of numbers in points; draw it again")
-    if not found:
+    if not coordinates:
         return ""
-    pairs = [f"{x} {y}" for x, y in zip(found[::2], found[1::2], strict=True)]
+    pairs = [f"{x} {y}" for x, y in zip(coordinates[::2], coordinates[1::2], strict=True)]
     return f"M {' L '.join(pairs)}{' Z' if name == 'polygon' else ''}"
 
 
@@ -327,24 +327,24 @@ def _commands(text: str) -> Iterator[str]:
         raise DesignError("has <path> with d that does not begin with a move; draw it again")
     for before, letter, body in zip(["", *letters], letters, bodies, strict=False):
         takes = TAKES[letter.upper()]
-        found = list(_numbers(body, takes == 7))
-        if (takes == 0 and found) or (takes and (not found or len(found) % takes)):
+        values = list(_numbers(body, takes == 7))
+        if (takes == 0 and values) or (takes and (not values or len(values) % takes)):
             raise DesignError(
                 f'has <path> with d that is damaged at "{letter}{body.strip()[:20]}"; draw it again'
             )
         if before.upper() + letter.upper() in UNLIKE:
             yield from ("l", "0", "0")
         if takes == 7:
-            yield from _arcs(letter, found)
+            yield from _arcs(letter, values)
         else:
             yield letter
-            yield from found
+            yield from values
 
 
-def _arcs(letter: str, found: list[str]) -> Iterator[str]:
+def _arcs(letter: str, values: list[str]) -> Iterator[str]:
     """Arcs one by one; those without a radius are lines."""
-    for first in range(0, len(found), 7):
-        rx, ry, *rest = found[first : first + 7]
+    for first in range(0, len(values), 7):
+        rx, ry, *rest = values[first : first + 7]
         if float(rx) == 0 or float(ry) == 0:
             yield from ("L" if letter == "A" else "l", *rest[-2:])
         else:
@@ -425,7 +425,7 @@ def svg_strands(path: Path) -> Traced:
         page = with_physical_lengths(page)
     if not drawn:
         _refuse_undrawn(root)
-    return Traced(_strands(drawn, page), page.said)
+    return Traced(_strands(drawn, page), page.description)
 
 
 def _strands(drawn: list[DrawnShape], page: Page) -> Iterator[Strand]:
@@ -538,14 +538,14 @@ def _transform(text: str) -> Matrix:
             raise DesignError(
                 f'has a transform that is damaged at "{text[end : end + 20]}"; apply it to the path'
             )
-        one = ReadMatrix(f"{match[1]}({' '.join(values)})")
-        matrix = _product(matrix, (one.a, one.b, one.c, one.d, one.e, one.f))
+        step = ReadMatrix(f"{match[1]}({' '.join(values)})")
+        matrix = _product(matrix, (step.a, step.b, step.c, step.d, step.e, step.f))
         end = match.end()
     return matrix
 
 
 def _product(outer: Matrix, inner: Matrix) -> Matrix:
-    """What takes a point by ``inner`` and then by ``outer``."""
+    """The matrix that applies ``inner`` and then ``outer``."""
     a, b, c, d, e, f = outer
     x, y, z, w, u, v = inner
     return (
@@ -645,8 +645,11 @@ def refuse_style_sheet(text: str) -> None:
     if "@import" in plain.lower() or "\\" in plain:
         raise DesignError("holds a style sheet with imports or escapes; save it as plain SVG")
     for name in _DECLARATION.findall(plain):
-        known = _VENDOR.sub("", name.lower())
-        if known in SHAPING | MOVING | CLIPPING | HIDING or known == "vector-effect":
+        property_name = _VENDOR.sub("", name.lower())
+        if (
+            property_name in SHAPING | MOVING | CLIPPING | HIDING
+            or property_name == "vector-effect"
+        ):
             raise DesignError(
                 f"sets {name} in a style sheet, which programs read differently; write it as an "
                 "attribute of the element itself, or delete it"
@@ -654,13 +657,13 @@ def refuse_style_sheet(text: str) -> None:
 
 
 def is_displayed(element: ElementTree.Element) -> bool:
-    """Whether the element and what is in it is drawn at all."""
+    """Return True if the element and its children are drawn at all."""
     value = _set(element, "display")
     return value != "none"
 
 
 def is_visible(element: ElementTree.Element, inherited: bool) -> bool:
-    """Whether the element itself is drawn; what is in it may say otherwise."""
+    """Return True if the element itself is drawn; its children may differ."""
     value = _set(element, "visibility")
     if value in ("", "inherit"):
         return inherited
@@ -678,13 +681,13 @@ def refuse_effects(element: ElementTree.Element) -> None:
         if condition in element.attrib:
             raise DesignError(f"draws <{name}> only under {condition}; remove that attribute")
     for key, value in _declared(element):
-        known = _VENDOR.sub("", key)
-        if known in SHAPING | MOVING:
+        property_name = _VENDOR.sub("", key)
+        if property_name in SHAPING | MOVING:
             raise DesignError(
                 f"sets {key} in the style of <{name}>, which programs read differently; write it "
                 "as an attribute, or apply it to the path"
             )
-        _refuse_effect(name, known, value)
+        _refuse_effect(name, property_name, value)
     for key in (*sorted(CLIPPING), "vector-effect"):
         _refuse_effect(name, key, element.get(key, "").strip().lower())
     for key in ("transform-origin", "transform-box"):

@@ -1,4 +1,4 @@
-"""What a user can ask for: the sections that every family's design file shares.
+"""Records of a design file: the sections that all families share, and the form of an actuator.
 
 Every field has the paper's value as default (paper Sec. 2) or, where the paper is silent, ours,
 and says so. Lengths are mm.
@@ -523,12 +523,12 @@ class Design(Section):
 
     @property
     def folder(self) -> Path:
-        """Where relative paths of the design start: the folder of its file."""
+        """Folder of the design's file, at which relative paths start."""
         return self._folder
 
     @property
     def is_solved(self) -> bool:
-        """Whether ``chamber.diameter`` was solved from what the design must fit."""
+        """True if ``chamber.diameter`` was solved from ``fits``."""
         return self._is_solved
 
     @property
@@ -543,19 +543,19 @@ class Design(Section):
 
     @property
     def pin_error(self) -> float:
-        """The most by which a layer on several pins lies off its place, mm."""
-        own = self.registration
-        if own.pin_error is not None:
-            return own.pin_error
-        return pin_error(self.thickest_pin, own.plate_made_by)
+        """Largest displacement of a layer on several pins, mm."""
+        registration = self.registration
+        if registration.pin_error is not None:
+            return registration.pin_error
+        return pin_error(self.thickest_pin, registration.plate_made_by)
 
     @property
     def lone_pin_error(self) -> float:
-        """The same where the plate has one pin, whose own place does not count, mm."""
-        own = self.registration
-        if own.pin_error is not None:
-            return own.pin_error
-        return lone_pin_error(self.thickest_pin, own.plate_made_by)
+        """Largest displacement of a layer on a single pin, whose place does not count, mm."""
+        registration = self.registration
+        if registration.pin_error is not None:
+            return registration.pin_error
+        return lone_pin_error(self.thickest_pin, registration.plate_made_by)
 
     @property
     def strip_width(self) -> float:
@@ -571,19 +571,20 @@ class Design(Section):
 
     @property
     def strip_loss(self) -> float:
-        """By how much a strip may come out narrower than drawn, mm, whether a kerf is known or not:
-        one that is measured later changes no strip.
+        """Width by which a strip may come out narrower than drawn, mm, for any kerf.
+
+        A kerf that is measured later changes no strip.
         """
         return 2 * self.registration.cutting_error + self.laser.unknown_kerf
 
     @property
     @abstractmethod
     def form(self) -> Form:
-        """What the actuator is like, for models, checks and pages. Raises DesignError."""
+        """Form of the actuator, for models, checks and pages. Raises DesignError."""
 
     @property
     def free(self) -> tuple[Free, ...]:
-        """The keys that a search may change unless it is told otherwise; a family adds its own."""
+        """Keys that a search may change by default; a family adds its own."""
         most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
         return (
             Free("stack.balloons", 2, most, 1),
@@ -592,10 +593,10 @@ class Design(Section):
         )
 
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
-        """The same design with keys changed, checked like a design file.
+        """Return the design with keys changed, checked like a design file.
 
         ``design.with_("stack.balloons=6")``, ``design.with_({"stack.balloons": 6})`` and
-        ``design.with_(stack={"balloons": 6})`` say the same. Raises DesignError with one sentence.
+        ``design.with_(stack={"balloons": 6})`` are equal. Raises DesignError with one sentence.
         """
         from sbafab.design.files import changed
 
@@ -610,25 +611,25 @@ class Design(Section):
         return table_html(("key", "value", "default"), keys_of(self), self.name)
 
     def completed(self) -> Self:
-        """The same design with every default that depends on another value filled in."""
+        """Return the design with every default that depends on another value filled in."""
         inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
 
     def fitted(self) -> Self:
-        """The same design with what it must fit solved for. Raises DesignError where nothing does.
+        """Return the design with its chamber solved from ``fits``, in families that have it.
 
-        A family that knows ``fits`` does so.
+        Raises DesignError where no chamber fits.
         """
         return self
 
     def solved(self) -> Self:
-        """The same design, of which ``chamber.diameter`` is known to be solved, not given."""
+        """Return the design with ``chamber.diameter`` marked as solved, not given."""
         copy = self.model_copy()
         copy._is_solved = True
         return copy
 
     def placed(self, folder: Path) -> Self:
-        """The same design with relative paths starting at ``folder``."""
+        """Return the design with relative paths starting at ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy
@@ -646,9 +647,7 @@ class Discs:
 
 @dataclass(frozen=True)
 class Slots:
-    """Oblong pockets, alike in every balloon: half discs of ``width`` joined by a straight ``run``,
-    both in mm.
-    """
+    """Oblong pockets, equal in every balloon: half discs of ``width`` and a straight ``run``, mm."""
 
     width: float
     run: float
@@ -664,9 +663,11 @@ Pockets = Discs | Slots | Drawn
 
 @dataclass(frozen=True)
 class Wrap:
-    """A laminate that is wrapped round a tube: its outer diameter, and the pitch of the stacks
-    round it, both in mm; ``glue`` is the adhesive that holds it there, and ``overlap`` by how much
-    (mm) one end of the sheet lies over the other.
+    """A laminate that is wrapped round a tube.
+
+    ``tube_diameter`` is the outer one and ``pitch`` that of the stacks round it, mm; ``glue`` is
+    the adhesive that holds it there, and ``overlap`` the width (mm) by which the sheet's ends
+    overlap.
     """
 
     tube_diameter: float
@@ -677,9 +678,9 @@ class Wrap:
 
 @dataclass(frozen=True)
 class Form:
-    """What an actuator is like, whichever family made it.
+    """Form of an actuator of any family.
 
-    ``words`` is what a technician calls it; ``stacks`` of balloons stand side by side, all with the
+    ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
     same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
     ``lumen_pin`` its dowel pin's.
     """
@@ -693,12 +694,12 @@ class Form:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether stacks on common plates push one way: unlike strokes then bend the actuator."""
+        """True if stacks on common plates push one way: unequal strokes then bend the actuator."""
         return self.stacks > 1 and self.wrap is None
 
     @property
     def pushing(self) -> int:
-        """Stacks that push one way: all on common plates, one alone of those round a tube."""
+        """Number of stacks that push one way: all on common plates, one of those round a tube."""
         return self.stacks if self.wrap is None else 1
 
 
@@ -707,7 +708,7 @@ class Free:
     """A key that a search may change: from ``low`` to ``high`` in steps.
 
     ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
-    ends are where a search begins to look, and may move.
+    ends are where a search begins, and may move.
     """
 
     key: str
@@ -720,5 +721,5 @@ class Free:
 
 def degrees_of_freedom(stacks: int) -> str:
     """Words for round stacks on common plates: one lengthens (1-DoF), three also bend (3-DoF)."""
-    said = {1: " (1-DoF)", 3: " (3-DoF)"}.get(stacks, "")
-    return f"stacked balloon actuator with {stacks} chamber{'s' if stacks > 1 else ''}{said}"
+    suffix = {1: " (1-DoF)", 3: " (3-DoF)"}.get(stacks, "")
+    return f"stacked balloon actuator with {stacks} chamber{'s' if stacks > 1 else ''}{suffix}"
