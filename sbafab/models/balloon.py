@@ -375,7 +375,7 @@ def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
         return equilibrium(BalloonEnergy(balloon, load), x)
     except NoEquilibrium:
         raise DesignError(
-            f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {balloon.pocket:g} mm; try another load"
         ) from None
 
 
@@ -677,8 +677,8 @@ def _two_film_equilibrium(films: TwoFilms, loads: Loads, basis: Array, y: Array)
         return equilibrium(_TwoFilmEnergy(films, loads, basis), y)
     except (NoEquilibrium, np.linalg.LinAlgError):
         raise DesignError(
-            f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; "
-            "try another load"
+            f"no equilibrium found for a balloon of radius {films[0].pocket:g} mm with two unlike "
+            "films; try another load"
         ) from None
 
 

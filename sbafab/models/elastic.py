@@ -120,7 +120,6 @@ def _risen(
 
 
 SAMPLES = 21
-SHARES = (0.0, 0.25, 0.75)
 ANGLES = (30.0, 60.0, 90.0)
 PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
@@ -194,7 +193,7 @@ def stroke_at(actuator: Actuator, share: float) -> float:
 def _forces(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, request.calibration)
     for pressure in request.pressures_kpa:
-        for share in SHARES if actuator.knows_full else SHARES[:1]:
+        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
@@ -211,7 +210,8 @@ def _pressures(
     return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
-def _chambers(number: int) -> str:
+def chamber_count(number: int) -> str:
+    """Return a number of chambers in words."""
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
@@ -219,7 +219,7 @@ def _bends(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(BEND, request.calibration)
     for pressure in request.pressures_kpa:
         for chambers in range(1, stack.chambers):
-            name = f"bend at {pressure:g} kPa in {_chambers(chambers)}, the others empty"
+            name = f"bend at {pressure:g} kPa in {chamber_count(chambers)}, the others empty"
             try:
                 pose = stack.pose(_pressures(stack, chambers, pressure))
             except DesignError as error:
@@ -269,7 +269,7 @@ def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     pressure = max(request.pressures_kpa)
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
-            name = f"force at {pressure:g} kPa in {_chambers(chambers)}, bent by {angle:g} deg"
+            name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
             pose = pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 yield LeftOut(name, "it does not bend so far")
@@ -362,7 +362,7 @@ def bend_relation(request: Asked, stack: Stack) -> Relation:
     lines = []
     for chambers in range(1, stack.chambers):
         poses = _poses(stack, chambers, pressures)
-        label = f"{_chambers(chambers)}, the others empty"
+        label = f"{chamber_count(chambers)}, the others empty"
         x = [pose.pressures[0] for pose in poses]
         lines.append(Trace(label, x, [pose.bend for pose in poses], model))
     return Relation(
@@ -378,7 +378,7 @@ def workspace_traces(request: Asked, stack: Stack) -> list[Trace]:
     for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
         for chambers in range(1, stack.chambers):
             poses = _poses(stack, chambers, pressures, rest)
-            label = f"elastic stack, {_chambers(chambers)} to 10 kPa, the others {words}"
+            label = f"elastic stack, {chamber_count(chambers)} to 10 kPa, the others {words}"
             aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
             lines.append(Trace(label, aside, [pose.height for pose in poses], model))
     return lines

@@ -19,6 +19,7 @@ from sbafab.laminate.laminate import (
     outline_diameter,
     overall_diameter,
 )
+from sbafab.models.lens import fullest
 from sbafab.models.paper import BURST, FLAT_HEIGHT_OF_FILMS, counterpart
 
 if TYPE_CHECKING:
@@ -221,8 +222,6 @@ def reached_diameter(form: Form, laminate: Laminate) -> float | None:
     """
     if not isinstance(form.pockets, Slots):
         return None
-    from sbafab.models.lens import fullest
-
     return _round_the_tube(form, laminate, fullest(form.pockets.width, form.pockets.run).stroke)
 
 

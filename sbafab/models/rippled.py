@@ -342,6 +342,6 @@ def _equilibrium(problem: Waves, x: Array) -> Array:
     except NoEquilibrium:
         of = problem.of
         raise DesignError(
-            f"a balloon of radius {of.balloon.pocket:g} mm with {of.waves} waves round its rim "
-            "finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {of.balloon.pocket:g} mm with "
+            f"{of.waves} waves round its rim; try another load"
         ) from None

@@ -243,7 +243,7 @@ def free_equilibrium(springs: Springs, start: Array) -> Array:
         before = largest if (share == 1.0).all() else 0.0
         at = at + step
         value, gradient, matrix = tried
-    raise DesignError("the stack finds no balance at these pressures; try others")
+    raise DesignError("no equilibrium of the stack found at these pressures; try others")
 
 
 def loaded_equilibrium(
@@ -272,7 +272,7 @@ def loaded_equilibrium(
         if balance is None:
             balance = _by_softer_plates(springs, pitch, load, wall, at)
     if balance is None:
-        raise DesignError("the stack finds no balance under this load; try a smaller one")
+        raise DesignError("no equilibrium of the stack found under this load; try a smaller one")
     return balance
 
 

@@ -290,8 +290,8 @@ def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | No
         return next(sold, float(math.ceil(least)))
     if thickness < least - ROUNDING:
         raise DesignError(
-            f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's hole "
-            f"takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
+            f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's "
+            f"hole takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
             "pins in registration.pin_lengths"
         )
     return thickness

@@ -801,8 +801,8 @@ def tacking_of(
         stack_mm=tack_stack(laminate),
         pins=pins,
         basis=(
-            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to {CLOCK_SHORTFALL:g} C "
-            f"short of the platen with {CONTACT:g} W/(m2 K), and in still air down to {TOUCH:g} C "
-            f"with {AIR:g} W/(m2 K) from each face; not measured"
+            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to "
+            f"{CLOCK_SHORTFALL:g} C short of the platen with {CONTACT:g} W/(m2 K), and in still "
+            f"air down to {TOUCH:g} C with {AIR:g} W/(m2 K) from each face; not measured"
         ),
     )

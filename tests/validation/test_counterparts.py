@@ -23,8 +23,8 @@ from sbafab.models.figures import Figure, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.paper import (
     COUNTERPARTS,
-    MODULUS,
     MISFIT,
+    MODULUS,
     POCKET_AREA,
     TIME_WITH_AIR,
     Counterpart,
