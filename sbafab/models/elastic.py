@@ -197,7 +197,7 @@ def _forces(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
-                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
+                value = float(blocked(stack, pressure, stroke_at(actuator, share)))
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error))
                 continue
@@ -240,7 +240,7 @@ def _clearances(where: str, request: Asked, stack: Stack, pose: Pose) -> Iterato
     yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
 
 
-def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+def bent(stack: Stack, chambers: int, angle: float) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
     empty; None where no pressure gives it.
     """
@@ -270,7 +270,7 @@ def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
             name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
-            pose = pose_bent_by(stack, chambers, angle)
+            pose = bent(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 yield LeftOut(name, "it does not bend so far")
                 continue
@@ -288,7 +288,7 @@ def _three(values: Array) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def time_to_fill(
+def filled(
     stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
 ) -> tuple[float, Pose]:
     """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
@@ -310,7 +310,7 @@ def _times(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
-        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
+        time, pose = filled(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
         yield LeftOut(name, str(error))
         return
@@ -350,7 +350,7 @@ def force_traces(actuator: Actuator, request: Asked, stack: Stack) -> list[Trace
     for pressure in request.pressures_kpa:
         if pressure > stack.most_pressure:
             continue
-        values = (actuator.form.pushing * blocked_force(stack, pressure, strokes)).tolist()
+        values = (actuator.form.pushing * blocked(stack, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
 
@@ -453,7 +453,7 @@ def _radii(stack: Stack, pose: Pose) -> Array:
 SERIES_SAMPLES = 401
 
 
-def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
     stroke.
 

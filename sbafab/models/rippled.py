@@ -94,7 +94,7 @@ def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool
     lower one's.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-    share, rate = taller(balloon, p)
+    share, rate = height_ratio(balloon, p)
     if not (rate.any() or (share != 1).any()):
         return inflate(balloon, p, h, tied=tied)
     free_height, slope = _free_heights(balloon, p)
@@ -138,14 +138,14 @@ def _fade(place: Array) -> tuple[Array, Array]:
     return value, 6 * up * (1 - up) - 6 * off * (1 - off) / (TAUT - 1)
 
 
-class Taller(NamedTuple):
+class HeightRatio(NamedTuple):
     """A ratio of heights, and its rate by pressure in 1/kPa."""
 
     share: Array
     rate: Array
 
 
-def taller(balloon: Balloon, pressure: Array) -> Taller:
+def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
     """Return free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in
     step with the rim. Between rungs a cubic of the pressure's logarithm.
     """
@@ -153,7 +153,7 @@ def taller(balloon: Balloon, pressure: Array) -> Taller:
     at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
     inside = (at > 0) & (at < rungs)
     if not resolved(balloon) or not inside.any():
-        return Taller(np.ones_like(pressure), np.zeros_like(pressure))
+        return HeightRatio(np.ones_like(pressure), np.zeros_like(pressure))
     waves = usual_waves(balloon)
     x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
     high = inflate(balloon, first * STEP ** np.arange(rungs)).height
@@ -167,7 +167,7 @@ def taller(balloon: Balloon, pressure: Array) -> Taller:
     a, b, rise = ratio[k], slopes[k], ratio[k + 1] - ratio[k]
     c, d = 3 * rise - 2 * b - slopes[k + 1], b + slopes[k + 1] - 2 * rise
     rate = (b + u * (2 * c + 3 * u * d)) * inside / (np.maximum(pressure, first) * math.log(STEP))
-    return Taller(a + u * (b + u * (c + u * d)), rate)
+    return HeightRatio(a + u * (b + u * (c + u * d)), rate)
 
 
 def resolved(balloon: Balloon) -> bool:

@@ -188,7 +188,7 @@ def working_days(
     return by_day(work, 60 * design.order.shift_hours)
 
 
-def a_day(plan: Schedule, together: int, minutes: float) -> int | None:
+def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
     """Return the number of actuators that one person makes in a shift with one press, ``together``
     at once.
 
@@ -223,8 +223,8 @@ def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, 
         "press_minutes": times.press,
         "hands_minutes": times.hands,
         "total_minutes": times.total,
-        "a_day_one_by_one": a_day(plan, 1, shift),
-        "a_day_in_batches": a_day(plan, most, shift),
+        "a_day_one_by_one": copies_a_day(plan, 1, shift),
+        "a_day_in_batches": copies_a_day(plan, most, shift),
         "shift_minutes": shift,
         "plan": [
             {

@@ -52,7 +52,7 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def named(layers: Sequence[int]) -> str:
+def layers_in_words(layers: Sequence[int]) -> str:
     """Return layer indices in words; never 2-3, which a spreadsheet takes for a date."""
     runs: list[list[int]] = []
     for index in layers:
@@ -542,7 +542,7 @@ def _items(
 def _instructions(part: AssemblyStep, count: int) -> str:
     """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
-    stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
+    stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {listed(pins)}"
     if not part.adds:
         return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
@@ -672,7 +672,7 @@ def warnings(
         )
     for step, part in zip(steps, parts, strict=True):
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):
-            which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+            which = layers_in_words(layers) if len(layers) < 4 else _by_role(laminate, layers)
             yield f"step {step.step}: no pin holds {which}; align by hand"
 
 
