@@ -1,16 +1,16 @@
-"""One round balloon as an elastic membrane of revolution: inflated free, or between plates.
+"""A round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
-Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's
-law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
-least energy do:
+Two films, bonded round the pocket and, where there are neighbours, at the neck. Of equal films one
+is computed, and the other mirrors it; unlike ones are computed together. A film stretches (plane
+stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. Where its hoop is compressed it
+wrinkles, and the wrinkles of least energy carry
 
     N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
 with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
-and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are
-those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
-pressures kPa, volumes ul, forces mN.
+and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are those of least
+energy, found by Newton's method for many pressures and heights at once. Lengths mm, pressures kPa,
+volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2
-    for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``FlatFilm``):
+    2 for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5

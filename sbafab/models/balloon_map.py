@@ -89,7 +89,7 @@ SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
 PIECES_IN_ALL = HEIGHT_SPANS + 2
-"""Those of a spline by height, and one extrapolation at either end."""
+"""Pieces of a spline by height, with an extrapolation at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -135,7 +135,7 @@ class BalloonMap:
 
     @cached_property
     def _polynomials(self) -> Array:
-        """By powers of both places: (pieces in pressure, powers, pieces by height x powers)."""
+        """Polynomials by both arguments: (pieces in pressure, powers, pieces by height x powers)."""
         by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
         rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
         return np.asarray(PIECES.T @ rows)

@@ -364,8 +364,8 @@ FULL_NOTE = (
 
 
 class VerdictLine(NamedTuple):
-    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), what it
-    comes to, and in ``note`` how far that is to be trusted.
+    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), its
+    ``figure``, and its validity in ``note``.
     """
 
     quantity: str

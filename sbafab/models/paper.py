@@ -55,7 +55,7 @@ LARGEST_BEND = Measured(81, 6, "deg", "Sec. 4.6")
 FULL_HEIGHT = Measured(17.5, 0, "mm", "Sec. 4.6")
 FLAT_HEIGHT = Measured(0.95, 0, "mm", "Sec. 4.6")
 BALLOONS = 15
-"""Of the 3-DoF actuator that was measured."""
+"""Balloons in a stack of the 3-DoF actuator that was measured."""
 WATER_FLOW = 35.0
 """ml/min (Sec. 7)."""
 AIR_FLOW = 2500.0

@@ -216,7 +216,7 @@ TITLES_OF_SEVERAL = {
     "tack_bottom": "Bottom balloons, their bases tacked on",
     "bond_bottom": "Bottom balloons, each with its base",
 }
-"""Where stacks are pressed beside each other."""
+"""Titles for stacks that are pressed beside each other."""
 
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
