@@ -84,9 +84,7 @@ class Balloon:
 
     @cached_property
     def nodes(self) -> Array:
-        """Radii of the flat film's nodes, mm, closer together where it bends sharply: at neck and
-        rim.
-        """
+        """Radii of the flat film's nodes, mm, closer together at neck and rim, where it bends."""
         even = np.linspace(0, 1, FILM_ELEMENTS + 1)
         close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
         film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
@@ -356,9 +354,7 @@ class BalloonEnergy:
 
 
 def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return an energy of the size of each balloon's, uJ, and the residual in mN that counts as
-    none.
-    """
+    """Return an energy of each balloon's size, uJ, and the residual in mN that counts as none."""
     force = RESIDUAL * np.maximum(load.pressure, LEAST_PRESSURE) * math.pi * balloon.pocket**2
     return load.pressure * balloon.pocket**3, force
 
@@ -380,9 +376,7 @@ def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
 
 
 def compressed_length(balloon: Balloon, r: Array, z: Array) -> Array:
-    """Return the length in mm along the film, neck and rim apart, where the smooth hoop is
-    compressed.
-    """
+    """Return the length in mm along the film over which the smooth hoop is compressed."""
     strains = strain(balloon.film, r, z)
     is_film = balloon.may_wrinkle & (not balloon.inextensible)
     is_compressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
@@ -404,9 +398,7 @@ def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
 
 
 def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
-    """Return the ripples of the rim at given shapes: of one film, which the other mirrors, or of
-    both.
-    """
+    """Return the rim's ripples at shapes of one film, which the other mirrors, or of both."""
     strains = [strain(film.film, *shape) for film, shape in zip(films, shapes, strict=True)]
     pulls = [
         film.membrane_stiffness * strains_of.meridian[:, film.edge - 1]
@@ -535,9 +527,7 @@ def squared_tilt(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> Array:
 
 
 class RippleEnergy(NamedTuple):
-    """Energy (rows,) with its derivatives by the radii of the rim's nodes: (nodes, rows) and
-    (nodes, nodes, rows).
-    """
+    """Energy (rows,); derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows)."""
 
     energy: Array
     slopes: Array

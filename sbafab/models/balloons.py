@@ -176,9 +176,7 @@ def pressed_by(balloon: Balloon, pressure: ArrayLike, force: ArrayLike) -> Shape
 
 
 def _root(over: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Return the zero of a rising function between bounds (the Illinois variant of regula
-    falsi).
-    """
+    """Return the zero of a rising function between bounds (regula falsi, Illinois variant)."""
     below, above = over(low), over(high)
     for _ in range(MOST_STEPS):
         span = np.where(above == below, 1.0, above - below)

@@ -82,9 +82,7 @@ def free_strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOu
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
-    """Return the balloons at each pressure, all solved at once; None where one finds no
-    equilibrium.
-    """
+    """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
     try:
         shapes = {kind: risen(kind, pressures) for kind in kinds}
     except DesignError:
@@ -98,9 +96,7 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
 def _risen(
     kinds: Counter[Balloon], pressure: float, shapes: Inflated | None
 ) -> tuple[float, float, float]:
-    """Return stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one
-    stack.
-    """
+    """Return stroke (mm), air (ul) and energy (uJ, to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
         shape = shapes[kind] if shapes else risen(kind, pressure)
@@ -163,9 +159,7 @@ CHAMBERS_SHUT = Model(
 
 
 def elastic_stack(actuator: Actuator, request: Asked) -> Stack | LeftOut | None:
-    """Return the stack of an actuator with round pockets, None for others, or the reason against
-    it.
-    """
+    """Return the stack of an actuator with round pockets, or why not; None for others."""
     if not actuator.radii:
         return None
     most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
@@ -260,9 +254,7 @@ def bent(stack: Stack, chambers: int, angle: float) -> Pose | None:
 
 
 def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
-    """Yield forces on a plate square to the bent tip, as the bending chambers are pressurised
-    further.
-    """
+    """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
     model = calibrated(FORCE, request.calibration)

@@ -109,9 +109,7 @@ def folded_diameter(width: float, thickness: float) -> float:
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
-    """Return the force in N by a pressure and dv/dh in mm2. Raises DesignError past the burst
-    pressure.
-    """
+    """Return N from kPa and dv/dh in mm2. Raises DesignError past the burst pressure."""
     pressure = np.asarray(pressure_kpa, dtype=float)
     good = (pressure >= 0) & (pressure <= BURST.value)
     if not good.all():
@@ -159,9 +157,7 @@ def modulus(force: float, deflection: float, length: float, second_moment: float
 
 
 def second_moments(region: Region) -> tuple[float, float]:
-    """Return the least and the largest second moment of area (mm4) of a section about its
-    centre.
-    """
+    """Return the least and largest second moment of area (mm4) of a section about its centre."""
     x0, y0 = centroid(region)
     xx = yy = xy = 0.0
     for piece in region.polygons(SAGITTA):
@@ -207,9 +203,7 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
 
 
 def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
-    """Return the diameter in mm of the tube with the flat laminate; the paper gives 15.33 (Sec.
-    2.1).
-    """
+    """Return the diameter in mm of tube and flat laminate; the paper's is 15.33 (Sec. 2.1)."""
     return wrap.tube_diameter + 2 * laminate.thickness
 
 

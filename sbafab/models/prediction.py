@@ -190,9 +190,7 @@ def power(actuator: Actuator, request: Asked, mass_g: float | None) -> Iterator[
 
 
 def _power_density(actuator: Actuator, request: Asked, whole: float, mass_g: float) -> Figure:
-    """Return the power density at the speed with air, as in the paper: its pump's flow, up to 10
-    kPa.
-    """
+    """Return the power density with the paper's air: its pump's flow, up to 10 kPa."""
     time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
     highest = max(request.pressures_kpa)
     push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, request))
@@ -320,9 +318,7 @@ def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
 
 
 def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
-    """Yield the largest bend of each number of chambers, and the largest lateral tip
-    displacement.
-    """
+    """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
     if not actuator.knows_full:
         yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
         return

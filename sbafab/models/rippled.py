@@ -116,9 +116,7 @@ def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool
 
 
 def _free_heights(balloon: Balloon, p: Array) -> tuple[Array, Array]:
-    """Return free heights by ``inflate`` in mm, and their rate by pressure; 1 mm where there is
-    none.
-    """
+    """Return free heights in mm by ``inflate``, and their rate by pressure; 1 where p is 0."""
     pressures = np.unique(p[p > 0])
     each = inflate(
         balloon, np.concatenate([pressures * (1 - NUDGE), pressures, pressures * (1 + NUDGE)])
@@ -171,9 +169,7 @@ def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
 
 
 def resolved(balloon: Balloon) -> bool:
-    """Return True if its waves are resolved: a wide pocket, both films equal and of the usual
-    law.
-    """
+    """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
     usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
 
@@ -214,18 +210,14 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
 
 @lru_cache(maxsize=256)
 def usual_waves(balloon: Balloon) -> int:
-    """Return the number of waves of least energy where ripples are well grown, by
-    ``ripples_at``.
-    """
+    """Return the number of waves of least energy of well-grown ripples, by ``ripples_at``."""
     shape = inflate(balloon, _first_pressure(balloon) * USUAL / START)
     (ripple,) = ripples_at((balloon,), ((shape.r, shape.z),))
     return int(ripple.waves[0])
 
 
 def _starts(of: Waving, at: float) -> list[Array]:
-    """Return coordinates to start from between two rungs: interpolated where both are on one
-    branch, else those of each.
-    """
+    """Return starts between two rungs: one interpolated on a common branch, else both."""
     k = int(at)
     near = [_rung(of.balloon, of.waves, each).x for each in (k, k + 1)]
     if not _are_one_branch(of, *near):
@@ -321,9 +313,7 @@ def _normals(of: Waving, x: Array) -> Array:
 
 
 def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
-    """Return the equilibrium at a pressure from that at another, in smaller steps where there is
-    none.
-    """
+    """Return the equilibrium at a pressure from that at another, if need be in smaller steps."""
     try:
         return _equilibrium(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
     except DesignError:

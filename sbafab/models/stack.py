@@ -349,9 +349,7 @@ class Stack:
         force: float = 0.0,
         stable: bool = True,
     ) -> Pose:
-        """Return the record of a pose; ``kinds`` are its freedoms by kind of balloon where levels
-        of one kind are equal.
-        """
+        """Return a pose; ``kinds`` are its freedoms by kind of balloon where levels are equal."""
         gaps = freedoms @ self._centres
         highest = float((gaps - self._top).max())
         if highest > 0:
@@ -421,9 +419,7 @@ def _clamped(balloon: Balloon) -> Balloon:
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
-    """Return the map of a balloon, to a lower pressure where wide pockets have no equilibrium
-    there.
-    """
+    """Return a balloon's map, to a lower pressure where a wide pocket has no equilibrium."""
     for share in PRESSURE_SHARES:
         try:
             return balloon_map(kind, share * most_pressure)

@@ -24,173 +24,6 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_loads import OuterPlate, PlateContact, Springs
 
-PLATE_STEPS = 12
-"""Steps against an outer plate before another method is tried."""
-PLATE_SMALLEST_STEP = 1e-7
-"""Step (mm, rad) against an outer plate below which an equilibrium counts as converged."""
-PLATE_RESIDUAL = 1e-4
-"""Residual in mN (or mN mm), and as a share of the plate's force, that counts as none."""
-FIRST_STEP = 1e-3
-"""Step (mm, rad) that is taken to come before the first one."""
-PLATE_CORRECTIONS, PLATE_SMALL_CORRECTION = 24, 0.2
-"""Corrections of a step by springs and contacts at its end, and the share of it that is small."""
-CONTACT_ROUNDS, CONTACT_RIM_ROUNDS = 8, 2
-"""Rounds of the active set of contacts, and those with further rims in contact."""
-STEP_SHARES = 0.5 ** np.arange(12)
-"""Shares of a step to an active set other than its own."""
-PLATE_STRAIGHT = 6e-3
-"""Step (mm, rad) along which springs are linear enough."""
-PUSH_RATIO = 2.0
-"""Largest initial force on a plate over the largest push of a level."""
-
-
-def start_below(
-    springs: Springs, start: Array, pitch: float, wall: OuterPlate, stiffness: float
-) -> Array:
-    """Return a start below a level plate, a little past it, so that it is met all round: symmetry
-    is kept.
-    """
-    at = start.copy()
-    if wall.is_level:
-        room = max(wall.point[2] / len(at) - pitch, 0.0)
-        is_high = at[:, 0] > room
-        straight = wall.sticks | (np.abs(at[:, 1:]) < 1e-9)
-        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
-        at[:, 0] = np.where(is_high, room, at[:, 0])
-        past = 1e-4
-        if wall.sticks and is_high.all():
-            # As far as the plate gives way to them.
-            push = float(-springs.energy(at)[1][:, 0].mean())
-            past = max(push, 0.0) / stiffness / len(at) + 1e-9
-        at[:, 0] += np.where(is_high, past, 0.0)
-    return at
-
-
-def _contact_descent(
-    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> tuple[Array, float, bool] | None:
-    """Return rise and tilt of each level (levels, 3), the force in mN on the plate, and True for a
-    stable equilibrium; None where the steps lead over an unstable place, or are too many.
-
-    A mixed method: a plate is stiff, so the contact forces are unknowns beside the freedoms, found
-    with each step and handed to the next. The set of points in contact is found within a step, with
-    the springs at its end.
-    """
-    at, before = start, FIRST_STEP
-    now = loaded_energy(springs, pitch, load, at)
-    touch = now.touch
-    if touch is not None and touch.push > PUSH_RATIO * np.abs(now.spring_gradient[:, 0]).max():
-        # So deep that it says nothing of the force, nor the first step of what is stable.
-        before = 0.0
-        now = loaded_energy(springs, pitch, load, at, np.zeros(len(touch.deep)))
-    for _ in range(PLATE_STEPS):
-        touch = now.touch
-        assert touch is not None
-        step = _contact_step(springs, at, now, touch)
-        if step is None:
-            return None
-        flat, touch, is_found = step
-        move = flat.reshape(-1, 3)
-        largest = float(np.abs(move).max())
-        if is_last_step(largest, before, PLATE_SMALLEST_STEP):
-            if is_found:
-                return at + move, touch.push, True
-            # A rim or a point that just touches is met in one round and parts in the next.
-            end = loaded_energy(springs, pitch, load, at + move)
-            if np.abs(end.gradient).max() < PLATE_RESIDUAL * (1 + end.push):
-                return at + move, end.push, True
-        share = float(step_limit(move).min())
-        if share < 1.0 and not wall.sticks:
-            return None
-        before = largest if share == 1.0 else 0.0
-        at = at + share * move
-        now = loaded_energy(springs, pitch, load, at, touch.forces)
-    return None
-
-
-def _contact_step(
-    springs: Springs, at: Array, now: LoadedEnergy, touch: PlateContact
-) -> tuple[Array, PlateContact, bool] | None:
-    """Return the step (freedoms) to equilibrium with all linear but springs and contacts, the
-    contact there, and True for converged; None where the tangent stiffness is indefinite.
-    """
-    lines, turned = now.deeper(touch), now.turned()
-    outside = now.gradient - now.spring_gradient.ravel() - touch.forces @ lines
-    spring_gradient, blocks = now.spring_gradient, now.blocks
-    flat = best = np.zeros(now.gradient.size)
-    has_converged = False
-    deep, least = touch.deep, np.inf
-    for number in range(PLATE_CORRECTIONS):
-        follows = outside + turned @ flat
-        if number:
-            value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
-            deep = touch.deep + lines @ flat
-            total = float(value.sum() + (outside + follows) @ flat / 2)
-            total += float(touch.resists(deep) @ deep) / 2
-            if total > least:
-                flat = (best + flat) / 2
-                continue
-            best, least = flat, total
-        matrix, gradient = with_diagonal_blocks(turned, blocks), follows + spring_gradient.ravel()
-        correction = _active_set_step(
-            springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep
-        )
-        if correction is None:
-            return None
-        more, is_settled = correction
-        flat = best + more
-        little = PLATE_SMALL_CORRECTION * np.abs(best).max() if number else PLATE_STRAIGHT
-        has_converged = is_settled and float(np.abs(more).max()) < little
-        if has_converged:
-            break
-    deep = touch.deep + lines @ flat
-    return flat, touch._replace(deep=deep, forces=touch.resists(deep)), has_converged
-
-
-def _active_set_step(
-    springs: Springs,
-    at: Array,
-    matrix: Array,
-    gradient: Array,
-    touch: PlateContact,
-    lines: Array,
-    deep: Array,
-) -> tuple[Array, bool] | None:
-    """Return the step at whose end the points and rims in contact are in equilibrium, and True if
-    these are the contacts that it was made with.
-    """
-
-    def energy(trial: Array) -> float:
-        after = deep + lines @ trial
-        return float((gradient + matrix @ trial / 2) @ trial + touch.resists(after) @ after / 2)
-
-    touches, met, held_off = deep > touch.least, None, 0
-    tried = []
-    for _ in range(CONTACT_ROUNDS):
-        stiff = touch.stiff * touches
-        against = (lines.T * stiff) @ lines
-        pushes = gradient + (stiff * deep) @ lines
-        if met is not None:
-            against = with_diagonal_blocks(against, met[1])
-            pushes = pushes + met[0].ravel()
-        step, is_firm = newton_step(pushes[None], (matrix + against)[None])
-        if not is_firm:
-            return None
-        ahead = deep + lines @ step[0] > touch.least
-        if (ahead == touches).all():
-            met = springs.meeting(at, step[0].reshape(-1, 3))
-            if met is None or held_off == CONTACT_RIM_ROUNDS:
-                return step[0], met is None
-            held_off += 1
-        touches = ahead
-        tried.append(step[0])
-    # None is the least: the best place on the ways there, of which the first leads downhill.
-    return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False
-
-
-# Levels alone, or all together under a load.
-
-
 SOFT_PLATES = (1e3, 1e5)
 """Stiffness in mN/mm of an outer plate in the first solutions."""
 MOST_STEPS = 300
@@ -218,6 +51,22 @@ is the last, and the relative change of springs in between.
 """
 FEW_STEPS = 12
 """Steps in which a far start meets an outer plate, or never does."""
+PLATE_STEPS = 12
+"""Steps against an outer plate before another method is tried."""
+PLATE_SMALLEST_STEP = 1e-7
+"""Step (mm, rad) against an outer plate below which an equilibrium counts as converged."""
+PLATE_RESIDUAL = 1e-4
+"""Residual in mN (or mN mm), and as a share of the plate's force, that counts as none."""
+FIRST_STEP = 1e-3
+"""Step (mm, rad) that is taken to come before the first one."""
+PLATE_CORRECTIONS, PLATE_SMALL_CORRECTION = 24, 0.2
+"""Corrections of a step by springs and contacts at its end, and the share of it that is small."""
+CONTACT_ROUNDS, CONTACT_RIM_ROUNDS = 8, 2
+"""Rounds of the active set of contacts, and those with further rims in contact."""
+STEP_SHARES = 0.5 ** np.arange(12)
+"""Shares of a step to an active set other than its own."""
+PUSH_RATIO = 2.0
+"""Largest initial force on a plate over the largest push of a level."""
 
 
 def free_equilibrium(springs: Springs, start: Array) -> Array:
@@ -357,9 +206,7 @@ def _safeguarded_step(gradient: Array, matrix: Array) -> tuple[Array, bool]:
 
 
 def _plain_step(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
-    """Return Newton's step of all levels, without a check of the tangent stiffness (None) where the
-    step leads downhill.
-    """
+    """Return Newton's step, its tangent stiffness unchecked (None) where it leads downhill."""
     flat = -np.linalg.solve(matrix, gradient)
     return (np.asarray(flat), None) if flat @ gradient < 0 else _safeguarded_step(gradient, matrix)
 
@@ -411,3 +258,148 @@ def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: 
         if np.abs(more).max() < SMALL_CORRECTION * np.abs(best).max():
             return flat
     return best
+
+
+# Against an outer plate, with its contact forces as unknowns beside the freedoms.
+
+
+def start_below(
+    springs: Springs, start: Array, pitch: float, wall: OuterPlate, stiffness: float
+) -> Array:
+    """Return a start a little past a level plate, so that it is met all round."""
+    at = start.copy()
+    if wall.is_level:
+        room = max(wall.point[2] / len(at) - pitch, 0.0)
+        is_high = at[:, 0] > room
+        straight = wall.sticks | (np.abs(at[:, 1:]) < 1e-9)
+        at[:, 1:] = np.where(straight, 0.0, at[:, 1:])
+        at[:, 0] = np.where(is_high, room, at[:, 0])
+        past = 1e-4
+        if wall.sticks and is_high.all():
+            # As far as the plate gives way to them.
+            push = float(-springs.energy(at)[1][:, 0].mean())
+            past = max(push, 0.0) / stiffness / len(at) + 1e-9
+        at[:, 0] += np.where(is_high, past, 0.0)
+    return at
+
+
+def _contact_descent(
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
+) -> tuple[Array, float, bool] | None:
+    """Return rise and tilt of each level (levels, 3), the force in mN on the plate, and True for a
+    stable equilibrium; None where the steps lead over an unstable place, or are too many.
+
+    A mixed method: a plate is stiff, so the contact forces are unknowns beside the freedoms, found
+    with each step and handed to the next. The set of points in contact is found within a step, with
+    the springs at its end.
+    """
+    at, before = start, FIRST_STEP
+    now = loaded_energy(springs, pitch, load, at)
+    touch = now.touch
+    if touch is not None and touch.push > PUSH_RATIO * np.abs(now.spring_gradient[:, 0]).max():
+        # So deep that it says nothing of the force, nor the first step of what is stable.
+        before = 0.0
+        now = loaded_energy(springs, pitch, load, at, np.zeros(len(touch.deep)))
+    for _ in range(PLATE_STEPS):
+        touch = now.touch
+        assert touch is not None
+        step = _contact_step(springs, at, now, touch)
+        if step is None:
+            return None
+        flat, touch, is_found = step
+        move = flat.reshape(-1, 3)
+        largest = float(np.abs(move).max())
+        if is_last_step(largest, before, PLATE_SMALLEST_STEP):
+            if is_found:
+                return at + move, touch.push, True
+            # A rim or a point that just touches is met in one round and parts in the next.
+            end = loaded_energy(springs, pitch, load, at + move)
+            if np.abs(end.gradient).max() < PLATE_RESIDUAL * (1 + end.push):
+                return at + move, end.push, True
+        share = float(step_limit(move).min())
+        if share < 1.0 and not wall.sticks:
+            return None
+        before = largest if share == 1.0 else 0.0
+        at = at + share * move
+        now = loaded_energy(springs, pitch, load, at, touch.forces)
+    return None
+
+
+def _contact_step(
+    springs: Springs, at: Array, now: LoadedEnergy, touch: PlateContact
+) -> tuple[Array, PlateContact, bool] | None:
+    """Return the step (freedoms) to equilibrium with all linear but springs and contacts, the
+    contact there, and True for converged; None where the tangent stiffness is indefinite.
+    """
+    lines, turned = now.deeper(touch), now.turned()
+    outside = now.gradient - now.spring_gradient.ravel() - touch.forces @ lines
+    spring_gradient, blocks = now.spring_gradient, now.blocks
+    flat = best = np.zeros(now.gradient.size)
+    has_converged = False
+    deep, least = touch.deep, np.inf
+    for number in range(PLATE_CORRECTIONS):
+        follows = outside + turned @ flat
+        if number:
+            value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
+            deep = touch.deep + lines @ flat
+            total = float(value.sum() + (outside + follows) @ flat / 2)
+            total += float(touch.resists(deep) @ deep) / 2
+            if total > least:
+                flat = (best + flat) / 2
+                continue
+            best, least = flat, total
+        matrix, gradient = with_diagonal_blocks(turned, blocks), follows + spring_gradient.ravel()
+        correction = _active_set_step(
+            springs, at + flat.reshape(-1, 3), matrix, gradient, touch, lines, deep
+        )
+        if correction is None:
+            return None
+        more, is_settled = correction
+        flat = best + more
+        little = PLATE_SMALL_CORRECTION * np.abs(best).max() if number else STRAIGHT
+        has_converged = is_settled and float(np.abs(more).max()) < little
+        if has_converged:
+            break
+    deep = touch.deep + lines @ flat
+    return flat, touch._replace(deep=deep, forces=touch.resists(deep)), has_converged
+
+
+def _active_set_step(
+    springs: Springs,
+    at: Array,
+    matrix: Array,
+    gradient: Array,
+    touch: PlateContact,
+    lines: Array,
+    deep: Array,
+) -> tuple[Array, bool] | None:
+    """Return the step at whose end the points and rims in contact are in equilibrium, and True if
+    these are the contacts that it was made with.
+    """
+
+    def energy(trial: Array) -> float:
+        after = deep + lines @ trial
+        return float((gradient + matrix @ trial / 2) @ trial + touch.resists(after) @ after / 2)
+
+    touches, met, held_off = deep > touch.least, None, 0
+    tried = []
+    for _ in range(CONTACT_ROUNDS):
+        stiff = touch.stiff * touches
+        against = (lines.T * stiff) @ lines
+        pushes = gradient + (stiff * deep) @ lines
+        if met is not None:
+            against = with_diagonal_blocks(against, met[1])
+            pushes = pushes + met[0].ravel()
+        step, is_firm = newton_step(pushes[None], (matrix + against)[None])
+        if not is_firm:
+            return None
+        ahead = deep + lines @ step[0] > touch.least
+        if (ahead == touches).all():
+            met = springs.meeting(at, step[0].reshape(-1, 3))
+            if met is None or held_off == CONTACT_RIM_ROUNDS:
+                return step[0], met is None
+            held_off += 1
+        touches = ahead
+        tried.append(step[0])
+    # None is the least: the best place on the ways there, of which the first leads downhill.
+    return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False

@@ -244,9 +244,7 @@ def pressure_basis(
 
 
 def unpressed(platen_kpa: float, pad: Pad, stands_out: float) -> float:
-    """Return the width in mm round a pin that stands out of the stack where the pad does not
-    press.
-    """
+    """Return the width in mm round a protruding pin where the pad does not press."""
     return stands_out * pad.modulus / (2 * platen_kpa)
 
 

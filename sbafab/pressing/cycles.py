@@ -87,9 +87,7 @@ def press_runs(
 def runs_of(
     laminate: Laminate, copies: int, platen: tuple[float, float], most: int | None = None
 ) -> Runs:
-    """Return the press runs of a laminate, on one base plate; registered sheets count as one
-    piece.
-    """
+    """Return a laminate's press runs on one base plate; registered sheets are one piece."""
     if laminate.panel is not None:
         return Runs(1, ((0.0, 0.0),))
     margin = PLATE_MARGIN if laminate.pins else 0.0
@@ -97,9 +95,7 @@ def runs_of(
 
 
 def design_runs(design: Design, laminate: Laminate, copies: int | None = None) -> Runs:
-    """Return the press runs of ``copies``, by default of the order; no cycle is longer than a
-    shift.
-    """
+    """Return the runs of ``copies``, by default the order; no cycle is longer than a shift."""
     press = design.press
     return runs_of(
         laminate,

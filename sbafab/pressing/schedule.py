@@ -152,9 +152,7 @@ class Heating:
 
 
 def heating(laminate: Laminate, press: PressSettings) -> Heating:
-    """Return the warming of the plate under a laminate; the press must be hotter than its films
-    melt.
-    """
+    """Return the warming of the plate; the press must be hotter than its films melt."""
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     melting = [film.softens_above for film in films if film.softens_above is not None]
     is_known = bool(melting) and not any(
@@ -262,9 +260,7 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """Return the minutes for which the press stays closed in a step; tacking is a flash
-        bond.
-        """
+        """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
         return {
             "flash_bottom": self.flash_bottom,
             "tack_bottom": self.flash_bottom,
@@ -689,9 +685,7 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
 
 
 def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
-    """Return the layers that join in a step, or lie in a bonded stack, that none of its pins
-    holds.
-    """
+    """Return the layers that join in a step, or in a bonded stack, without a pin."""
     pinned = {
         layer.pattern
         for layer in distinct_layers(laminate, part.layers)
@@ -775,9 +769,7 @@ class Tacking:
 
 
 def tack_stack(laminate: Laminate) -> float:
-    """Return the height of the highest film with its mask, mm; the transfer film stops short of the
-    pins.
-    """
+    """Return the largest height in mm of a film with its mask, the transfer film left out."""
     masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
     films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
     return round(max(films) + max(masks), 6)
