@@ -1,16 +1,16 @@
-"""One round balloon as an elastic membrane of revolution: inflated free, or between plates.
+"""A round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
-Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's
-law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
-least energy do:
+Two films, bonded round the pocket and, where there are neighbours, at the neck. Of equal films one
+is computed, and the other mirrors it; unlike ones are computed together. A film stretches (plane
+stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. Where its hoop is compressed it
+wrinkles, and the wrinkles of least energy carry
 
     N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
 with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
-and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are
-those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
-pressures kPa, volumes ul, forces mN.
+and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are those of least
+energy, found by Newton's method for many pressures and heights at once. Lengths mm, pressures kPa,
+volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2
-    for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``FlatFilm``):
+    2 for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5
@@ -84,9 +84,7 @@ class Balloon:
 
     @cached_property
     def nodes(self) -> Array:
-        """Radii of the flat film's nodes, mm, closer together where it bends sharply: at neck and
-        rim.
-        """
+        """Radii of the flat film's nodes, mm, closer together at neck and rim, where it bends."""
         even = np.linspace(0, 1, FILM_ELEMENTS + 1)
         close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
         film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
@@ -356,9 +354,7 @@ class BalloonEnergy:
 
 
 def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Return an energy of the size of each balloon's, uJ, and the residual in mN that counts as
-    none.
-    """
+    """Return an energy of each balloon's size, uJ, and the residual in mN that counts as none."""
     force = RESIDUAL * np.maximum(load.pressure, LEAST_PRESSURE) * math.pi * balloon.pocket**2
     return load.pressure * balloon.pocket**3, force
 
@@ -375,14 +371,12 @@ def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
         return equilibrium(BalloonEnergy(balloon, load), x)
     except NoEquilibrium:
         raise DesignError(
-            f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {balloon.pocket:g} mm; try another load"
         ) from None
 
 
 def compressed_length(balloon: Balloon, r: Array, z: Array) -> Array:
-    """Return the length in mm along the film, neck and rim apart, where the smooth hoop is
-    compressed.
-    """
+    """Return the length in mm along the film over which the smooth hoop is compressed."""
     strains = strain(balloon.film, r, z)
     is_film = balloon.may_wrinkle & (not balloon.inextensible)
     is_compressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
@@ -404,9 +398,7 @@ def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
 
 
 def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
-    """Return the ripples of the rim at given shapes: of one film, which the other mirrors, or of
-    both.
-    """
+    """Return the rim's ripples at shapes of one film, which the other mirrors, or of both."""
     strains = [strain(film.film, *shape) for film, shape in zip(films, shapes, strict=True)]
     pulls = [
         film.membrane_stiffness * strains_of.meridian[:, film.edge - 1]
@@ -535,9 +527,7 @@ def squared_tilt(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> Array:
 
 
 class RippleEnergy(NamedTuple):
-    """Energy (rows,) with its derivatives by the radii of the rim's nodes: (nodes, rows) and
-    (nodes, nodes, rows).
-    """
+    """Energy (rows,); derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows)."""
 
     energy: Array
     slopes: Array
@@ -677,8 +667,8 @@ def _two_film_equilibrium(films: TwoFilms, loads: Loads, basis: Array, y: Array)
         return equilibrium(_TwoFilmEnergy(films, loads, basis), y)
     except (NoEquilibrium, np.linalg.LinAlgError):
         raise DesignError(
-            f"a balloon of radius {films[0].pocket:g} mm with two unlike films finds no balance; "
-            "try another load"
+            f"no equilibrium found for a balloon of radius {films[0].pocket:g} mm with two unlike "
+            "films; try another load"
         ) from None
 
 

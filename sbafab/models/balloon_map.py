@@ -37,8 +37,7 @@ P0 = 0.1
 RISE_POINTS = 65
 """Pressures at which free heights are tabulated, to start from."""
 COLLAPSE_SUCTION = 0.1
-"""Suction in kPa at which a slack film collapses: about what brings one taut, ours, not measured.
-"""
+"""Suction in kPa at which a slack film collapses: about what brings one taut, not measured."""
 HEADROOM = 1.15
 """Height of the map over that of the highest free balloon."""
 LEAST_HEIGHT = 0.01
@@ -52,9 +51,7 @@ VOLUME_WEIGHT = 0.6
 LOW_HEIGHT = 0.2
 """Height in mm below which volume errors are weighted absolutely, above relatively."""
 PRESSURE_CHECKS, HEIGHT_CHECKS = 8 * PRESSURE_SPANS + 1, 4 * HEIGHT_SPANS + 1
-"""Points by pressure and by height at which volumes must rise with pressure and forces fall with
-height.
-"""
+"""Points at which volumes must rise with pressure and forces fall with height, each way."""
 LOW_CHECKS = np.array([0.001, 0.002, 0.004, 0.007])
 """Further heights near the flat, as shares of the map's height."""
 LEAST_CHECK = 0.005
@@ -89,7 +86,7 @@ SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
 PIECES_IN_ALL = HEIGHT_SPANS + 2
-"""Those of a spline by height, and one extrapolation at either end."""
+"""Pieces of a spline by height, with an extrapolation at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
@@ -135,7 +132,7 @@ class BalloonMap:
 
     @cached_property
     def _polynomials(self) -> Array:
-        """By powers of both places: (pieces in pressure, powers, pieces by height x powers)."""
+        """Polynomials by both: (pieces by pressure, powers, pieces by height x powers)."""
         by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
         rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
         return np.asarray(PIECES.T @ rows)
@@ -177,9 +174,7 @@ class BalloonMap:
         return x, each / np.hypot(p, P0)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """Return the force in mN on the plate at either end; below 0 where the balloon is pulled
-        on.
-        """
+        """Return the force in mN on the plate at either end; below 0 for a pull."""
         return -self._along(0, pressure, height).first * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
@@ -471,8 +466,6 @@ def nearest_admissible(point: Array, rows: Array, least: Array) -> Array | None:
 
 
 def _share(values: Array, by: Array) -> float:
-    """Return the share of a step after which the first of the values is 0; inf where none ever
-    is.
-    """
+    """Return the share of a step after which the first value is 0; inf where none ever is."""
     falls = by < 0
     return float((values[falls] / -by[falls]).min(initial=np.inf))

@@ -176,9 +176,7 @@ def pressed_by(balloon: Balloon, pressure: ArrayLike, force: ArrayLike) -> Shape
 
 
 def _root(over: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    """Return the zero of a rising function between bounds (the Illinois variant of regula
-    falsi).
-    """
+    """Return the zero of a rising function between bounds (regula falsi, Illinois variant)."""
     below, above = over(low), over(high)
     for _ in range(MOST_STEPS):
         span = np.where(above == below, 1.0, above - below)
@@ -190,7 +188,7 @@ def _root(over: Callable[[Array], Array], low: Array, high: Array) -> Array:
         # Of an end that stays, the value counts half, so that the next place lies nearer to it.
         below, above = np.where(up, below / 2, value), np.where(up, value, above / 2)
         low, high = np.where(up, low, middle), np.where(up, middle, high)
-    raise DesignError("a balloon finds no such state; ask for another load")
+    raise DesignError("no such state of a balloon found; try another load")
 
 
 def stresses(balloon: Balloon, shapes: Shapes) -> FilmStress:

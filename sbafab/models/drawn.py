@@ -23,12 +23,8 @@ ROUNDNESS = 1.2
 """Largest ratio of the farthest to the nearest distance of a nearly round pocket's edge from its
 axis: its stroke, in proportion to the diameter, is then known to some 10 % either way.
 """
-
-
 EXACT_GROUPS = ("size", "inlet")
 """Groups of figures that are computed for the drawn pocket itself."""
-
-
 BY_DISC = "disc of equal area"
 
 
@@ -146,9 +142,7 @@ FLAT_PLATES = Model(
 
 
 def flat_forces(actuator: Actuator, request: Asked) -> Iterator[Figure]:
-    """Yield upper bounds of the blocked force of drawn pockets at each pressure, before plates
-    part.
-    """
+    """Yield upper bounds of the drawn pockets' blocked force, before plates part."""
     drawing = actuator.design.drawing
     if drawing is None or actuator.form.wrap is not None:
         return

@@ -82,9 +82,7 @@ def free_strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOu
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
-    """Return the balloons at each pressure, all solved at once; None where one finds no
-    equilibrium.
-    """
+    """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
     try:
         shapes = {kind: risen(kind, pressures) for kind in kinds}
     except DesignError:
@@ -98,9 +96,7 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
 def _risen(
     kinds: Counter[Balloon], pressure: float, shapes: Inflated | None
 ) -> tuple[float, float, float]:
-    """Return stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one
-    stack.
-    """
+    """Return stroke (mm), air (ul) and energy (uJ, to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
         shape = shapes[kind] if shapes else risen(kind, pressure)
@@ -120,7 +116,6 @@ def _risen(
 
 
 SAMPLES = 21
-SHARES = (0.0, 0.25, 0.75)
 ANGLES = (30.0, 60.0, 90.0)
 PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
@@ -164,9 +159,7 @@ CHAMBERS_SHUT = Model(
 
 
 def elastic_stack(actuator: Actuator, request: Asked) -> Stack | LeftOut | None:
-    """Return the stack of an actuator with round pockets, None for others, or the reason against
-    it.
-    """
+    """Return the stack of an actuator with round pockets, or why not; None for others."""
     if not actuator.radii:
         return None
     most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
@@ -194,11 +187,11 @@ def stroke_at(actuator: Actuator, share: float) -> float:
 def _forces(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, request.calibration)
     for pressure in request.pressures_kpa:
-        for share in SHARES if actuator.knows_full else SHARES[:1]:
+        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
-                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
+                value = float(blocked(stack, pressure, stroke_at(actuator, share)))
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error))
                 continue
@@ -211,7 +204,8 @@ def _pressures(
     return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
-def _chambers(number: int) -> str:
+def chamber_count(number: int) -> str:
+    """Return a number of chambers in words."""
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
@@ -219,7 +213,7 @@ def _bends(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(BEND, request.calibration)
     for pressure in request.pressures_kpa:
         for chambers in range(1, stack.chambers):
-            name = f"bend at {pressure:g} kPa in {_chambers(chambers)}, the others empty"
+            name = f"bend at {pressure:g} kPa in {chamber_count(chambers)}, the others empty"
             try:
                 pose = stack.pose(_pressures(stack, chambers, pressure))
             except DesignError as error:
@@ -240,7 +234,7 @@ def _clearances(where: str, request: Asked, stack: Stack, pose: Pose) -> Iterato
     yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
 
 
-def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+def bent(stack: Stack, chambers: int, angle: float) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
     empty; None where no pressure gives it.
     """
@@ -260,17 +254,15 @@ def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
 
 
 def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
-    """Yield forces on a plate square to the bent tip, as the bending chambers are pressurised
-    further.
-    """
+    """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
     model = calibrated(FORCE, request.calibration)
     pressure = max(request.pressures_kpa)
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
-            name = f"force at {pressure:g} kPa in {_chambers(chambers)}, bent by {angle:g} deg"
-            pose = pose_bent_by(stack, chambers, angle)
+            name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
+            pose = bent(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 yield LeftOut(name, "it does not bend so far")
                 continue
@@ -288,7 +280,7 @@ def _three(values: Array) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def time_to_fill(
+def filled(
     stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
 ) -> tuple[float, Pose]:
     """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
@@ -310,7 +302,7 @@ def _times(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
-        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
+        time, pose = filled(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
         yield LeftOut(name, str(error))
         return
@@ -350,7 +342,7 @@ def force_traces(actuator: Actuator, request: Asked, stack: Stack) -> list[Trace
     for pressure in request.pressures_kpa:
         if pressure > stack.most_pressure:
             continue
-        values = (actuator.form.pushing * blocked_force(stack, pressure, strokes)).tolist()
+        values = (actuator.form.pushing * blocked(stack, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
 
@@ -362,7 +354,7 @@ def bend_relation(request: Asked, stack: Stack) -> Relation:
     lines = []
     for chambers in range(1, stack.chambers):
         poses = _poses(stack, chambers, pressures)
-        label = f"{_chambers(chambers)}, the others empty"
+        label = f"{chamber_count(chambers)}, the others empty"
         x = [pose.pressures[0] for pose in poses]
         lines.append(Trace(label, x, [pose.bend for pose in poses], model))
     return Relation(
@@ -378,7 +370,7 @@ def workspace_traces(request: Asked, stack: Stack) -> list[Trace]:
     for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
         for chambers in range(1, stack.chambers):
             poses = _poses(stack, chambers, pressures, rest)
-            label = f"elastic stack, {_chambers(chambers)} to 10 kPa, the others {words}"
+            label = f"elastic stack, {chamber_count(chambers)} to 10 kPa, the others {words}"
             aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
             lines.append(Trace(label, aside, [pose.height for pose in poses], model))
     return lines
@@ -453,7 +445,7 @@ def _radii(stack: Stack, pose: Pose) -> Array:
 SERIES_SAMPLES = 401
 
 
-def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
     stroke.
 

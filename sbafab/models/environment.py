@@ -58,9 +58,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Vent all chambers and set a new target: ``options["target"]`` in mm, or the tip of a
-        random pose.
-        """
+        """Vent all chambers; the target is ``options["target"]`` (mm) or a random pose's tip."""
         super().reset(seed=seed)
         target = (options or {}).get("target")
         if target is None:
@@ -72,9 +70,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         return self._observation(self._motion), {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Return the observation ``dt`` s later, the reward, and True for a target reached, then
-        for time up.
-        """
+        """Return the observation ``dt`` s later, the reward, if it arrived, and if time is up."""
         if self._motion is None:
             raise DesignError("the environment is at no place yet; call reset first")
         valves = (np.clip(np.asarray(action, dtype=float), -1.0, 1.0) + 1) / 2 * self.most_pressure

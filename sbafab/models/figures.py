@@ -364,8 +364,8 @@ FULL_NOTE = (
 
 
 class VerdictLine(NamedTuple):
-    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), what it
-    comes to, and in ``note`` how far that is to be trusted.
+    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), its
+    ``figure``, and its validity in ``note``.
     """
 
     quantity: str
@@ -387,9 +387,7 @@ def verdict(prediction: Prediction) -> tuple[VerdictLine, ...]:
 
 
 def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
-    """Yield the main figures of an actuator with their quantities, each by the model to design
-    with.
-    """
+    """Yield the main figures with their quantities, each by the model to design with."""
     to_design_with = [figure for figure in prediction.figures if not figure.other]
     for begins in STROKES:
         yield from (("stroke", item) for item in _first(to_design_with, begins))
@@ -419,9 +417,7 @@ def _shown(figure: Figure) -> str:
 
 
 def _note(figure: Figure) -> str:
-    """Return the measured counterpart, else the interval that measurements give, else the
-    validity.
-    """
+    """Return the measured counterpart, else the interval of measurements, else the validity."""
     if figure.measured or figure.between:
         return figure.aside
     if figure.model.name.startswith("the paper's full height"):
@@ -437,9 +433,7 @@ def _note(figure: Figure) -> str:
 
 @lru_cache(maxsize=1)
 def eq_4_ratios() -> tuple[float, float]:
-    """Return the least and the largest ratio of the paper's forces (Sec. 4.3) to virtual work on
-    Eq. 4.
-    """
+    """Return the range of ratios of the paper's forces (Sec. 4.3) to virtual work on Eq. 4."""
     full = paper.FULL_SHARE * RADIUS
     ratios = [
         measured.value / (chambers * paper.FORCE_KPA / 1000 * float(printed.rate(h, RADIUS)))

@@ -19,6 +19,7 @@ from sbafab.laminate.laminate import (
     outline_diameter,
     overall_diameter,
 )
+from sbafab.models.lens import fullest
 from sbafab.models.paper import BURST, FLAT_HEIGHT_OF_FILMS, counterpart
 
 if TYPE_CHECKING:
@@ -108,9 +109,7 @@ def folded_diameter(width: float, thickness: float) -> float:
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
-    """Return the force in N by a pressure and dv/dh in mm2. Raises DesignError past the burst
-    pressure.
-    """
+    """Return N from kPa and dv/dh in mm2. Raises DesignError past the burst pressure."""
     pressure = np.asarray(pressure_kpa, dtype=float)
     good = (pressure >= 0) & (pressure <= BURST.value)
     if not good.all():
@@ -158,9 +157,7 @@ def modulus(force: float, deflection: float, length: float, second_moment: float
 
 
 def second_moments(region: Region) -> tuple[float, float]:
-    """Return the least and the largest second moment of area (mm4) of a section about its
-    centre.
-    """
+    """Return the least and largest second moment of area (mm4) of a section about its centre."""
     x0, y0 = centroid(region)
     xx = yy = xy = 0.0
     for piece in region.polygons(SAGITTA):
@@ -206,9 +203,7 @@ def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
 
 
 def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
-    """Return the diameter in mm of the tube with the flat laminate; the paper gives 15.33 (Sec.
-    2.1).
-    """
+    """Return the diameter in mm of tube and flat laminate; the paper's is 15.33 (Sec. 2.1)."""
     return wrap.tube_diameter + 2 * laminate.thickness
 
 
@@ -221,8 +216,6 @@ def reached_diameter(form: Form, laminate: Laminate) -> float | None:
     """
     if not isinstance(form.pockets, Slots):
         return None
-    from sbafab.models.lens import fullest
-
     return _round_the_tube(form, laminate, fullest(form.pockets.width, form.pockets.run).stroke)
 
 

@@ -52,9 +52,7 @@ class Kinematics:
         return self._stroke(volumes)
 
     def volume(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Return the volume in ul a balloon at a stroke of the stack. Raises DesignError out of
-        range.
-        """
+        """Return ul a balloon at a stroke of the stack. Raises DesignError out of range."""
         return self._volume(self._within(stroke))
 
     def rate(self, stroke: ArrayLike) -> NDArray[np.float64]:
@@ -147,9 +145,7 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
 
 
 def full_stroke(radii: Sequence[float]) -> float:
-    """Return the full stroke in mm of a stack by the paper: 17.5 for 15 of radius 2.5 (Sec.
-    4.6).
-    """
+    """Return a stack's full stroke in mm by the paper: 17.5 for 15 of radius 2.5 (Sec. 4.6)."""
     return FULL_SHARE * sum(radii)
 
 
@@ -199,9 +195,7 @@ class Actuator:
     thickness: float
 
     def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the length of a chamber at a stroke: from the flat thickness to the full
-        height.
-        """
+        """Return a chamber's length at a stroke: from the flat thickness to the full height."""
         return self.thickness + stroke * (self.full_height - self.thickness) / self.full_stroke
 
     @property

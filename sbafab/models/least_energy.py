@@ -20,8 +20,7 @@ ROUNDING = 1e-13
 """Share of the energy that is lost to rounding."""
 HALVINGS = 12
 LAST_STEP = 1e-4
-"""Share of its length by which the last step, which no line search checks, may change an element.
-"""
+"""Share of its length by which the last step, without line search, may change an element."""
 
 
 class NoEquilibrium(Exception):  # noqa: N818
@@ -53,9 +52,7 @@ class Potential(Protocol):
         ...
 
     def newton_step(self, state: Descent, damping: Array) -> Array:
-        """Return Newton's step (coordinates, rows), with ``damping`` as a share of the diagonal
-        added.
-        """
+        """Return Newton's step (coordinates, rows), the diagonal increased by ``damping``."""
         ...
 
     def change(self, x: Array, ahead: Array) -> Array:
@@ -191,9 +188,7 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
 
 
 def tie(band: Array, from_: int, to: int) -> None:
-    """Add the row and column of one unknown to those of another, further on, that it is equal
-    to.
-    """
+    """Add the row and column of one unknown to those of another that it is equal to."""
     size, width = band.shape[:2]
     for i in range(max(0, from_ - width + 1), min(size, from_ + width)):
         value = band[min(i, from_), abs(i - from_)]
@@ -204,9 +199,7 @@ def tie(band: Array, from_: int, to: int) -> None:
 
 
 class Packing(NamedTuple):
-    """Entries [i, k] of a band that belong to free unknowns, and their places in the narrower
-    band.
-    """
+    """Entries [i, k] of a band that belong to free unknowns, and their places in their band."""
 
     row: NDArray[np.int_]
     off: NDArray[np.int_]

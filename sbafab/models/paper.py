@@ -55,7 +55,7 @@ LARGEST_BEND = Measured(81, 6, "deg", "Sec. 4.6")
 FULL_HEIGHT = Measured(17.5, 0, "mm", "Sec. 4.6")
 FLAT_HEIGHT = Measured(0.95, 0, "mm", "Sec. 4.6")
 BALLOONS = 15
-"""Of the 3-DoF actuator that was measured."""
+"""Balloons in a stack of the 3-DoF actuator that was measured."""
 WATER_FLOW = 35.0
 """ml/min (Sec. 7)."""
 AIR_FLOW = 2500.0
@@ -165,9 +165,7 @@ class Counterpart:
 
 
 def _forces() -> Iterator[Counterpart]:
-    """Yield the straight actuators' forces at 100 kPa (Sec. 4.3) that a model misses by more than
-    MISFIT.
-    """
+    """Yield straight forces at 100 kPa (Sec. 4.3) that a model misses by more than MISFIT."""
     gave = {
         (ONE_DOF, STACK): (1.888, 1.709, 1.355),
         (ONE_DOF, EQ_4): (None, None, 0.8422),
@@ -196,9 +194,7 @@ def _forces() -> Iterator[Counterpart]:
 
 
 def _bent_forces() -> Iterator[Counterpart]:
-    """Yield the bent actuator's forces at 100 kPa (Sec. 4.3); the paper does not say with which
-    chambers.
-    """
+    """Yield bent forces at 100 kPa (Sec. 4.3); the paper does not name the chambers."""
     gave = {30: (1.667, None), 60: (None, 2.829), 90: (1.194, 2.341)}
     for angle, measured in FORCE_BENT:
         for chambers, value in zip(("one chamber", "2 chambers"), gave[angle], strict=True):

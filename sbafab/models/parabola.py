@@ -84,9 +84,7 @@ class FullestHalf(NamedTuple):
 
 @cache
 def fullest(length: float) -> FullestHalf:
-    """Return the half balloon that holds most: at l = 2.5 mm 8.47 ul, 1.33 mm high (both: 16.947
-    ul).
-    """
+    """Return the fullest half: at l = 2.5 mm 8.47 ul, 1.33 mm high (both: 16.947 ul)."""
     low, high = 1.0, 10.0
     for _ in range(BISECTIONS):
         k = (low + high) / 2
@@ -103,17 +101,13 @@ def radius(h: ArrayLike, length: float) -> NDArray[np.float64]:
 
 
 def volume(h: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Return the volume (ul) of a half ``h`` mm high: Eq. 1. Raises DesignError past the fullest
-    one.
-    """
+    """Return ul of a half ``h`` mm high: Eq. 1. Raises DesignError past the fullest one."""
     k = _slope(h, length)
     return _volume(k, length)
 
 
 def height(v: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Return the height (mm) of a half that holds ``v`` ul. Raises DesignError past the fullest
-    one.
-    """
+    """Return mm of a half that holds ``v`` ul. Raises DesignError past the fullest one."""
     most = fullest(length)
     volumes = within(v, most.volume, "volume of half a balloon", "ul", MODEL)
     k = inverse(lambda slope: _volume(slope, length), volumes, most.slope)

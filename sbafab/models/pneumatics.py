@@ -26,9 +26,7 @@ TUBE_LENGTH = 150.0
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3; ``is_gas`` makes it
-    compressible.
-    """
+    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3; compressible if ``is_gas``."""
 
     name: str
     viscosity: float
@@ -72,9 +70,7 @@ class Line:
         return math.pi * self.diameter**2 / 4 * self.length
 
     def flow(self, source: float, chamber: float) -> float:
-        """Return the flow in ul/s from a pressure at the pump to one in the chamber; a gas at the
-        atmosphere.
-        """
+        """Return ul/s, of a gas at the atmosphere, between pressures at pump and in chamber."""
         drop = self._drop(source, chamber)
         head = abs(drop)
         laminar = head * math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)

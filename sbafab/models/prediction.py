@@ -18,6 +18,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, paper
 from sbafab.models.drawn import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
+from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
     REACHED,
     STACK,
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 SAMPLES = 61
-SHARES = (0.0, 0.25, 0.75)
 
 
 def check_request(actuator: Actuator, request: Asked) -> None:
@@ -115,7 +115,7 @@ def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
 def forces(actuator: Actuator, request: Asked) -> Iterator[Figure]:
     """Yield the blocked force at each pressure, flat and at the paper's shares of full stroke."""
     for pressure in request.pressures_kpa:
-        for share in SHARES if actuator.knows_full else SHARES[:1]:
+        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.full_stroke, request)
@@ -190,9 +190,7 @@ def power(actuator: Actuator, request: Asked, mass_g: float | None) -> Iterator[
 
 
 def _power_density(actuator: Actuator, request: Asked, whole: float, mass_g: float) -> Figure:
-    """Return the power density at the speed with air, as in the paper: its pump's flow, up to 10
-    kPa.
-    """
+    """Return the power density with the paper's air: its pump's flow, up to 10 kPa."""
     time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
     highest = max(request.pressures_kpa)
     push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, request))
@@ -320,15 +318,13 @@ def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
 
 
 def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
-    """Yield the largest bend of each number of chambers, and the largest lateral tip
-    displacement.
-    """
+    """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
     if not actuator.knows_full:
         yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
         return
     all_paths = paths(actuator)
     for path in all_paths:
-        name = f"bend with {_chambers(path.chambers)} at full stroke, the others flat"
+        name = f"bend with {chamber_count(path.chambers)} at full stroke, the others flat"
         if len(path.stroke) < SAMPLES:
             reason = "more than half a turn: the tip would come down through the base"
             yield LeftOut(name, reason)
@@ -367,7 +363,7 @@ def bending_relation(actuator: Actuator, request: Asked) -> Relation:
     for path in paths(actuator):
         content = first.volume(path.stroke) * actuator.balloons
         time = seconds(content, request.flow_ml_min)
-        label = f"{_chambers(path.chambers)} inflated, the others flat"
+        label = f"{chamber_count(path.chambers)} inflated, the others flat"
         lines.append(Trace(label, time.tolist(), np.degrees(path.angle).tolist(), model))
     points = []
     if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
@@ -399,7 +395,7 @@ def workspace_relation(actuator: Actuator) -> Relation:
     rests = (("flat", False), ("full", True)) if actuator.knows_full else ()
     for rest, others_full in rests:
         for path in paths(actuator, others_full):
-            label = f"{_chambers(path.chambers)}, the others {rest}"
+            label = f"{chamber_count(path.chambers)}, the others {rest}"
             lines.append(Trace(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
     points = []
     if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
@@ -413,10 +409,6 @@ def workspace_relation(actuator: Actuator) -> Relation:
         tuple(lines),
         tuple(points),
     )
-
-
-def _chambers(number: int) -> str:
-    return "one chamber" if number == 1 else f"{number} chambers"
 
 
 # The whole prediction of one design.

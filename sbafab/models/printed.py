@@ -32,9 +32,7 @@ def largest_volume(length: float) -> float:
 
 
 def volume(h: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Return the volume (ul) of a balloon whose stroke is ``h`` mm. Raises DesignError out of
-    range.
-    """
+    """Return ul of a balloon whose stroke is ``h`` mm. Raises DesignError out of range."""
     return _volume(_stroke(h, length), length)
 
 

@@ -75,9 +75,7 @@ class Waving:
 
     @cached_property
     def along(self) -> Array:
-        """Rates of r, aside and z along the meridian by the changes, in each slice: (3, slices,
-        places).
-        """
+        """Rates of r, aside and z by the changes, in each slice: (3, slices, places)."""
         rows = np.zeros((3, SLICES, PLACES))
         rows[0, :, R] = rows[2, :, Z] = 1.0
         for k, cos, sin in _overtones():
@@ -216,9 +214,7 @@ class Sums:
     """
 
     def __init__(self, of: Waving, parts: Parts, kinks: Array) -> None:
-        """Assemble parts; ``kinks`` (rows, elements - 1, places, places) couple neighbouring
-        elements.
-        """
+        """Assemble parts; ``kinks`` (rows, elements - 1, places, places) couple neighbours."""
         self.of = of
         nodes, edge = len(of.balloon.nodes), of.balloon.edge
         one_over = 1 / of.balloon.film.lengths[:, None]
@@ -361,9 +357,7 @@ class Waves:
         return step
 
     def change(self, x: Array, ahead: Array) -> Array:
-        """Return the largest share of its length by which a step changes an element of the mean
-        meridian: (rows,).
-        """
+        """Return the largest relative change of an element of the mean meridian: (rows,)."""
         length, by = (
             np.hypot(np.diff(y[R::PLACES], axis=0), np.diff(y[Z::PLACES], axis=0))
             for y in (x, ahead)
@@ -435,9 +429,7 @@ class Waves:
         return np.asarray((s1 * e1 + s2 * e2 + s12 * e12).sum((1, 2)) / 2)
 
     def _air(self, at: Slices, p: Array) -> Array:
-        """Add the air between the middle of the film and the middle plane, and return it in ul:
-        (rows,).
-        """
+        """Add the air between the film's middle and the middle plane; return its ul: (rows,)."""
         balloon = self.of.balloon
         number = np.arange(len(balloon.film.lengths))
         size = math.tau / SLICES * balloon.film.middles * balloon.film.lengths
@@ -534,9 +526,7 @@ class Waves:
         return parts
 
     def _joined(self, kinks: Array) -> Array:
-        """Return the coupling of the changes along neighbours: (rows, elements - 1, places,
-        places).
-        """
+        """Return the coupling of neighbours' changes: (rows, elements - 1, places, places)."""
         size = kinks.shape[:2]
         blocks = (kinks.reshape(*size, -1) @ self.of.products[3]).reshape(*size, PLACES, PLACES)
         blocks[:, : self.of.balloon.neck_edge, Z] = 0.0
@@ -579,9 +569,7 @@ class Waves:
         return np.asarray((by_rise * rise + by_up * up).sum(1) / 2)
 
     def _inner_face(self, sums: Sums, places: Array, p: Array) -> Array:
-        """Add the volume between the film's middle and its inner face, by the mean meridian, and
-        return it in ul.
-        """
+        """Add the volume between the film's middle and its inner face; return it in ul."""
         balloon = self.of.balloon
         lie = Elements.of(places[:, :, R], places[:, :, Z])
         thick, thin = (

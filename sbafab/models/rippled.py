@@ -94,7 +94,7 @@ def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool
     lower one's.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-    share, rate = taller(balloon, p)
+    share, rate = height_ratio(balloon, p)
     if not (rate.any() or (share != 1).any()):
         return inflate(balloon, p, h, tied=tied)
     free_height, slope = _free_heights(balloon, p)
@@ -116,9 +116,7 @@ def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool
 
 
 def _free_heights(balloon: Balloon, p: Array) -> tuple[Array, Array]:
-    """Return free heights by ``inflate`` in mm, and their rate by pressure; 1 mm where there is
-    none.
-    """
+    """Return free heights in mm by ``inflate``, and their rate by pressure; 1 where p is 0."""
     pressures = np.unique(p[p > 0])
     each = inflate(
         balloon, np.concatenate([pressures * (1 - NUDGE), pressures, pressures * (1 + NUDGE)])
@@ -138,14 +136,14 @@ def _fade(place: Array) -> tuple[Array, Array]:
     return value, 6 * up * (1 - up) - 6 * off * (1 - off) / (TAUT - 1)
 
 
-class Taller(NamedTuple):
+class HeightRatio(NamedTuple):
     """A ratio of heights, and its rate by pressure in 1/kPa."""
 
     share: Array
     rate: Array
 
 
-def taller(balloon: Balloon, pressure: Array) -> Taller:
+def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
     """Return free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in
     step with the rim. Between rungs a cubic of the pressure's logarithm.
     """
@@ -153,7 +151,7 @@ def taller(balloon: Balloon, pressure: Array) -> Taller:
     at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
     inside = (at > 0) & (at < rungs)
     if not resolved(balloon) or not inside.any():
-        return Taller(np.ones_like(pressure), np.zeros_like(pressure))
+        return HeightRatio(np.ones_like(pressure), np.zeros_like(pressure))
     waves = usual_waves(balloon)
     x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
     high = inflate(balloon, first * STEP ** np.arange(rungs)).height
@@ -167,13 +165,11 @@ def taller(balloon: Balloon, pressure: Array) -> Taller:
     a, b, rise = ratio[k], slopes[k], ratio[k + 1] - ratio[k]
     c, d = 3 * rise - 2 * b - slopes[k + 1], b + slopes[k + 1] - 2 * rise
     rate = (b + u * (2 * c + 3 * u * d)) * inside / (np.maximum(pressure, first) * math.log(STEP))
-    return Taller(a + u * (b + u * (c + u * d)), rate)
+    return HeightRatio(a + u * (b + u * (c + u * d)), rate)
 
 
 def resolved(balloon: Balloon) -> bool:
-    """Return True if its waves are resolved: a wide pocket, both films equal and of the usual
-    law.
-    """
+    """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
     usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
 
@@ -214,18 +210,14 @@ def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> 
 
 @lru_cache(maxsize=256)
 def usual_waves(balloon: Balloon) -> int:
-    """Return the number of waves of least energy where ripples are well grown, by
-    ``ripples_at``.
-    """
+    """Return the number of waves of least energy of well-grown ripples, by ``ripples_at``."""
     shape = inflate(balloon, _first_pressure(balloon) * USUAL / START)
     (ripple,) = ripples_at((balloon,), ((shape.r, shape.z),))
     return int(ripple.waves[0])
 
 
 def _starts(of: Waving, at: float) -> list[Array]:
-    """Return coordinates to start from between two rungs: interpolated where both are on one
-    branch, else those of each.
-    """
+    """Return starts between two rungs: one interpolated on a common branch, else both."""
     k = int(at)
     near = [_rung(of.balloon, of.waves, each).x for each in (k, k + 1)]
     if not _are_one_branch(of, *near):
@@ -321,9 +313,7 @@ def _normals(of: Waving, x: Array) -> Array:
 
 
 def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
-    """Return the equilibrium at a pressure from that at another, in smaller steps where there is
-    none.
-    """
+    """Return the equilibrium at a pressure from that at another, if need be in smaller steps."""
     try:
         return _equilibrium(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
     except DesignError:
@@ -342,6 +332,6 @@ def _equilibrium(problem: Waves, x: Array) -> Array:
     except NoEquilibrium:
         of = problem.of
         raise DesignError(
-            f"a balloon of radius {of.balloon.pocket:g} mm with {of.waves} waves round its rim "
-            "finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {of.balloon.pocket:g} mm with "
+            f"{of.waves} waves round its rim; try another load"
         ) from None

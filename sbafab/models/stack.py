@@ -22,9 +22,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sbafab.actuators import build
 from sbafab.errors import DesignError
+from sbafab.laminate.laminate import film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
+from sbafab.models.balloons import balloons_of
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.pneumatics import Line
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
@@ -284,8 +287,6 @@ class Stack:
         """Return a motion that starts at pressures (kPa, by default 0); ``line`` feeds each
         chamber, and ``load`` are keyword arguments of ``pose`` beside pressures.
         """
-        from sbafab.models.pneumatics import Line
-
         start = self.pose((0.0,) * self.chambers if pressures is None else pressures, **load)
         return Motion(self, line or Line(), load, start)
 
@@ -348,9 +349,7 @@ class Stack:
         force: float = 0.0,
         stable: bool = True,
     ) -> Pose:
-        """Return the record of a pose; ``kinds`` are its freedoms by kind of balloon where levels
-        of one kind are equal.
-        """
+        """Return a pose; ``kinds`` are its freedoms by kind of balloon where levels are equal."""
         gaps = freedoms @ self._centres
         highest = float((gaps - self._top).max())
         if highest > 0:
@@ -392,10 +391,6 @@ def stack(
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """
-    from sbafab.actuators import build
-    from sbafab.laminate.laminate import film_mass
-    from sbafab.models.balloons import balloons_of
-
     flat = laminate or build(design)
     row = [_clamped(balloon) for balloon in balloons_of(design, flat, factors, form)]
     press = 1.0 if factors is None else factors.press_factor
@@ -424,9 +419,7 @@ def _clamped(balloon: Balloon) -> Balloon:
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
-    """Return the map of a balloon, to a lower pressure where wide pockets have no equilibrium
-    there.
-    """
+    """Return a balloon's map, to a lower pressure where a wide pocket has no equilibrium."""
     for share in PRESSURE_SHARES:
         try:
             return balloon_map(kind, share * most_pressure)
@@ -566,7 +559,9 @@ class Motion:
             ahead = self._newton_step(missed, now, counts, least)
             ahead *= min(1.0, LONGEST_STEP / max(float(np.abs(ahead).max()), 1e-12))
             now = self._downhill(missed, now, ahead, (least, most))
-        raise DesignError("the stack finds no balance at the end of this step; try a shorter one")
+        raise DesignError(
+            "no equilibrium of the stack found at the end of this step; try a shorter one"
+        )
 
     def _downhill(
         self,

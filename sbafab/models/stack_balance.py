@@ -24,6 +24,33 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_loads import OuterPlate, PlateContact, Springs
 
+SOFT_PLATES = (1e3, 1e5)
+"""Stiffness in mN/mm of an outer plate in the first solutions."""
+MOST_STEPS = 300
+RESIDUAL = 1e-7
+"""Residual in mN (or mN mm) that counts as none."""
+SMALLEST_SUM_STEP = 5e-8
+"""Smallest step where the errors of all levels add up: tilts under a load, volumes without."""
+PLATE_LAST_STEP, PLATE_LAST_GAIN = 3e-5, 1e-7
+"""Largest last step (mm, rad) against an outer plate, and its energy (uJ): the plate's force is to
+converge as well.
+"""
+ROUGH_STEP = 0.01
+"""Last step (mm, rad) against a soft plate."""
+RIM_ROUNDS = 2
+"""Times that a step is limited by rims that it would meet."""
+CORRECTIONS, SMALL_CORRECTION = 16, 0.8
+"""Corrections of a step by the springs at its end, and the share of it that is small: the next step
+makes up for the rest.
+"""
+STRAIGHT = 6e-3
+"""Step (mm, rad) along which springs are linear enough."""
+REUSED_STEP, REUSED_PRODUCT, SPRING_CHANGE = 2e-3, 1e-9, 0.2
+"""Step whose tangent stiffness the next may use again, the product of both steps at which that one
+is the last, and the relative change of springs in between.
+"""
+FEW_STEPS = 12
+"""Steps in which a far start meets an outer plate, or never does."""
 PLATE_STEPS = 12
 """Steps against an outer plate before another method is tried."""
 PLATE_SMALLEST_STEP = 1e-7
@@ -38,18 +65,208 @@ CONTACT_ROUNDS, CONTACT_RIM_ROUNDS = 8, 2
 """Rounds of the active set of contacts, and those with further rims in contact."""
 STEP_SHARES = 0.5 ** np.arange(12)
 """Shares of a step to an active set other than its own."""
-PLATE_STRAIGHT = 6e-3
-"""Step (mm, rad) along which springs are linear enough."""
 PUSH_RATIO = 2.0
 """Largest initial force on a plate over the largest push of a level."""
+
+
+def free_equilibrium(springs: Springs, start: Array) -> Array:
+    """Return rise and tilt of each row without external load: (rows, 3). Raises DesignError."""
+    at, before = start, SMALLEST_STEP
+    value, gradient, matrix = springs.energy(at)
+    for _ in range(MOST_STEPS):
+        if np.abs(gradient).max() < RESIDUAL:
+            return at
+        move, is_firm = newton_step(gradient, matrix)
+        largest = float(np.abs(move).max())
+        if is_firm and is_last_step(largest, before, SMALLEST_SUM_STEP):
+            return at + move
+        share = step_limit(move)
+        slope = (move * gradient).sum(-1)
+        for _ in range(12):
+            step = share[:, None] * move
+            tried = springs.energy(at + step)
+            good = tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + np.abs(value))
+            if good.all():
+                break
+            share = np.where(good, share, share / 2)
+        before = largest if (share == 1.0).all() else 0.0
+        at = at + step
+        value, gradient, matrix = tried
+    raise DesignError("no equilibrium of the stack found at these pressures; try others")
+
+
+def loaded_equilibrium(
+    springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
+) -> tuple[Array, float, bool]:
+    """Return rise and tilt of each level (levels, 3) under a load, the force in mN on the plate,
+    and True for a stable equilibrium.
+
+    An outer plate that is not met soon is stiffened by and by, for steps without contact would
+    run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError where no
+    equilibrium is found.
+    """
+    wall = load.wall
+    if wall is None:
+        fine = SMALLEST_STEP if is_near else SMALLEST_SUM_STEP
+        balance = _energy_descent(springs, pitch, load, start, FEW_STEPS, quick=fine)
+        if balance is None:
+            balance = _energy_descent(springs, pitch, load, start, MOST_STEPS)
+    else:
+        at = start if is_near else start_below(springs, start, pitch, wall, load.stiffness)
+        balance = _contact_descent(springs, pitch, load, wall, at)
+        if balance is None:
+            balance = _energy_descent(
+                springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS
+            )
+        if balance is None:
+            balance = _by_softer_plates(springs, pitch, load, wall, at)
+    if balance is None:
+        raise DesignError("no equilibrium of the stack found under this load; try a smaller one")
+    return balance
+
+
+def _by_softer_plates(
+    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
+) -> tuple[Array, float, bool] | None:
+    """Return the loaded equilibrium against a plate by way of softer plates."""
+    at = start
+    for stiffness in SOFT_PLATES:
+        soft = _energy_descent(
+            springs, pitch, load._replace(stiffness=stiffness), at, MOST_STEPS, ROUGH_STEP
+        )
+        if soft is None:
+            return None
+        at, _, _ = soft
+    balance = _contact_descent(springs, pitch, load, wall, at)
+    return balance or _energy_descent(springs, pitch, load, at, MOST_STEPS)
+
+
+def _energy_descent(
+    springs: Springs,
+    pitch: float,
+    load: Load,
+    start: Array,
+    most: int,
+    enough: float = 0.0,
+    quick: float = 0.0,
+) -> tuple[Array, float, bool] | None:
+    """Return the loaded equilibrium, or None where ``most`` steps do not reach it.
+
+    A step no larger than ``enough`` ends it. ``quick`` makes fewer and larger steps, until the
+    error is below it.
+    """
+    fine = quick or SMALLEST_STEP
+    at, before, last = start, fine, None
+    now = loaded_energy(springs, pitch, load, at)
+    for _ in range(most):
+        if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
+            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
+        if last is not None:
+            # The matrix of a step so small is still good enough for the last one.
+            matrix, blocks = last
+            flat = -np.linalg.solve(matrix, now.gradient)
+            if np.abs(flat).max() * before < REUSED_PRODUCT and _are_close(blocks, now.blocks):
+                return at + flat.reshape(-1, 3), now.push, True
+        rest = now.rest()
+        matrix = with_diagonal_blocks(rest, now.blocks)
+        flat, is_firm = (_plain_step if quick else _safeguarded_step)(now.gradient, matrix)
+        flat = _rim_limited(springs, at, flat, now.gradient, rest, now.blocks)
+        if quick and np.abs(flat).max() > STRAIGHT:
+            flat = _refined(springs, at, flat, now, rest)
+        move = flat.reshape(-1, 3)
+        largest = float(np.abs(move).max())
+        slope = float(flat @ now.gradient)
+        fits = load.wall is None or (largest < PLATE_LAST_STEP and slope > -PLATE_LAST_GAIN)
+        is_last = largest <= enough or (fits and is_last_step(largest, before, fine))
+        if is_last and (is_positive_definite(matrix) if is_firm is None else is_firm):
+            at = at + move
+            if load.wall is None:
+                return at, 0.0, True
+            return at, loaded_energy(springs, pitch, load, at).push, True
+        share = float(step_limit(move).min()) if largest > LARGEST_MOVE.min() else 1.0
+        for _ in range(14):
+            tried = loaded_energy(springs, pitch, load, at + share * move)
+            if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
+                break
+            share /= 2
+        before = largest if share == 1.0 else 0.0
+        may_last = load.wall is None and 0 < before < REUSED_STEP and is_positive_definite(matrix)
+        last = (matrix, now.blocks) if may_last else None
+        at = at + share * move
+        now = tried
+        if abs(slope) < 1e-11 * (1 + abs(now.value)):
+            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
+    return None
+
+
+def _safeguarded_step(gradient: Array, matrix: Array) -> tuple[Array, bool]:
+    """Return Newton's step of all levels, and True for a positive definite tangent stiffness."""
+    step, is_firm = newton_step(gradient[None], matrix[None])
+    return step[0], is_firm
+
+
+def _plain_step(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
+    """Return Newton's step, its tangent stiffness unchecked (None) where it leads downhill."""
+    flat = -np.linalg.solve(matrix, gradient)
+    return (np.asarray(flat), None) if flat @ gradient < 0 else _safeguarded_step(gradient, matrix)
+
+
+def _are_close(first: Array, second: Array) -> bool:
+    """Return True if the springs of two places are nearly equal: not where rims meet or part."""
+    return float(np.abs(first - second).max()) < SPRING_CHANGE * float(np.abs(first).max())
+
+
+def _rim_limited(
+    springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
+) -> Array:
+    """Return the step to where rims just touch that it would drive into each other.
+
+    A step without their contact would run far past them (a primal-dual active set).
+    """
+    for _ in range(RIM_ROUNDS):
+        met = springs.meeting(at, flat.reshape(-1, 3))
+        if met is None:
+            break
+        push, stiffer = met
+        matrix = with_diagonal_blocks(rest, blocks + stiffer)
+        tried, _ = newton_step((gradient + push.ravel())[None], matrix[None])
+        if float((tried @ gradient)[0]) >= 0:
+            break  # it would lead uphill
+        flat = tried[0]
+    return flat
+
+
+def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: Array) -> Array:
+    """Return the step at whose end springs are in equilibrium, with all else linear.
+
+    Films, and rims that meet on the way, are most of the nonlinearity.
+    """
+    outside = now.gradient - now.spring_gradient.ravel()
+    best, least = flat, math.inf
+    for _ in range(CORRECTIONS):
+        value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
+        follows = outside + rest @ flat
+        total = float(value.sum() + (outside + follows) @ flat / 2)
+        if total > least:
+            flat = (best + flat) / 2
+            continue
+        best, least = flat, total
+        gradient = follows + spring_gradient.ravel()
+        more = np.asarray(-np.linalg.solve(with_diagonal_blocks(rest, blocks), gradient))
+        more = _rim_limited(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
+        flat = best + more
+        if np.abs(more).max() < SMALL_CORRECTION * np.abs(best).max():
+            return flat
+    return best
+
+
+# Against an outer plate, with its contact forces as unknowns beside the freedoms.
 
 
 def start_below(
     springs: Springs, start: Array, pitch: float, wall: OuterPlate, stiffness: float
 ) -> Array:
-    """Return a start below a level plate, a little past it, so that it is met all round: symmetry
-    is kept.
-    """
+    """Return a start a little past a level plate, so that it is met all round."""
     at = start.copy()
     if wall.is_level:
         room = max(wall.point[2] / len(at) - pitch, 0.0)
@@ -139,7 +356,7 @@ def _contact_step(
             return None
         more, is_settled = correction
         flat = best + more
-        little = PLATE_SMALL_CORRECTION * np.abs(best).max() if number else PLATE_STRAIGHT
+        little = PLATE_SMALL_CORRECTION * np.abs(best).max() if number else STRAIGHT
         has_converged = is_settled and float(np.abs(more).max()) < little
         if has_converged:
             break
@@ -186,228 +403,3 @@ def _active_set_step(
         tried.append(step[0])
     # None is the least: the best place on the ways there, of which the first leads downhill.
     return min((share * trial for trial in tried for share in STEP_SHARES), key=energy), False
-
-
-# Levels alone, or all together under a load.
-
-
-SOFT_PLATES = (1e3, 1e5)
-"""Stiffness in mN/mm of an outer plate in the first solutions."""
-MOST_STEPS = 300
-RESIDUAL = 1e-7
-"""Residual in mN (or mN mm) that counts as none."""
-SMALLEST_SUM_STEP = 5e-8
-"""Smallest step where the errors of all levels add up: tilts under a load, volumes without."""
-PLATE_LAST_STEP, PLATE_LAST_GAIN = 3e-5, 1e-7
-"""Largest last step (mm, rad) against an outer plate, and its energy (uJ): the plate's force is to
-converge as well.
-"""
-ROUGH_STEP = 0.01
-"""Last step (mm, rad) against a soft plate."""
-RIM_ROUNDS = 2
-"""Times that a step is limited by rims that it would meet."""
-CORRECTIONS, SMALL_CORRECTION = 16, 0.8
-"""Corrections of a step by the springs at its end, and the share of it that is small: the next step
-makes up for the rest.
-"""
-STRAIGHT = 6e-3
-"""Step (mm, rad) along which springs are linear enough."""
-REUSED_STEP, REUSED_PRODUCT, SPRING_CHANGE = 2e-3, 1e-9, 0.2
-"""Step whose tangent stiffness the next may use again, the product of both steps at which that one
-is the last, and the relative change of springs in between.
-"""
-FEW_STEPS = 12
-"""Steps in which a far start meets an outer plate, or never does."""
-
-
-def free_equilibrium(springs: Springs, start: Array) -> Array:
-    """Return rise and tilt of each row without external load: (rows, 3). Raises DesignError."""
-    at, before = start, SMALLEST_STEP
-    value, gradient, matrix = springs.energy(at)
-    for _ in range(MOST_STEPS):
-        if np.abs(gradient).max() < RESIDUAL:
-            return at
-        move, is_firm = newton_step(gradient, matrix)
-        largest = float(np.abs(move).max())
-        if is_firm and is_last_step(largest, before, SMALLEST_SUM_STEP):
-            return at + move
-        share = step_limit(move)
-        slope = (move * gradient).sum(-1)
-        for _ in range(12):
-            step = share[:, None] * move
-            tried = springs.energy(at + step)
-            good = tried[0] <= value + 1e-4 * share * slope + 1e-11 * (1 + np.abs(value))
-            if good.all():
-                break
-            share = np.where(good, share, share / 2)
-        before = largest if (share == 1.0).all() else 0.0
-        at = at + step
-        value, gradient, matrix = tried
-    raise DesignError("the stack finds no balance at these pressures; try others")
-
-
-def loaded_equilibrium(
-    springs: Springs, pitch: float, load: Load, start: Array, is_near: bool
-) -> tuple[Array, float, bool]:
-    """Return rise and tilt of each level (levels, 3) under a load, the force in mN on the plate,
-    and True for a stable equilibrium.
-
-    An outer plate that is not met soon is stiffened by and by, for steps without contact would
-    run far into it; ``is_near`` marks a start that may be in contact. Raises DesignError where no
-    equilibrium is found.
-    """
-    wall = load.wall
-    if wall is None:
-        fine = SMALLEST_STEP if is_near else SMALLEST_SUM_STEP
-        balance = _energy_descent(springs, pitch, load, start, FEW_STEPS, quick=fine)
-        if balance is None:
-            balance = _energy_descent(springs, pitch, load, start, MOST_STEPS)
-    else:
-        at = start if is_near else start_below(springs, start, pitch, wall, load.stiffness)
-        balance = _contact_descent(springs, pitch, load, wall, at)
-        if balance is None:
-            balance = _energy_descent(
-                springs, pitch, load, at, MOST_STEPS if is_near else FEW_STEPS
-            )
-        if balance is None:
-            balance = _by_softer_plates(springs, pitch, load, wall, at)
-    if balance is None:
-        raise DesignError("the stack finds no balance under this load; try a smaller one")
-    return balance
-
-
-def _by_softer_plates(
-    springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
-) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium against a plate by way of softer plates."""
-    at = start
-    for stiffness in SOFT_PLATES:
-        soft = _energy_descent(
-            springs, pitch, load._replace(stiffness=stiffness), at, MOST_STEPS, ROUGH_STEP
-        )
-        if soft is None:
-            return None
-        at, _, _ = soft
-    balance = _contact_descent(springs, pitch, load, wall, at)
-    return balance or _energy_descent(springs, pitch, load, at, MOST_STEPS)
-
-
-def _energy_descent(
-    springs: Springs,
-    pitch: float,
-    load: Load,
-    start: Array,
-    most: int,
-    enough: float = 0.0,
-    quick: float = 0.0,
-) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium, or None where ``most`` steps do not reach it.
-
-    A step no larger than ``enough`` ends it. ``quick`` makes fewer and larger steps, until the
-    error is below it.
-    """
-    fine = quick or SMALLEST_STEP
-    at, before, last = start, fine, None
-    now = loaded_energy(springs, pitch, load, at)
-    for _ in range(most):
-        if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
-            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
-        if last is not None:
-            # The matrix of a step so small is still good enough for the last one.
-            matrix, blocks = last
-            flat = -np.linalg.solve(matrix, now.gradient)
-            if np.abs(flat).max() * before < REUSED_PRODUCT and _are_close(blocks, now.blocks):
-                return at + flat.reshape(-1, 3), now.push, True
-        rest = now.rest()
-        matrix = with_diagonal_blocks(rest, now.blocks)
-        flat, is_firm = (_plain_step if quick else _safeguarded_step)(now.gradient, matrix)
-        flat = _rim_limited(springs, at, flat, now.gradient, rest, now.blocks)
-        if quick and np.abs(flat).max() > STRAIGHT:
-            flat = _refined(springs, at, flat, now, rest)
-        move = flat.reshape(-1, 3)
-        largest = float(np.abs(move).max())
-        slope = float(flat @ now.gradient)
-        fits = load.wall is None or (largest < PLATE_LAST_STEP and slope > -PLATE_LAST_GAIN)
-        is_last = largest <= enough or (fits and is_last_step(largest, before, fine))
-        if is_last and (is_positive_definite(matrix) if is_firm is None else is_firm):
-            at = at + move
-            if load.wall is None:
-                return at, 0.0, True
-            return at, loaded_energy(springs, pitch, load, at).push, True
-        share = float(step_limit(move).min()) if largest > LARGEST_MOVE.min() else 1.0
-        for _ in range(14):
-            tried = loaded_energy(springs, pitch, load, at + share * move)
-            if tried.value <= now.value + 1e-4 * share * slope + 1e-11 * (1 + abs(now.value)):
-                break
-            share /= 2
-        before = largest if share == 1.0 else 0.0
-        may_last = load.wall is None and 0 < before < REUSED_STEP and is_positive_definite(matrix)
-        last = (matrix, now.blocks) if may_last else None
-        at = at + share * move
-        now = tried
-        if abs(slope) < 1e-11 * (1 + abs(now.value)):
-            return at, now.push, is_positive_definite(with_diagonal_blocks(now.rest(), now.blocks))
-    return None
-
-
-def _safeguarded_step(gradient: Array, matrix: Array) -> tuple[Array, bool]:
-    """Return Newton's step of all levels, and True for a positive definite tangent stiffness."""
-    step, is_firm = newton_step(gradient[None], matrix[None])
-    return step[0], is_firm
-
-
-def _plain_step(gradient: Array, matrix: Array) -> tuple[Array, bool | None]:
-    """Return Newton's step of all levels, without a check of the tangent stiffness (None) where the
-    step leads downhill.
-    """
-    flat = -np.linalg.solve(matrix, gradient)
-    return (np.asarray(flat), None) if flat @ gradient < 0 else _safeguarded_step(gradient, matrix)
-
-
-def _are_close(first: Array, second: Array) -> bool:
-    """Return True if the springs of two places are nearly equal: not where rims meet or part."""
-    return float(np.abs(first - second).max()) < SPRING_CHANGE * float(np.abs(first).max())
-
-
-def _rim_limited(
-    springs: Springs, at: Array, flat: Array, gradient: Array, rest: Array, blocks: Array
-) -> Array:
-    """Return the step to where rims just touch that it would drive into each other.
-
-    A step without their contact would run far past them (a primal-dual active set).
-    """
-    for _ in range(RIM_ROUNDS):
-        met = springs.meeting(at, flat.reshape(-1, 3))
-        if met is None:
-            break
-        push, stiffer = met
-        matrix = with_diagonal_blocks(rest, blocks + stiffer)
-        tried, _ = newton_step((gradient + push.ravel())[None], matrix[None])
-        if float((tried @ gradient)[0]) >= 0:
-            break  # it would lead uphill
-        flat = tried[0]
-    return flat
-
-
-def _refined(springs: Springs, at: Array, flat: Array, now: LoadedEnergy, rest: Array) -> Array:
-    """Return the step at whose end springs are in equilibrium, with all else linear.
-
-    Films, and rims that meet on the way, are most of the nonlinearity.
-    """
-    outside = now.gradient - now.spring_gradient.ravel()
-    best, least = flat, math.inf
-    for _ in range(CORRECTIONS):
-        value, spring_gradient, blocks = springs.energy(at + flat.reshape(-1, 3))
-        follows = outside + rest @ flat
-        total = float(value.sum() + (outside + follows) @ flat / 2)
-        if total > least:
-            flat = (best + flat) / 2
-            continue
-        best, least = flat, total
-        gradient = follows + spring_gradient.ravel()
-        more = np.asarray(-np.linalg.solve(with_diagonal_blocks(rest, blocks), gradient))
-        more = _rim_limited(springs, at + best.reshape(-1, 3), more, gradient, rest, blocks)
-        flat = best + more
-        if np.abs(more).max() < SMALL_CORRECTION * np.abs(best).max():
-            return flat
-    return best

@@ -53,9 +53,7 @@ FORCE_MOTION = _force_motion_matrix()
 
 
 def _rotation_matrix() -> Array:
-    """Return the matrix (12, 13) behind ``_rotations``: of 1, x, y, xx, xy, yx, yy, 1, then xx, xy,
-    yx, yy.
-    """
+    """Return the matrix (12, 13) of ``_rotations``: by 1, x, y, xx, xy, yx, yy, 1, xx .. yy."""
     matrix = np.zeros((12, 13))
     turn, rate = matrix[:, :9].reshape(12, 3, 3), matrix[:, 9:].reshape(12, 2, 2)
     turn[0] = BASE
@@ -136,9 +134,7 @@ def _rotations(vectors: Array) -> tuple[Array, Array]:
 
 
 def crossing(vectors: Array) -> Array:
-    """Return matrices (..., 3, 3) that turn a row into its vector product, the vectors (..., 3)
-    first.
-    """
+    """Return matrices (..., 3, 3) of the vector product of vectors (..., 3) with a row."""
     return np.asarray((vectors @ CROSS).reshape(*vectors.shape, 3))
 
 
@@ -264,9 +260,7 @@ class Springs:
         return np.asarray(each.reshape(-1, 3, 3))
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
-        """Return the energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows,
-        3, 3).
-        """
+        """Return energy (rows) in uJ, gradient (rows, 3), second derivatives (rows, 3, 3)."""
         begins, ring, squares, meet, _ = self.places
         gaps = (freedoms[:, None] @ meet)[:, 0]
         value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
@@ -282,9 +276,7 @@ class Springs:
         return value, gradient, matrix
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
-        """Return the volume in ul of each balloon (rows, chambers), and the potential of each
-        row.
-        """
+        """Return ul in each balloon (rows, chambers), and the potential of each row."""
         begins, ring = self.places.begins, self.places.ring
         gaps = (ring @ freedoms[..., None])[..., 0]
         both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
@@ -372,9 +364,7 @@ def outer_plate(line: tuple[float, ...], sticks: bool, outline: float) -> OuterP
 
 
 class Load(NamedTuple):
-    """External loads, in mN: force on the tip, weight of each level, and the outer plate with its
-    stiffness in mN/mm.
-    """
+    """External loads: tip force and level weight in mN, outer plate, its stiffness in mN/mm."""
 
     tip: Array
     weight: Array | None
@@ -438,9 +428,7 @@ def _external_forces(plates: Chain, load: Load, forces: Array | None) -> _Extern
 def _with_contact(
     acting: _ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
 ) -> _ExternalForces:
-    """Return the forces with those of the outer plate on the tip: ``forces``, or by its
-    stiffness.
-    """
+    """Return the forces with those of the outer plate: ``forces``, or by its stiffness."""
     points = plates.places[-1] + wall.local @ plates.axes[-1].T
     deep = ((points - wall.point) * wall.ways).sum(-1)
     lines = np.concatenate([(points[:, None] @ wall.crosses)[:, 0], wall.ways], axis=1)
@@ -459,9 +447,7 @@ def _with_contact(
 
 @lru_cache(maxsize=16)
 def _beyond(count: int) -> tuple[Array, Array]:
-    """Return a mask of the plates beyond each level (count, count + 1), and their number (count,
-    1).
-    """
+    """Return a mask of plates beyond each level (count, count + 1), and their number."""
     mask = 1.0 - np.tri(count, count + 1)
     return mask, mask.sum(axis=1, keepdims=True)
 
@@ -500,9 +486,7 @@ class LoadedEnergy(NamedTuple):
         return -(half + half.T)
 
     def deeper(self, touch: PlateContact) -> Array:
-        """Return the increase in mm of a contact's depths by a unit of each freedom: (points,
-        freedoms).
-        """
+        """Return a contact's depths in mm by a unit of each freedom: (points, freedoms)."""
         return np.asarray(touch.lines @ self.motions.reshape(-1, 6).T)
 
     def rest(self) -> Array:
@@ -543,8 +527,6 @@ def loaded_energy(
 
 @lru_cache(maxsize=16)
 def _base_side(count: int) -> Array:
-    """Return 1 where the row's level is nearer the base than the column's, half where both are one
-    level.
-    """
+    """Return 1 where the row's level is nearer the base than the column's, 1/2 if equal."""
     level = np.repeat(np.arange(count), 3)
     return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

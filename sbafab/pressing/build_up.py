@@ -175,8 +175,8 @@ def pad_thickness(
     """
     if pad.material == "silicone sponge" and pad.hardness > HARDEST_SPONGE:
         raise DesignError(
-            f"press.pad_hardness = {pad.hardness:g} Shore A is none of a silicone sponge, which "
-            f"has at most {HARDEST_SPONGE:g}; lower it, or set press.pad_material = "
+            f"press.pad_hardness = {pad.hardness:g} Shore A is harder than any silicone "
+            f"sponge, {HARDEST_SPONGE:g} at most; lower it, or set press.pad_material = "
             '"silicone rubber"'
         )
     if pad.thickness is not None:
@@ -237,17 +237,14 @@ def pressure_basis(
     """Return the sentence that explains the estimated pressures."""
     return (
         f"estimate: {platen_kpa:g} kPa on the platen are about {estimate.film:.0f} on the films, "
-        "as "
-        f"the pad ({thickness:g} mm, {pad.modulus / 1000:.2f} MPa) gives way {under.height:.3f} mm "
-        f"more there; {estimate.edge:.0f} within {estimate.free:.1f} mm of their edge, "
+        f"as the pad ({thickness:g} mm, {pad.modulus / 1000:.2f} MPa) gives way {under.height:.3f} "
+        f"mm more there; {estimate.edge:.0f} within {estimate.free:.1f} mm of their edge, "
         f"{estimate.bond:.0f} over the lowest bond, {estimate.plate:.0f} beside them"
     )
 
 
 def unpressed(platen_kpa: float, pad: Pad, stands_out: float) -> float:
-    """Return the width in mm round a pin that stands out of the stack where the pad does not
-    press.
-    """
+    """Return the width in mm round a protruding pin where the pad does not press."""
     return stands_out * pad.modulus / (2 * platen_kpa)
 
 

@@ -87,9 +87,7 @@ def press_runs(
 def runs_of(
     laminate: Laminate, copies: int, platen: tuple[float, float], most: int | None = None
 ) -> Runs:
-    """Return the press runs of a laminate, on one base plate; registered sheets count as one
-    piece.
-    """
+    """Return a laminate's press runs on one base plate; registered sheets are one piece."""
     if laminate.panel is not None:
         return Runs(1, ((0.0, 0.0),))
     margin = PLATE_MARGIN if laminate.pins else 0.0
@@ -97,9 +95,7 @@ def runs_of(
 
 
 def design_runs(design: Design, laminate: Laminate, copies: int | None = None) -> Runs:
-    """Return the press runs of ``copies``, by default of the order; no cycle is longer than a
-    shift.
-    """
+    """Return the runs of ``copies``, by default the order; no cycle is longer than a shift."""
     press = design.press
     return runs_of(
         laminate,
@@ -188,7 +184,7 @@ def working_days(
     return by_day(work, 60 * design.order.shift_hours)
 
 
-def a_day(plan: Schedule, together: int, minutes: float) -> int | None:
+def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
     """Return the number of actuators that one person makes in a shift with one press, ``together``
     at once.
 
@@ -223,8 +219,8 @@ def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, 
         "press_minutes": times.press,
         "hands_minutes": times.hands,
         "total_minutes": times.total,
-        "a_day_one_by_one": a_day(plan, 1, shift),
-        "a_day_in_batches": a_day(plan, most, shift),
+        "a_day_one_by_one": copies_a_day(plan, 1, shift),
+        "a_day_in_batches": copies_a_day(plan, most, shift),
         "shift_minutes": shift,
         "plan": [
             {

@@ -202,9 +202,7 @@ def settings_by_step(
 
 
 class _Choice(NamedTuple):
-    """A depth of holes, their pins' length by height of stack, and the largest height of one over
-    its stack.
-    """
+    """Depth of holes, pin lengths by height of stack, and the largest height over a stack."""
 
     depth: float
     lengths: Mapping[float, float]
@@ -226,9 +224,7 @@ def _setting(pin: Pin, height: float, choice: _Choice) -> PinSetting:
 def _choices(
     pin: str, diameter: float, tops: Sequence[float], sold: Sequence[float]
 ) -> list[_Choice]:
-    """Return the depths with which some pin stands no higher than it must over one of the
-    stacks.
-    """
+    """Return depths with which some pin stands no higher than it must over a stack."""
     needs = {top: top + chamfer(diameter) for top in tops}
     seat = least_seat(diameter)
     depths = {
@@ -259,16 +255,12 @@ def _choices(
 
 
 def _rounded_down(depth: float) -> float:
-    """Return the multiple of ``STEP`` at or below a depth, so that pins never stand lower for
-    it.
-    """
+    """Return a multiple of ``STEP`` at or below a depth: pins never stand lower for it."""
     return round(math.floor(depth / STEP + ROUNDING) * STEP, 6)
 
 
 def _shortest(sold: Sequence[float], depth: float, need: float) -> float | None:
-    """Return the shortest pin that surely stands ``need`` mm over the plate; None where none
-    does.
-    """
+    """Return the shortest pin that surely stands ``need`` mm over the plate, or None."""
     off = depth_tolerance(depth)
     return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - ROUNDING), None)
 
@@ -279,9 +271,7 @@ def _needed_length(seat: float, need: float) -> float:
 
 
 def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | None) -> float:
-    """Return the plate's thickness in mm: the setting's, or the thinnest sold that takes every
-    pin's seat.
-    """
+    """Return the plate's thickness in mm: as set, or the thinnest that takes every seat."""
     least = max((every[0].depth for every in choices.values()), default=0.0) + FLOOR
     if not choices:
         least = 0.0
@@ -291,8 +281,7 @@ def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | No
     if thickness < least - ROUNDING:
         raise DesignError(
             f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's "
-            "hole "
-            f"takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
+            f"hole takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
             "pins in registration.pin_lengths"
         )
     return thickness
@@ -371,9 +360,7 @@ def hole_notes(
 
 
 def plate_thickness(thickness: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:
-    """Return the base plate's thickness in mm: the setting's, or the thinnest sold under every
-    seat.
-    """
+    """Return the base plate's thickness in mm: as set, or the thinnest under every seat."""
     if thickness is not None:
         return thickness
     deepest = max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0)

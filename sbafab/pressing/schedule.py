@@ -52,7 +52,7 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def named(layers: Sequence[int]) -> str:
+def layers_in_words(layers: Sequence[int]) -> str:
     """Return layer indices in words; never 2-3, which a spreadsheet takes for a date."""
     runs: list[list[int]] = []
     for index in layers:
@@ -152,9 +152,7 @@ class Heating:
 
 
 def heating(laminate: Laminate, press: PressSettings) -> Heating:
-    """Return the warming of the plate under a laminate; the press must be hotter than its films
-    melt.
-    """
+    """Return the warming of the plate; the press must be hotter than its films melt."""
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     melting = [film.softens_above for film in films if film.softens_above is not None]
     is_known = bool(melting) and not any(
@@ -216,7 +214,7 @@ TITLES_OF_SEVERAL = {
     "tack_bottom": "Bottom balloons, their bases tacked on",
     "bond_bottom": "Bottom balloons, each with its base",
 }
-"""Where stacks are pressed beside each other."""
+"""Titles for stacks that are pressed beside each other."""
 
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
@@ -262,9 +260,7 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """Return the minutes for which the press stays closed in a step; tacking is a flash
-        bond.
-        """
+        """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
         return {
             "flash_bottom": self.flash_bottom,
             "tack_bottom": self.flash_bottom,
@@ -542,7 +538,7 @@ def _items(
 def _instructions(part: AssemblyStep, count: int) -> str:
     """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
-    stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
+    stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {listed(pins)}"
     if not part.adds:
         return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
@@ -672,7 +668,7 @@ def warnings(
         )
     for step, part in zip(steps, parts, strict=True):
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):
-            which = named(layers) if len(layers) < 4 else _by_role(laminate, layers)
+            which = layers_in_words(layers) if len(layers) < 4 else _by_role(laminate, layers)
             yield f"step {step.step}: no pin holds {which}; align by hand"
 
 
@@ -689,9 +685,7 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
 
 
 def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
-    """Return the layers that join in a step, or lie in a bonded stack, that none of its pins
-    holds.
-    """
+    """Return the layers that join in a step, or in a bonded stack, without a pin."""
     pinned = {
         layer.pattern
         for layer in distinct_layers(laminate, part.layers)
@@ -775,9 +769,7 @@ class Tacking:
 
 
 def tack_stack(laminate: Laminate) -> float:
-    """Return the height of the highest film with its mask, mm; the transfer film stops short of the
-    pins.
-    """
+    """Return the largest height in mm of a film with its mask, the transfer film left out."""
     masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
     films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
     return round(max(films) + max(masks), 6)
@@ -802,8 +794,7 @@ def tacking_of(
         pins=pins,
         basis=(
             f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to "
-            f"{CLOCK_SHORTFALL:g} C "
-            f"short of the platen with {CONTACT:g} W/(m2 K), and in still air down to {TOUCH:g} C "
-            f"with {AIR:g} W/(m2 K) from each face; not measured"
+            f"{CLOCK_SHORTFALL:g} C short of the platen with {CONTACT:g} W/(m2 K), and in still "
+            f"air down to {TOUCH:g} C with {AIR:g} W/(m2 K) from each face; not measured"
         ),
     )

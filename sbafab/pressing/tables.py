@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.schedule import HeatPoint, Schedule, named
+from sbafab.pressing.schedule import HeatPoint, Schedule, layers_in_words
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"
@@ -67,8 +67,8 @@ def press_csv(plan: Schedule) -> str:
                 step.step,
                 step.title,
                 step.bond,
-                named(step.layers),
-                named(step.adds),
+                layers_in_words(step.layers),
+                layers_in_words(step.adds),
                 ", ".join(step.pins),
                 f"{step.temperature_c:g}",
                 f"{step.pressure_kpa:g}",

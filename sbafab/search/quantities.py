@@ -25,7 +25,7 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import blocked_force
+from sbafab.models.elastic import blocked
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
@@ -287,7 +287,7 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        push = float(blocked_force(self._stack, kpa, stroke))
+        push = float(blocked(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)

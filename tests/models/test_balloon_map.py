@@ -12,7 +12,7 @@ import pytest
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap, balloon_map
-from sbafab.models.rippled import pressed, risen, taller
+from sbafab.models.rippled import height_ratio, pressed, risen
 
 SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
@@ -56,7 +56,7 @@ def test_forces_are_within_two_percent(
     """Of force and of pressure times pocket, at places drawn from 0.06 to 100 kPa; so volumes."""
     draw = np.random.default_rng(7)
     p = 0.06 * (100 / 0.06) ** draw.random(200)
-    free = inflate(made.balloon, p).height * taller(made.balloon, p).share
+    free = inflate(made.balloon, p).height * height_ratio(made.balloon, p).share
     h = free * draw.uniform(least, most, len(p))
     inside = (h < 0.98 * made.most_height) & (h > 0.02)
     p, h = p[inside], h[inside]

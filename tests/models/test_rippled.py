@@ -16,7 +16,7 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.film_elements import Elements, air_volume, bending, membrane
 from sbafab.models.rim_modes import EDGE, OVERTONES, PLACES, UP, R, Waves, Waving, Z, first_of
-from sbafab.models.rippled import pressed, resolved, rippled, risen, taller
+from sbafab.models.rippled import height_ratio, pressed, resolved, rippled, risen
 
 WIDE = Balloon(5.0)
 INNER = Balloon(5.0, neck=1.27, bore=0.52)
@@ -166,7 +166,7 @@ def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
 
 def test_free_heights_of_the_map_are_those_with_waves() -> None:
     p = np.array([0.5, 1.0, 3.0, 8.0])
-    assert (taller(INNER, p).share > 1.005).all()
+    assert (height_ratio(INNER, p).share > 1.005).all()
     found = balloon_map(INNER, 50.0).free_height(p)
     assert found == pytest.approx(risen(INNER, p).height, rel=0.015)
 
