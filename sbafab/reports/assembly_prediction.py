@@ -1,4 +1,4 @@
-"""Prediction of an inflated assembly: reach, load, grip in its lumen, and contacts between parts."""
+"""Prediction of an inflated assembly: reach, load, grip in its lumen, contacts between parts."""
 
 from __future__ import annotations
 

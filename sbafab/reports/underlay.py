@@ -233,7 +233,7 @@ def _laminate(page: PdfPage, laminate: Laminate, outlines: tuple[Guide, ...], sh
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
-    """Return all that is laid by hand in any step, equal outlines once, in the order of the steps."""
+    """Return all that is laid by hand in any step, equal outlines once, in order of steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
     parts = assembly(laminate)
     # What is laid down again as one whole stack has no edge to lie by.
