@@ -1,4 +1,4 @@
-"""The kerf from what was measured on the calibration piece, with its uncertainty.
+"""The calibration piece, its table of measured sizes, and the kerf from them with its uncertainty.
 
 An outside comes out smaller by the kerf, a window larger; a constant reading error makes both
 larger, and a scale both in proportion. So all three are fitted together, by least squares of
@@ -85,7 +85,7 @@ class Measurement:
 
     @property
     def kerf(self) -> float:
-        """What this size alone says of the kerf."""
+        """The kerf by this size alone, mm."""
         return self.sign * (self.measured - self.nominal)
 
     def __str__(self) -> str:
@@ -110,7 +110,7 @@ class Value(NamedTuple):
         return self.value - self.half_width, self.value + self.half_width
 
     def differs_from(self, other: float) -> bool:
-        """Whether the interval leaves ``other`` out."""
+        """Return True if the interval does not hold ``other``."""
         return abs(self.value - other) > self.half_width
 
 
@@ -135,16 +135,16 @@ class Estimate:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether the sizes show a scale other than 1."""
+        """True if the sizes show a scale other than 1."""
         return self.scale is not None and self.scale.differs_from(1.0)
 
     @property
     def is_vague(self) -> bool:
-        """Whether the kerf may as well be none, or is known too badly to compensate with."""
+        """True if the kerf may be none, or is known too badly to compensate with."""
         return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
 
     def gap(self, size: Measurement) -> float:
-        """How far a size lies from what kerf and scale say it should be."""
+        """Return the distance of a size from its value by kerf and scale, mm."""
         scale = 1.0 if self.scale is None else self.scale.value
         scale += size.along_x * self.scale_along_x
         kerf = self.kerf.value + size.along_x * self.kerf_along_x
@@ -166,7 +166,7 @@ class Calibration:
 
     @property
     def differs(self) -> bool:
-        """Whether the kerf along x is another one than along y."""
+        """True if the kerf along x differs from that along y."""
         return self.difference is not None and self.difference.differs_from(0.0)
 
 
@@ -196,30 +196,30 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
         raise DesignError(
             f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
-    found = _fitted(measurements, resolution)
-    if _is_other_unit(found):
-        assert found.scale is not None
+    estimate = _fitted(measurements, resolution)
+    if _is_other_unit(estimate):
+        assert estimate.scale is not None
         raise DesignError(
-            f"the measured sizes{where} are about {found.scale.value:.3g} times the nominal ones; "
-            "give them in millimetres"
+            f"the measured sizes{where} are about {estimate.scale.value:.3g} times the nominal "
+            "ones; give them in millimetres"
         )
-    if not 0 <= found.kerf.value <= LARGEST:
-        kind = "negative" if found.kerf.value < 0 else f"over {LARGEST:g} mm"
+    if not 0 <= estimate.kerf.value <= LARGEST:
+        kind = "negative" if estimate.kerf.value < 0 else f"over {LARGEST:g} mm"
         raise DesignError(
-            f"the kerf{where} comes out as {found.kerf.value:.3f} mm, which is {kind}; check the "
-            "measurements, the unit and which rows are outers and windows"
+            f"the kerf{where} comes out as {estimate.kerf.value:.3f} mm, which is {kind}; check "
+            "the measurements, the unit and which rows are outers and windows"
         )
-    worst = max(measurements, key=found.gap)
-    if found.gap(worst) > LARGEST_SLIP:
+    worst = max(measurements, key=estimate.gap)
+    if estimate.gap(worst) > LARGEST_SLIP:
         raise DesignError(
-            f"{worst} is {found.gap(worst):.2f} mm off what the sizes together say; measure it "
+            f"{worst} is {estimate.gap(worst):.2f} mm off what the sizes together say; measure it "
             "again, and the others too"
         )
-    return found
+    return estimate
 
 
-def _is_other_unit(found: Estimate) -> bool:
-    return found.scale is not None and abs(found.scale.value - 1) > WORST_SCALE
+def _is_other_unit(estimate: Estimate) -> bool:
+    return estimate.scale is not None and abs(estimate.scale.value - 1) > WORST_SCALE
 
 
 def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
@@ -231,18 +231,18 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
         return
     middle = median(m.kerf for m in measurements)
     by_distance = sorted(measurements, key=lambda m: -abs(m.kerf - middle))
-    told: list[tuple[float, float, Measurement]] = []
+    slips: list[tuple[float, float, Measurement]] = []
     for suspect in by_distance[:MOST_SUSPECTS]:
-        others = [m for m in measurements if m is not suspect]
-        if suspect.instrument not in {size.instrument for size in others}:
+        rest = [m for m in measurements if m is not suspect]
+        if suspect.instrument not in {size.instrument for size in rest}:
             continue
-        found = _fitted(others, resolution)
-        spread = max(map(found.gap, others))
-        is_sound = 0 <= found.kerf.value <= LARGEST and not _is_other_unit(found)
-        if is_sound and spread <= LARGEST_SLIP < found.gap(suspect):
-            told.append((spread, found.gap(suspect), suspect))
-    if told:
-        _, off, slip = min(told, key=lambda entry: entry[0])
+        estimate = _fitted(rest, resolution)
+        spread = max(map(estimate.gap, rest))
+        is_sound = 0 <= estimate.kerf.value <= LARGEST and not _is_other_unit(estimate)
+        if is_sound and spread <= LARGEST_SLIP < estimate.gap(suspect):
+            slips.append((spread, estimate.gap(suspect), suspect))
+    if slips:
+        _, off, slip = min(slips, key=lambda entry: entry[0])
         raise DesignError(
             f"{slip} is {off:.2f} mm off what the other sizes say; mend the entry or measure it "
             "again"
@@ -301,7 +301,7 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
 
 
 def _are_apart(columns: NDArray[Any]) -> bool:
-    """Whether the sizes tell what the columns stand for from each other."""
+    """Return True if the sizes tell the causes of the columns from each other."""
     import numpy as np
 
     unit = columns / np.linalg.norm(columns, axis=0)
@@ -317,8 +317,8 @@ def _left_by_rounding(scatter: float, resolution: float) -> float:
     """
     if resolution == 0:
         return 0.0
-    own = max(scatter - resolution**2 / 12, 0.0)
-    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * own / resolution**2)
+    variance = max(scatter - resolution**2 / 12, 0.0)
+    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * variance / resolution**2)
 
 
 @cache
@@ -440,7 +440,7 @@ def _labels() -> tuple[Stroke, ...]:
     return (*(stroke for name in names for stroke in name), *title, *arrow)
 
 
-# The coupon's table as it was filled in: read where it can be read in one way, or refused.
+# The coupon's filled-in table: read where it can be read in one way, or refused.
 
 
 MOST_BYTES = 1_000_000
@@ -471,14 +471,14 @@ def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
         if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
     ]
     separator, names = _header(path, lines[0] if lines else ("", ""))
-    found = []
+    measurements = []
     for where, line in lines[1:]:
         cells = _row(line, separator, len(names), where)
         _refuse_two_ways(cells, names, separator, where)
         row = dict(zip(names, cells, strict=False))
         if row["measured_mm"]:
-            found.append(_measurement(row, where, instrument))
-    return found
+            measurements.append(_measurement(row, where, instrument))
+    return measurements
 
 
 def table_text(path: Path) -> str:
@@ -496,7 +496,7 @@ def table_text(path: Path) -> str:
 
 
 def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
-    """What parts the columns, and their names in small letters."""
+    """Return the separator of the columns, and their names in small letters."""
     where, line = first
     separator = max(SEPARATORS, key=line.count)
     names = [name.lower() for name in _cells(line, separator, where)]
@@ -569,8 +569,8 @@ def _measurement(row: dict[str, str], where: str, instrument: str) -> Measuremen
     (kind,) = kinds
     used = row.get(INSTRUMENT, "").lower() or instrument
     if used and used not in RESOLUTIONS:
-        known = ", ".join(RESOLUTIONS)
-        raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {known}")
+        allowed = ", ".join(RESOLUTIONS)
+        raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {allowed}")
     if axis not in ("x", "y"):
         raise DesignError(f"{where}: axis must be x or y")
     nominal, measured = (_size(row[name], name, where) for name in NUMBERS)

@@ -31,7 +31,7 @@ QUARTER = math.tan(math.pi / 8)
 
 
 class DrawnEntity(NamedTuple):
-    """What one entity draws on a layer: the closed contour, or else the loose edges."""
+    """The drawing of one entity on a layer: the closed contour, or else the loose edges."""
 
     kind: str
     layer: str
@@ -40,7 +40,7 @@ class DrawnEntity(NamedTuple):
 
 
 def of_polyline(kind: str, layer: str, edges: Sequence[Edge], closed: bool) -> DrawnEntity:
-    """What a polyline of these edges draws."""
+    """Return the drawing of a polyline of these edges."""
     if closed:
         return DrawnEntity(kind, layer, Contour(tuple(edges)), ())
     return DrawnEntity(kind, layer, None, edges)
@@ -80,14 +80,14 @@ def polyline(
 
 
 def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
-    """What a polyline draws from a vertex to the next; arcs may turn more than half round."""
+    """Return edges from a vertex of a polyline to the next; arcs may turn more than half round."""
     edge = edge_from_bulge(start, end, bulge)
     if isinstance(edge, Line) or abs(bulge) <= QUARTER:
         return [edge]
     return quarter_arcs(start, end, edge.centre, edge.radius, 4 * math.atan(bulge))
 
 
-# Whether a cut file's entities are shown, plotted and coloured as the shop takes them.
+# Appearance: entities are shown, plotted and coloured as the shop takes them.
 
 
 BY_LAYER = 256
@@ -174,15 +174,15 @@ def _check_entity(entity: DXFGraphic) -> None:
 
 
 def _is_true(colour: int | None, layer: str) -> bool:
-    """Whether a true colour, if there is one, is that of the layer's index."""
+    """Return True if a true colour, if there is one, is that of the layer's index."""
     if colour is None:
         return True
     from ezdxf.colors import aci2rgb, int2rgb
 
-    own = {tuple(aci2rgb(COLOURS[layer]))}
+    layer_colour = {tuple(aci2rgb(COLOURS[layer]))}
     # Index 7 is black on white and white on black.
     both = {(0, 0, 0), (255, 255, 255)}
-    return tuple(int2rgb(colour & 0xFFFFFF)) in (both if COLOURS[layer] == 7 else own)
+    return tuple(int2rgb(colour & 0xFFFFFF)) in (both if COLOURS[layer] == 7 else layer_colour)
 
 
 def _shown(item: Layer | DXFGraphic) -> str:
@@ -190,7 +190,7 @@ def _shown(item: Layer | DXFGraphic) -> str:
     return str(item.dxf.get("color")) if colour is None else f"#{colour & 0xFFFFFF:06x}"
 
 
-# Cut files read by the form in which this program writes them, and in no other.
+# Reading by the form in which this program writes, and by no other.
 #
 # All but numbers, properties and entities has to be the packaged empty document, letter by letter,
 # and every entity one of the four that are written, with the handle that is its turn. What such a
@@ -216,14 +216,14 @@ _ROW = re.compile(rf" 10\n{_VALUE} 20\n{_VALUE}(?: 42\n{_VALUE})?")
 
 
 class OwnFile(NamedTuple):
-    """What a file in this program's form holds."""
+    """The content of a file in this program's form."""
 
     properties: dict[str, str]
     drawn: list[DrawnEntity]
 
 
 def as_written(text: str) -> OwnFile | None:
-    """What a cut file in this program's form holds; None for any other text, and for a polyline
+    """Return the content of a file in this program's form; None for other text, and for a polyline
     that cannot be cut.
     """
     form = skeleton()
@@ -248,16 +248,16 @@ def as_written(text: str) -> OwnFile | None:
 
 def _properties(text: str, place: int) -> tuple[dict[str, str] | None, int]:
     """The custom properties from a place on, and where they end; None where they may be others."""
-    found: dict[str, str] = {}
+    properties: dict[str, str] = {}
     while match := _PROPERTY.match(text, place):
         name, value = match.groups()
-        if name in found or any(
-            _UNSURE.search(said) or not said.isprintable() for said in (name, value)
+        if name in properties or any(
+            _UNSURE.search(string) or not string.isprintable() for string in (name, value)
         ):
             return None, place
-        found[name] = value
+        properties[name] = value
         place = match.end()
-    return found, place
+    return properties, place
 
 
 @cache
@@ -283,31 +283,31 @@ def _entities(text: str, first_handle: int, seed: int) -> list[DrawnEntity] | No
     for match in _entity(skeleton().model_space).finditer(text):
         if match.start() != place or match[2] != f"{first_handle + len(drawn):X}":
             return None
-        own = _drawn_by_own_form(match)
-        if own is None:
+        entity = _drawn_by_own_form(match)
+        if entity is None:
             return None
-        drawn.append(own)
+        drawn.append(entity)
         place = match.end()
     return drawn if place == len(text) and first_handle + len(drawn) == seed else None
 
 
 def _drawn_by_own_form(match: re.Match[str]) -> DrawnEntity | None:
     kind, _, layer, count, closed, rows, *numbers = match.groups()
-    said = [float(number) for number in numbers if number is not None]
+    values = [float(number) for number in numbers if number is not None]
     if kind == "LWPOLYLINE" and rows is not None:
         points = list(_rows(rows))
         if len(points) != int(count):
             return None
         edges = polyline(points, closed == "1", 0.0, layer not in (CUT_INNER, CUT_OUTER))
         return of_polyline(kind, layer, edges, closed == "1")
-    is_round = numbers[0] is not None and len(said) == len(ROUND.get(kind, ""))
-    if is_round and said[2] > 0:
-        x, y, radius, *turn = said
+    is_round = numbers[0] is not None and len(values) == len(ROUND.get(kind, ""))
+    if is_round and values[2] > 0:
+        x, y, radius, *turn = values
         if kind == "CIRCLE":
             return DrawnEntity(kind, layer, circle((x, y), radius), ())
         return DrawnEntity(kind, layer, None, arc((x, y), radius, *turn))
     if kind == "LINE" and numbers[-1] is not None:
-        x, y, u, v = said
+        x, y, u, v = values
         return DrawnEntity(kind, layer, None, [Line((x, y), (u, v))])
     return None
 
@@ -318,7 +318,7 @@ def _rows(text: str) -> Iterator[tuple[float, ...]]:
         yield float(x), float(y), 0.0, 0.0, float(bulge or 0.0)
 
 
-# Cut files read back into exact contours, and refused where they could not be cut.
+# Reading back into exact contours, refused where they could not be cut.
 #
 # Those that stand letter by letter as this program writes them are read by that form; of all
 # others, and so of all that was touched by hand or another program, ezdxf says what they hold.
@@ -334,7 +334,7 @@ FLAT = 1e-9
 
 @dataclass(frozen=True)
 class ReadBack:
-    """What a cut file holds.
+    """The content of a cut file.
 
     ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties,
     which a DXF before R2004 has none of; ``units`` is "mm", or empty in R12, which cannot say;
@@ -369,14 +369,14 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
-    own = as_written(text)
-    if own is not None:
-        return _put_together(own.drawn, own.properties, "mm")
+    own_file = as_written(text)
+    if own_file is not None:
+        return _put_together(own_file.drawn, own_file.properties, "mm")
     return read_with_ezdxf(text)
 
 
 def read_with_ezdxf(text: str) -> ReadBack:
-    """What ezdxf says that a text holds. Raises OutputError as ``read_profile`` does."""
+    """Read a text with ezdxf. Raises OutputError as ``read_profile`` does."""
     check_space(text)
     document = _parsed(text)
     units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
@@ -430,7 +430,7 @@ def _put_together(
     closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
     loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
     layers: list[str] = []
-    other: list[str] = []
+    other_kinds: list[str] = []
     strokes: list[tuple[str, tuple[Edge, ...]]] = []
     for kind, layer, contour, edges in entities:
         drawn = contour.edges if contour else edges
@@ -441,7 +441,7 @@ def _put_together(
             raise OutputError(f"{_place(kind, drawn)} {on}")
         layers.append(layer)
         if layer not in closed:
-            other.append(kind)
+            other_kinds.append(kind)
             strokes.append((layer, tuple(drawn)))
         elif contour:
             closed[layer].append(contour)
@@ -453,7 +453,7 @@ def _put_together(
     copies = Copies()
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]], copies)
     region = nested_region(contours[CUT_INNER], contours[CUT_OUTER], copies)
-    return ReadBack(region, properties, units, tuple(layers), tuple(other), tuple(strokes))
+    return ReadBack(region, properties, units, tuple(layers), tuple(other_kinds), tuple(strokes))
 
 
 def _place(kind: str, drawn: Sequence[Edge]) -> str:
@@ -462,7 +462,9 @@ def _place(kind: str, drawn: Sequence[Edge]) -> str:
 
 
 def _is_short(edge: Edge) -> bool:
-    """Whether an edge has no length: none is shorter than its chord, but for a radius below 0."""
+    """Return True if an edge has no length: none is shorter than its chord, but for a radius below
+    0.
+    """
     may_be = math.dist(edge.start, edge.end) < EPSILON or (
         isinstance(edge, Arc) and edge.radius < EPSILON
     )
@@ -470,7 +472,7 @@ def _is_short(edge: Edge) -> bool:
 
 
 def _drawn(entity: DXFEntity) -> DrawnEntity:
-    """What an entity draws; polylines on the layers of strokes may be open."""
+    """Return the drawing of an entity; polylines on the layers of strokes may be open."""
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
 
@@ -517,7 +519,9 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
 
 
 def _is_plain(entity: Polyline) -> bool:
-    """Whether an old polyline is flat and drawn as it stands: no mesh, no curve fitted to it."""
+    """Return True if an old polyline is flat and drawn as it stands: no mesh, no curve fitted to
+    it.
+    """
     return bool(entity.is_2d_polyline) and not entity.dxf.flags & ~CLOSED
 
 

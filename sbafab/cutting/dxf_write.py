@@ -29,10 +29,8 @@ DATUM_ARM = 1.0
 
 
 class Surroundings(NamedTuple):
-    """What a film sheet has beside its parts: open runs of points, and its frame's far corner.
-
-    ``engraved`` strokes are burnt into the waste; ``parting`` cuts the sheet off its roll; the
-    frame from the origin to ``frame`` is for reference, as a check of scale, and so are ``marks``.
+    """The drawing of a film sheet beside its parts: open runs of points, and its frame's far
+    corner.
     """
 
     engraved: Sequence[Sequence[Point]] = ()

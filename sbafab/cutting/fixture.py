@@ -116,8 +116,8 @@ def write_fixture(
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())
-    found = verify_file(path, plate, properties)
-    if len(found.strokes) != 2 + len(written):
+    read = verify_file(path, plate, properties)
+    if len(read.strokes) != 2 + len(written):
         raise OutputError(f"{path.name}: its notes are not whole. Regenerate it.")
     return PATH
 

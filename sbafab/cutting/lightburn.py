@@ -78,7 +78,7 @@ class LaserRun(NamedTuple):
 
 
 def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun]:
-    """What a sheet holds, in cutting order; the frame, which is not cut, comes last."""
+    """Yield the content of a sheet in cutting order; the frame, which is not cut, comes last."""
     for run in sheet.engraved:
         yield _run(ENGRAVE, run)
     for contour in contours:
@@ -291,7 +291,7 @@ class LaserShape:
 
 
 class Project(NamedTuple):
-    """What a project cuts: settings of each index as they stand, shapes in the file's order."""
+    """A project: settings of each index as they stand, shapes in the file's order."""
 
     settings: dict[int, dict[str, str]]
     shapes: tuple[LaserShape, ...]
@@ -311,7 +311,7 @@ def read_project(path: Path) -> Project:
         ]
         paths = _Paths()
         shapes = tuple(_read_shape(item, paths) for item in root.iterfind("Shape"))
-        return Project({int(told["index"]): told for told in settings}, shapes)
+        return Project({int(setting["index"]): setting for setting in settings}, shapes)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error}") from error
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -386,18 +386,18 @@ def _handle(text: str) -> tuple[float, float]:
 
 
 def _matches(pattern: re.Pattern[str], text: str) -> Iterator[tuple[str, ...]]:
-    """What a text holds that is nothing but one match of a pattern after the other."""
+    """Yield the matches of a pattern; raise for a text that holds anything between them."""
     place = 0
-    for found in pattern.finditer(text):
-        if found.start() != place:
+    for match in pattern.finditer(text):
+        if match.start() != place:
             break
-        yield found.groups("")
-        place = found.end()
+        yield match.groups("")
+        place = match.end()
     if place != len(text):
         raise OutputError(f"it says {text[place : place + 20]!r} in a path")
 
 
-# Whether a LightBurn project is the film sheet that was meant.
+# Verification that a LightBurn project is the expected film sheet.
 
 
 BETWEEN = (0.25, 0.5, 0.75)
@@ -412,13 +412,13 @@ def verify_project(path: Path, contours: Sequence[Contour], sheet: Surroundings)
     Every shape is on its layer, in its order, and within TOLERANCE of its contour; layers are in
     order, the frame is not cut and no power is set. Raises OutputError with what is not, and where.
     """
-    found = read_project(path)
+    project = read_project(path)
     try:
-        wanted = list(drawn(contours, sheet))
-        _check_settings(found, {run.layer for run in wanted})
-        if len(found.shapes) != len(wanted):
-            raise OutputError(f"it has {len(found.shapes)} shapes, not {len(wanted)}")
-        pairs = list(zip(found.shapes, wanted, strict=True))
+        expected = list(drawn(contours, sheet))
+        _check_settings(project, {run.layer for run in expected})
+        if len(project.shapes) != len(expected):
+            raise OutputError(f"it has {len(project.shapes)} shapes, not {len(expected)}")
+        pairs = list(zip(project.shapes, expected, strict=True))
         for (shape, run), is_on in zip(pairs, _surely_on(pairs), strict=True):
             if shape.index != INDICES[run.layer] or shape.is_closed != run.closed:
                 x, y = shape.curves[0].start
@@ -429,21 +429,21 @@ def verify_project(path: Path, contours: Sequence[Contour], sheet: Surroundings)
         raise OutputError(f"{path.name}: {error}; regenerate it") from error
 
 
-def _check_settings(found: Project, layers: set[str]) -> None:
-    own = [layer for layer in INDICES if layer in layers]
-    if list(found.settings) != [INDICES[layer] for layer in own]:
+def _check_settings(project: Project, layers: set[str]) -> None:
+    used = [layer for layer in INDICES if layer in layers]
+    if list(project.settings) != [INDICES[layer] for layer in used]:
         raise OutputError("its layers are others, or in another order")
-    for rank, layer in enumerate(own):
-        wanted = {
+    for rank, layer in enumerate(used):
+        expected = {
             "type": CUT_MODE,
             "priority": str(rank),
             "doOutput": str(int(layer != REFERENCE)),
             **dict.fromkeys(("kerf", *POWERS), "0"),
         }
-        told = found.settings[INDICES[layer]]
-        for name, value in wanted.items():
-            if told.get(name) != value:
-                raise OutputError(f"{name} of layer {layer} is {told.get(name)}, not {value}")
+        setting = project.settings[INDICES[layer]]
+        for name, value in expected.items():
+            if setting.get(name) != value:
+                raise OutputError(f"{name} of layer {layer} is {setting.get(name)}, not {value}")
 
 
 def _surely_on(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[bool]:
@@ -454,31 +454,35 @@ def _surely_on(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[bool]:
     surely = [False] * len(pairs)
     rounds = [i for i, (shape, run) in enumerate(pairs) if shape.circle and run.circle]
     paths = [i for i, (shape, run) in enumerate(pairs) if shape.rows and run.circle is None]
-    for found, offs in (
+    for indices, offs in (
         (rounds, _circle_offs([pairs[i] for i in rounds])),
         (paths, _path_offs([pairs[i] for i in paths])),
     ):
-        for i, off in zip(found, offs, strict=True):
+        for i, off in zip(indices, offs, strict=True):
             surely[i] = off < SURE * TOLERANCE
     return surely
 
 
 def _circle_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
-    """How far the curves of drawn circles lie off those that are meant."""
+    """Return the distance of the curves of drawn circles from the expected ones, mm."""
     import numpy as np
 
     if not pairs:
         return []
     drawn_as = np.array([(*shape.circle[0], shape.circle[1]) for shape, _ in pairs if shape.circle])
-    meant = np.array([(*run.circle[0], run.circle[1]) for _, run in pairs if run.circle])
+    expected = np.array([(*run.circle[0], run.circle[1]) for _, run in pairs if run.circle])
     unit = np.array([p for curve in unit_circle() for p in (curve.start, curve.at(0.5))])
-    x, y = (drawn_as[:, k, None] + drawn_as[:, 2:] * unit[:, k] - meant[:, k, None] for k in (0, 1))
-    offs: list[float] = np.abs(np.hypot(x, y) - meant[:, 2:]).max(axis=1).tolist()
+    x, y = (
+        drawn_as[:, k, None] + drawn_as[:, 2:] * unit[:, k] - expected[:, k, None] for k in (0, 1)
+    )
+    offs: list[float] = np.abs(np.hypot(x, y) - expected[:, 2:]).max(axis=1).tolist()
     return offs
 
 
 def _path_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
-    """How far the curves of paths lie off the edges that are meant; infinite for others in kind."""
+    """Return the distance of the curves of paths from the expected edges, mm; infinite for other
+    kinds.
+    """
     import numpy as np
 
     if not pairs:
@@ -488,26 +492,30 @@ def _path_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
     sweep = _sweep(edges)
     # As many curves for an edge as ``parts_of`` makes parts.
     counts = np.maximum(1, np.ceil(np.abs(sweep) / MOST_TURN - 1e-9)).astype(int)
-    wanted = np.bincount(owner_of_edge, counts, len(pairs)).astype(int)
-    alike = wanted == [len(shape.rows) for shape, _ in pairs]
-    offs = np.where(alike, 0.0, np.inf)
-    chosen = np.flatnonzero(alike[owner_of_edge])
+    expected = np.bincount(owner_of_edge, counts, len(pairs)).astype(int)
+    same_kind = expected == [len(shape.rows) for shape, _ in pairs]
+    offs = np.where(same_kind, 0.0, np.inf)
+    chosen = np.flatnonzero(same_kind[owner_of_edge])
     if len(chosen):
-        own = [shape for (shape, _), is_alike in zip(pairs, alike, strict=True) if is_alike]
+        shapes = [
+            shape
+            for (shape, _), is_comparable in zip(pairs, same_kind, strict=True)
+            if is_comparable
+        ]
         which = np.repeat(chosen, counts[chosen])
         step = np.arange(len(which)) - np.repeat(
             np.cumsum(counts[chosen]) - counts[chosen], counts[chosen]
         )
-        known = {id(shape.rows): np.array(shape.rows) for shape in own}
+        by_key = {id(shape.rows): np.array(shape.rows) for shape in shapes}
         rows = np.concatenate(
-            [known[id(shape.rows)] + np.tile(np.array(shape.place), 4) for shape in own]
+            [by_key[id(shape.rows)] + np.tile(np.array(shape.place), 4) for shape in shapes]
         )
-        straight = np.array([flag for shape in own for flag in shape.is_line])
+        straight = np.array([flag for shape in shapes for flag in shape.is_line])
         share = np.array([step, step + 1]) / counts[which]
         off = _row_offs(rows, straight, edges[which], sweep[which], share)
         np.maximum.at(offs, owner_of_edge[which], off)
-    found: list[float] = offs.tolist()
-    return found
+    farthest: list[float] = offs.tolist()
+    return farthest
 
 
 def _numbers(edge: Edge) -> tuple[float, ...]:
@@ -535,10 +543,7 @@ def _row_offs(
     sweep: NDArray[np.float64],
     share: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """How far each curve lies off its part of an edge, which ``share`` says: from, and to.
-
-    Its ends off the part's, and what lies between off the arc's circle.
-    """
+    """Return the distance of each curve from its part of an edge; ``share`` is from and to, mm."""
     import numpy as np
 
     centre, radius = edges[:, 4:6], edges[:, 6]
@@ -548,8 +553,8 @@ def _row_offs(
         angle = first + sweep * part
         on = centre + radius[:, None] * np.array([np.cos(angle), np.sin(angle)]).T
         ends = edges[:, 0:2] if end == 0.0 else edges[:, 2:4]
-        meant = np.where((part == end)[:, None], ends, on)
-        off = np.maximum(off, np.hypot(*(place - meant).T))
+        expected = np.where((part == end)[:, None], ends, on)
+        off = np.maximum(off, np.hypot(*(place - expected).T))
     is_arc = radius > 0
     for t in BETWEEN:
         weights = np.array([(1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t * t, t**3])
@@ -581,7 +586,7 @@ def _check_shape(shape: LaserShape, edges: Sequence[Edge]) -> None:
 
 
 def _offs(curve: Bezier, part: Edge) -> Iterator[tuple[float, Point]]:
-    """How far ends lie off, and what lies between them off the edge or the arc's circle."""
+    """Return distance of ends, and of what lies between them from the edge or the arc's circle."""
     yield math.dist(curve.start, part.start), curve.start
     yield math.dist(curve.end, part.end), curve.end
     if isinstance(part, Line) and curve.handles is None:
@@ -629,10 +634,10 @@ def write_projects(
     for pattern, layers in laminate.patterns.items():
         first = layers[0]
         # Mask sheets are drawn turned over.
-        left, side = (-x1, "left") if first.is_mask else (x0, "right")
-        said = file_properties(settings, first.film.material, pattern)
+        left_edge, side = (-x1, "left") if first.is_mask else (x0, "right")
+        properties = file_properties(settings, first.film.material, pattern)
         target = folder / _file_path(first, settings)
-        _write(target, paths[pattern].moved(-left, -y0), Surroundings(), said, side)
+        _write(target, paths[pattern].moved(-left_edge, -y0), Surroundings(), properties, side)
     drawn = marks(panel)
     moved = tuple(tuple((x - x0, y - y0) for x, y in run) for run in drawn.marks)
     path = laser_path(laminate, settings).moved(-x0, -y0)

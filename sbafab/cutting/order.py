@@ -111,8 +111,8 @@ def _worth_a_look(stops: Sequence[Point]) -> list[bool]:
         saved = steps[: count - ahead] - np.hypot(*(xy[ahead + 1 :] - xy[: count - ahead]).T)
         saved[:-1] += steps[ahead + 1 :] - np.hypot(*(xy[ahead + 2 :] - xy[1 : count - ahead]).T)
         worth[: count - ahead] |= saved > SHORTER / 2
-    found: list[bool] = worth.tolist()
-    return found
+    flags: list[bool] = worth.tolist()
+    return flags
 
 
 def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
@@ -143,7 +143,7 @@ def _apart(a: Bounds, b: Bounds) -> float:
     return math.hypot(across, along)
 
 
-# Points of which the nearest is taken, time after time, without looking at all of them.
+# Repeated nearest-point queries without looking at all points.
 
 
 SLACK = 1e-5
@@ -185,7 +185,7 @@ class PointsLeft:
         x, y = self._place(p)
         (last_x, last_y), cell = self._last, self._cell
         ring = max(0, -x, -y, x - last_x, y - last_y)
-        best, found, home = math.inf, -1, (0, 0)
+        best, nearest, home = math.inf, -1, (0, 0)
         points, cells = self._points, self._cells
         while best > (ring - 1) * cell - SLACK:
             for place in self._ring(x, y, ring):
@@ -193,12 +193,12 @@ class PointsLeft:
                     if math.dist(p, points[number]) > best + SLACK:
                         continue
                     value = measure(number)
-                    if value < best or (value == best and number < found):
-                        best, found, home = value, number, place
+                    if value < best or (value == best and number < nearest):
+                        best, nearest, home = value, number, place
             ring += 1
-        self._cells[home].remove(found)
+        self._cells[home].remove(nearest)
         self._count -= 1
-        return found
+        return nearest
 
     def _ring(self, x: int, y: int, ring: int) -> Iterator[tuple[int, int]]:
         """The cells a number of cells away, as far as there are any."""

@@ -43,7 +43,7 @@ LabelState = Literal["engraved", "no room", "off"]
 
 @dataclass(frozen=True)
 class Machine:
-    """What the estimate of cutting time assumes; mm/s, seconds and mm."""
+    """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
 
     cut_speed: float = 20.0
     travel_speed: float = 200.0
@@ -130,8 +130,8 @@ def _write_sheet(
     text = dxf_text(contours, properties, settings.curves.profile, around)
     path.write_bytes(text.encode())
     # In the order of the file, so that each contour is compared with its own first.
-    found = verify_file(path, Region(contours), properties)
-    _verify_surroundings(path.name, found, around)
+    read = verify_file(path, Region(contours), properties)
+    _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
     project.write_bytes(project_text(contours, around, properties).encode())
     verify_project(project, contours, around)
@@ -183,7 +183,7 @@ def _surroundings(
 
 
 def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, ...], ...]:
-    """What is engraved into the border, if there is room for it between the pins."""
+    """Return the engraving of the border, if there is room for it between the pins."""
     kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
     waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
     lowered = f" limits: {', '.join(settings.lowered)}" if settings.lowered else ""
@@ -195,11 +195,11 @@ def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, 
 
 
 def _counts(nest: Nest, placements: Sequence[Placement]) -> tuple[tuple[str, str, int], ...]:
-    found = Counter(
+    counts = Counter(
         (nest.parts[placement.part].design, nest.parts[placement.part].pattern)
         for placement in placements
     )
-    return tuple((design, pattern, count) for (design, pattern), count in sorted(found.items()))
+    return tuple((design, pattern, count) for (design, pattern), count in sorted(counts.items()))
 
 
 def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
@@ -208,10 +208,10 @@ def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
     )
 
 
-def _verify_surroundings(name: str, found: ReadBack, around: Surroundings) -> None:
-    """What the written sheet has beside its parts: frame, engraving, parting cut."""
+def _verify_surroundings(name: str, read: ReadBack, around: Surroundings) -> None:
+    """Check the written sheet's frame, engraving and parting cut."""
     try:
-        check_surroundings(found, around)
+        check_surroundings(read, around)
     except OutputError as error:
         raise OutputError(f"{name}: {error}") from error
 
@@ -288,7 +288,7 @@ def _written(lines: Sequence[str], margin: _Margin, stock: Stock) -> tuple[Strok
 
 
 def _is_clear(ends: tuple[Point, Point], pin: tuple[float, float, float]) -> bool:
-    """Whether the box between two corners keeps off a pin's."""
+    """Return True if the box between two corners keeps off a pin's."""
     low_x, low_y, high_x, high_y = _box(ends)
     x, y, r = pin[0], pin[1], pin[2] / 2
     return x + r < low_x or x - r > high_x or y + r < low_y or y - r > high_y

@@ -1,4 +1,6 @@
-"""A canvas of few flat colours, painted enlarged and reduced at the end (Pillow)."""
+"""Raster pictures: a canvas of few flat colours, a depth buffer for surfaces, a length bar
+(Pillow).
+"""
 
 from __future__ import annotations
 
@@ -82,10 +84,10 @@ class Canvas:
         picture = self._backdrop(footprint).convert("RGB")
         # What nothing is painted on is backdrop.
         whole = self._enlarged
-        left, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
+        x0, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
         last = -(-bottom // whole)
         for row in range(top // whole, last, STRIP):
-            strip = left // whole, row, -(-right // whole), min(row + STRIP, last)
+            strip = x0 // whole, row, -(-right // whole), min(row + STRIP, last)
             picture.paste(self._reduced(strip, picture.crop(strip)), strip[:2])
         self._write(picture, caption, films)
         out = BytesIO()
@@ -93,12 +95,14 @@ class Canvas:
         return out.getvalue()
 
     def _reduced(self, box: tuple[int, int, int, int], behind: Image) -> Image:
-        """What is painted within the ``box`` of the picture, over what lies ``behind`` it there."""
+        """Return what is painted within the ``box`` of the picture, over what lies ``behind`` it
+        there.
+        """
         from PIL import ImageChops
 
         whole = self._enlarged
-        left, top, right, bottom = box
-        inside = self._image.crop((whole * left, whole * top, whole * right, whole * bottom))
+        x0, top, right, bottom = box
+        inside = self._image.crop((whole * x0, whole * top, whole * right, whole * bottom))
         painted = inside.convert("RGB").reduce(whole)
         empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
         # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
@@ -136,8 +140,8 @@ class Canvas:
                 lines.append(word)
         for above, line in enumerate(reversed(lines)):
             draw.text((x, y - (1.7 + 1.3 * above) * size), line, fill=INK, font=font)
-        for tone, said in KEY:
-            words = films if tone == "film" else said
+        for tone, meaning in KEY:
+            words = films if tone == "film" else meaning
             draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)
             draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
             x += round(3.6 * size + draw.textlength(words, font=font))
@@ -156,7 +160,7 @@ def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
 
 
 def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Point]:
-    """Where a ray to the right first meets the ring, and the index of the vertex after it."""
+    """Return first point at which a ray to the right meets the ring, and the vertex after it."""
     best: tuple[float, int] | None = None
     for i, (x1, y1) in enumerate(ring):
         x0, y0 = ring[i - 1]
@@ -237,7 +241,7 @@ def seen(
     lamp: Sequence[float],
     normals: Sequence[NDArray[np.float64]] | None = None,
 ) -> Buffer:
-    """What the eye sees of the surfaces; ``lamp`` is the direction to the light, in the view.
+    """Return the depth buffer of the surfaces; ``lamp`` is the direction to the light, in the view.
 
     Faces are lit one by one, or smoothly where ``normals`` (n, 3) of the points are given.
     """
@@ -288,8 +292,8 @@ def _paint(
     # Triangles of like size are sampled together.
     grids = np.column_stack([_power_of_two(along), _power_of_two(across)])
     for n, m in np.unique(grids, axis=0):
-        own = np.flatnonzero((grids == (n, m)).all(axis=1))
-        for part in np.array_split(own, max(1, len(own) * n * m // MOST)):
+        samples = np.flatnonzero((grids == (n, m)).all(axis=1))
+        for part in np.array_split(samples, max(1, len(samples) * n * m // MOST)):
             seen_as = _Triangles(body, front[part], corners[part], light[part])
             _sample(buffer, seen_as, (int(n), int(m)), size)
 
@@ -297,7 +301,7 @@ def _paint(
 def _light(
     corners: NDArray[np.float64], scale: float, lamp: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """How light a triangle is, from its normal in the view (right, up, toward)."""
+    """Return the light of a triangle, from its normal in the view (right, up, toward)."""
     import numpy as np
 
     true = corners * np.array([1 / scale, -1 / scale, 1.0])
@@ -307,7 +311,7 @@ def _light(
 
 
 def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How light what faces along normals (n, 3) in the view is: from AMBIENT to 1."""
+    """Return the light of what faces along normals (n, 3) in the view: from AMBIENT to 1."""
     import numpy as np
 
     light: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normals @ lamp, 0, 1)
@@ -343,15 +347,17 @@ class _Triangles(NamedTuple):
     light: NDArray[np.float64]
 
 
-def _sample(buffer: Buffer, own: _Triangles, grid: tuple[int, int], size: tuple[int, int]) -> None:
+def _sample(
+    buffer: Buffer, corners: _Triangles, grid: tuple[int, int], size: tuple[int, int]
+) -> None:
     """Points of each triangle: along its first side, and from there towards its third corner."""
     import numpy as np
 
     s = np.linspace(0, 1, grid[0])[None, :, None, None]
     t = np.linspace(0, 1, grid[1])[None, None, :, None]
-    a, b, c = (own.corners[:, i][:, None, None, :] for i in range(3))
+    a, b, c = (corners.corners[:, i][:, None, None, :] for i in range(3))
     points = (1 - t) * (a + s * (b - a)) + t * c
-    number = np.repeat(np.arange(len(own.face)), grid[0] * grid[1])
+    number = np.repeat(np.arange(len(corners.face)), grid[0] * grid[1])
     x, y, depth = points.reshape(-1, 3).T
     column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
@@ -363,9 +369,9 @@ def _sample(buffer: Buffer, own: _Triangles, grid: tuple[int, int], size: tuple[
     at = np.flatnonzero(inside)[won] % (grid[0] * grid[1])
     p, q = s.ravel()[at // grid[1]], t.ravel()[at % grid[1]]
     shares = np.stack([(1 - q) * (1 - p), (1 - q) * p, q], axis=-1)
-    buffer.light[place] = (own.light[number] * shares).sum(axis=1)
-    buffer.face[place] = own.face[number]
-    buffer.body[place] = own.body
+    buffer.light[place] = (corners.light[number] * shares).sum(axis=1)
+    buffer.face[place] = corners.face[number]
+    buffer.body[place] = corners.body
 
 
 # A bar of round length under a picture that is true to scale.

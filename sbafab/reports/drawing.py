@@ -49,7 +49,7 @@ def document(width: float, height: float, title: str, elements: Iterable[str]) -
 
 
 def film_fill(film: Film) -> str:
-    """What a film is filled with: masks are hatched, so that a grey print still tells them."""
+    """Return the fill of a film: masks are hatched, so that a grey print still tells them."""
     return f"url(#{_hatch_id(film.shade % len(MASKS))})" if film.is_mask else ink(film).fill
 
 
@@ -59,16 +59,18 @@ def _hatch_id(shade: int) -> str:
 
 def _definitions(drawn: str) -> str:
     """The hatch of PTFE, and those of the further masks that are drawn."""
-    hatches = {_hatch_id(shade): own for shade, own in enumerate(MASKS)}
-    used = [_hatch(n, own) for n, own in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn]
+    hatches = {_hatch_id(shade): colours for shade, colours in enumerate(MASKS)}
+    used = [
+        _hatch(n, colours) for n, colours in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn
+    ]
     return f"<defs>{''.join(used)}</defs>"
 
 
-def _hatch(name: str, own: Ink) -> str:
+def _hatch(name: str, colours: Ink) -> str:
     return (
         f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
-        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{own.fill}"/>'
-        f'<rect width="0.16" height="1.2" fill="{own.line}" fill-opacity="0.55"/></pattern>'
+        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{colours.fill}"/>'
+        f'<rect width="0.16" height="1.2" fill="{colours.line}" fill-opacity="0.55"/></pattern>'
     )
 
 
@@ -173,15 +175,15 @@ def across(a: Point, b: Point) -> list[str]:
     return [line(tails, colour=GREY), arrow(a, (u, v)), arrow(b, (-u, -v))]
 
 
-def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Positions as near as may be to the wanted ones (sorted), at least ``gap`` apart.
 
     They stay between ``low`` and ``high`` where there is room for all of them.
     """
-    if not wanted:
+    if not targets:
         return []
     groups: list[list[float]] = []
-    for place in wanted:
+    for place in targets:
         groups.append([place, 1])
         while len(groups) > 1 and _overlap(groups[-2], groups[-1], gap):
             centre, count = groups.pop()
@@ -212,7 +214,7 @@ def _shifted(p: Point, unit: Point, distance: float) -> Point:
     return p[0] + unit[0] * distance, p[1] + unit[1] * distance
 
 
-# What a drawing of a profile gives the size of, measured on the profile itself.
+# Dimensions of a profile, measured on the profile itself.
 
 
 SAME = 1e-4
@@ -260,7 +262,7 @@ def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
 
 
 def balloons(laminate: Laminate) -> str:
-    """How many balloons there are: 15 balloons, or 3 stacks of 1 balloon side by side."""
+    """Return number of balloons in words: 15 balloons, or 3 stacks of 1 balloon side by side."""
     high = f"{laminate.balloons} balloon{'s' if laminate.balloons > 1 else ''}"
     stacks = sum(len(chamber.centres) for chamber in laminate.chambers)
     on_sheet = any(layer.role == "sheet" for layer in laminate.layers)
@@ -282,16 +284,16 @@ def circles(laminate: Laminate, layer: Layer) -> list[Circle]:
         if contour.circle is not None and not is_disc(layer.profile, contour):
             name = _circle_name(laminate, layer, contour)
             groups.setdefault((name, round(contour.circle[1], 4)), []).append(contour)
-    found = []
+    callouts = []
     for (name, radius), contours in groups.items():
         centre = max((c.circle[0] for c in contours if c.circle), key=lambda p: (p[0], p[1]))
         words = f"{name} ⌀{length(2 * radius)}".strip()
-        found.append(Circle(_counted(len(contours), words), centre, radius))
-    return found
+        callouts.append(Circle(_counted(len(contours), words), centre, radius))
+    return callouts
 
 
 def is_disc(profile: Region, outer: Contour) -> bool:
-    """Whether a contour is the round outline of a profile of one piece."""
+    """Return True if a contour is the round outline of a profile of one piece."""
     return outer.circle is not None and profile.outers == (outer,)
 
 
@@ -304,9 +306,9 @@ def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
         return "neck ring" if layer.role == "separator-mask" else "bore"
     if laminate.lumen and math.hypot(*centre) < SAME:
         return "lumen"
-    held = any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins)
+    is_pinned = any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins)
     tooling = "tail" if layer.role == "chamber-mask" else "ear"
-    return tooling if held else ""
+    return tooling if is_pinned else ""
 
 
 def radii(profile: Region) -> list[Circle]:
@@ -317,13 +319,13 @@ def radii(profile: Region) -> list[Circle]:
             for edge in contour.edges:
                 if isinstance(edge, Arc):
                     groups.setdefault(round(edge.radius, 3), []).append(edge)
-    found = []
+    callouts = []
     for radius in sorted(groups, reverse=True)[:MOST_RADII]:
         arcs = groups[radius]
         pointed = max(arcs, key=lambda arc: round(arc.at(0.5)[0] + arc.at(0.5)[1], 6))
         words = _counted(len(_distinct(arc.centre for arc in arcs)), f"R{length(radius)}")
-        found.append(Circle(words, pointed.centre, pointed.radius, pointed.at(0.5)))
-    return found
+        callouts.append(Circle(words, pointed.centre, pointed.radius, pointed.at(0.5)))
+    return callouts
 
 
 def circumscribed(profile: Region) -> Circle | None:
@@ -357,14 +359,14 @@ def inlet_width(laminate: Laminate, layer: Layer) -> WidthDimension | None:
     """The width of the inlet strip or tab, if any, at the inlet farthest right."""
     if layer.role == "separator-mask":
         return None
-    found = [(inlet, span) for inlet in laminate.inlets if (span := _across(layer, inlet))]
-    if not found:
+    spans = [(inlet, span) for inlet in laminate.inlets if (span := _across(layer, inlet))]
+    if not spans:
         return None
-    inlet, (start, end) = max(found, key=lambda item: (item[0].mouth[0], item[0].mouth[1]))
+    inlet, (start, end) = max(spans, key=lambda item: (item[0].mouth[0], item[0].mouth[1]))
     name = "strip" if layer.is_mask else "tab"
     (x, y), (u, v) = _station(inlet), inlet.direction
     ends = sorted(((x - s * v, y + s * u) for s in (start, end)), key=lambda p: (p[1], p[0]))
-    words = _counted(len(found), f"{name} {length(end - start)} wide")
+    words = _counted(len(spans), f"{name} {length(end - start)} wide")
     return WidthDimension(words, ends[0], ends[1])
 
 

@@ -79,11 +79,11 @@ def inflated(
     webs = _webs(laminate, stack, levels, meridians)
     parts = [InflatedPart("web", webs, _normals(webs), None)]
     for number, chamber in enumerate(laminate.chambers):
-        found = [
+        balloons = [
             _balloon(level, stack.axes[number], meridians[i][number], around)
             for i, level in enumerate(levels)
         ]
-        surface = _joined(found)
+        surface = _joined(balloons)
         parts.append(InflatedPart(chamber.name, surface, _normals(surface), number))
     return parts
 
@@ -108,13 +108,13 @@ class _Level:
         self.normals = axes[i][:, 2], axes[i + 1][:, 2]
         self.origin = (self.low + self.high) / 2
         # The rotation nearest to the mean of both.
-        left, _, right = np.linalg.svd(axes[i] + axes[i + 1])
-        self.axes = left @ right
+        u, _, v = np.linalg.svd(axes[i] + axes[i + 1])
+        self.axes = u @ v
 
     def points(self, x: Array, y: Array, z: Array) -> Array:
         """Places in space of points in this frame."""
-        found: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
-        return found
+        places: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
+        return places
 
     def heights(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Heights of the lower and the upper plate over points of the plane."""
@@ -137,22 +137,22 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
         for kind, gaps in zip(stack.levels, pose.gaps, strict=True)
     ]
     distinct = sorted({key for row in keys for key in row})
-    known: dict[tuple[int, int, int], FilmMeridian] = {}
+    by_key: dict[tuple[int, int, int], FilmMeridian] = {}
     for kind in sorted({key[0] for key in distinct}):
-        own = [key for key in distinct if key[0] == kind]
-        p, gap = (np.array([key[place] for key in own]) / SAME for place in (1, 2))
-        known.update(zip(own, _films(stack.maps[kind].balloon, p, gap), strict=True))
-    return [[known[key] for key in row] for row in keys]
+        kind_keys = [key for key in distinct if key[0] == kind]
+        p, gap = (np.array([key[place] for key in kind_keys]) / SAME for place in (1, 2))
+        by_key.update(zip(kind_keys, _films(stack.maps[kind].balloon, p, gap), strict=True))
+    return [[by_key[key] for key in row] for row in keys]
 
 
 def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
-    found = inflate(balloon, p, gap, tied=True)
+    shapes = inflate(balloon, p, gap, tied=True)
     part = slice(balloon.neck_edge, balloon.edge + 1)
-    shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
-    drawn = balloon.pocket - found.r[:, balloon.edge]
+    shares = np.clip(shapes.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
+    drawn = balloon.pocket - shapes.r[:, balloon.edge]
     return [
         FilmMeridian(r, share, float(inward), balloon.pocket)
-        for r, share, inward in zip(found.r[:, part], shares, drawn, strict=True)
+        for r, share, inward in zip(shapes.r[:, part], shares, drawn, strict=True)
     ]
 
 
@@ -160,9 +160,9 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     """Both films of a balloon and its necks, closed."""
     turn = np.arange(around) * (math.tau / around)
     rings = np.linspace(0, len(film.radii) - 1, min(len(film.radii), around // 2 + 1))
-    kept_rings = np.rint(rings).astype(int)
-    radii = np.concatenate([[0.0], film.radii[kept_rings]])
-    shares = np.concatenate([film.shares[:1], film.shares[kept_rings]])
+    ring_numbers = np.rint(rings).astype(int)
+    radii = np.concatenate([[0.0], film.radii[ring_numbers]])
+    shares = np.concatenate([film.shares[:1], film.shares[ring_numbers]])
     x = axis[0] + radii[:, None] * np.cos(turn)
     y = axis[1] + radii[:, None] * np.sin(turn)
     below, above = level.heights(x, y)
@@ -170,8 +170,8 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     sides = []
     for height, middle, sign in ((above, at_axis[1][0], 1), (below, at_axis[0][0], -1)):
         # Where plates lean so far that they meet the films keep a little height.
-        kept = sign * np.maximum(sign * height, FLATTEST * abs(middle))
-        sides.append(level.points(x, y, shares[:, None] * kept))
+        clipped = sign * np.maximum(sign * height, FLATTEST * abs(middle))
+        sides.append(level.points(x, y, shares[:, None] * clipped))
     rows = len(radii)
     # Down over the upper film, round the rim, which both films share, and back under the lower one.
     points = np.concatenate([sides[0], sides[1][-2::-1]]).reshape(-1, 3)
@@ -194,24 +194,24 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
 def _webs(
     laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[FilmMeridian]]
 ) -> Surface:
-    """What is bonded round the pockets of every level, as a plate of two films."""
-    known: dict[Region, Surface] = {}
-    found = []
-    for i, (level, own) in enumerate(zip(levels, films, strict=True)):
+    """Return the bonded web round the pockets of every level, as a plate of two films."""
+    by_region: dict[Region, Surface] = {}
+    webs = []
+    for i, (level, level_films) in enumerate(zip(levels, films, strict=True)):
         region = _web(laminate, stack, i)
         thick = laminate.tpe_layers[0].film.thickness * 2
-        if region not in known:
-            known[region] = fuse([Slab(region, -thick / 2, thick / 2)], SAGITTA)
-        flat = known[region]
+        if region not in by_region:
+            by_region[region] = fuse([Slab(region, -thick / 2, thick / 2)], SAGITTA)
+        flat = by_region[region]
         x, y, z = flat.points.T
         moved = np.zeros((len(x), 2))
-        for axis, film in zip(stack.axes, own, strict=True):
+        for axis, film in zip(stack.axes, level_films, strict=True):
             off = np.column_stack([x, y]) - axis
             away = np.hypot(*off.T)
             fade = np.exp(-np.maximum(away - film.pocket, 0.0) / REACH)
             moved -= film.drawn * fade[:, None] * off / np.maximum(away, 1e-9)[:, None]
-        found.append(Surface(level.points(x + moved[:, 0], y + moved[:, 1], z), flat.faces))
-    return _joined(found)
+        webs.append(Surface(level.points(x + moved[:, 0], y + moved[:, 1], z), flat.faces))
+    return _joined(webs)
 
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
@@ -252,11 +252,11 @@ def _normals(surface: Surface) -> Array:
     """Unit normals (n, 3) of the points: means of their faces, by area."""
     a, b, c = (surface.points[surface.faces[:, i]] for i in range(3))
     of_faces = np.cross(b - a, c - a)
-    found = np.zeros_like(surface.points)
+    normals = np.zeros_like(surface.points)
     for corner in range(3):
-        np.add.at(found, surface.faces[:, corner], of_faces)
-    found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30)
-    return found
+        np.add.at(normals, surface.faces[:, corner], of_faces)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return normals
 
 
 def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose:
@@ -264,8 +264,8 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
 
     Raises DesignError for volumes that the stack's highest pressure does not reach.
     """
-    wanted = np.asarray(volumes_ul, dtype=float)
-    if wanted.shape != (stack.chambers,) or not (np.isfinite(wanted) & (wanted >= 0)).all():
+    volumes = np.asarray(volumes_ul, dtype=float)
+    if volumes.shape != (stack.chambers,) or not (np.isfinite(volumes) & (volumes >= 0)).all():
         raise DesignError(
             f"volumes must be {stack.chambers} numbers of ul, 0 or more, one a chamber"
         )
@@ -273,8 +273,8 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
     pose = stack.pose(tuple(p))
     try:
         for _ in range(rounds):
-            miss = wanted - pose.volumes
-            if (np.abs(miss) <= 1e-3 * np.maximum(wanted, 1.0)).all():
+            miss = volumes - pose.volumes
+            if (np.abs(miss) <= 1e-3 * np.maximum(volumes, 1.0)).all():
                 return pose
             slopes = np.empty((stack.chambers, stack.chambers))
             for number in range(stack.chambers):
@@ -288,15 +288,15 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
             )
             pose = stack.pose(tuple(p), near=pose)
     except DesignError as error:
-        raise _out_of_reach(wanted, pose) from error
-    raise _out_of_reach(wanted, pose)
+        raise _out_of_reach(volumes, pose) from error
+    raise _out_of_reach(volumes, pose)
 
 
-def _out_of_reach(wanted: Array, pose: Pose) -> DesignError:
-    asked, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (wanted, pose.volumes))
-    nearer = ", or volumes that lie nearer together" if np.ptp(wanted) > 0 else ""
+def _out_of_reach(volumes: Array, pose: Pose) -> DesignError:
+    target, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (volumes, pose.volumes))
+    nearer = ", or volumes that lie nearer together" if np.ptp(volumes) > 0 else ""
     return DesignError(
-        f"no pressures give the volumes {asked} ul: the search ended at {nearest} ul; give less"
+        f"no pressures give the volumes {target} ul: the search ended at {nearest} ul; give less"
         f"{nearer}"
     )
 
@@ -308,21 +308,21 @@ TOUCHING = 0.05
 """mm3 that two parts may share: touching, as in the check of the deflated assembly."""
 
 
-def shared(own: Solids, theirs: Solids) -> float:
-    """Mm3 that lie in both."""
-    return sum(float((a ^ b).volume()) for a in own for b in theirs if apart(a, b) <= 0)
+def shared_volume(first: Solids, second: Solids) -> float:
+    """Return the volume that lies in both, mm3."""
+    return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
 
 
-def apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
-    """Mm between the boxes of two solids; 0 or less where they meet."""
-    one, other = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
-    return float(np.maximum(one[0] - other[1], other[0] - one[1]).max())
+def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Return the distance between the boxes of two solids, mm; 0 or less where they meet."""
+    box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
+    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
 
 
 def lifted(
     assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """By what (3,) in mm a part is lifted by the actuators under it."""
+    """Return by what (3,) in mm a part is lifted by the actuators under it."""
     lift = np.zeros(3)
     while placed.part.on is not None:
         if placed.part.at == "top":
@@ -332,18 +332,18 @@ def lifted(
 
 
 def carried(assembled: Assembled, name: str) -> set[str]:
-    """A part and all that hangs on it."""
-    found = {name}
+    """Return a part and all that hangs on it."""
+    names = {name}
     for part in assembled.parts:
-        if part.part.on in found:
-            found.add(part.name)
-    return found
+        if part.part.on in names:
+            names.add(part.name)
+    return names
 
 
-def solids(placed: PlacedSba, found: Stack, pose: Pose, lift: NDArray[np.float64]) -> Solids:
+def solids(placed: PlacedSba, stack: Stack, pose: Pose, lift: NDArray[np.float64]) -> Solids:
     """An inflated actuator's balloons and webs in a pose, in place."""
     pieces = []
-    for part in inflated(placed.made.laminate, found, pose, COARSE):
+    for part in inflated(placed.made.laminate, stack, pose, COARSE):
         points = placed.upright(part.surface.points) + lift
         pieces += manifold(replace(part.surface, points=points)).decompose()
     return pieces

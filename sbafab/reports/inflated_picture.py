@@ -43,7 +43,7 @@ GROUND = -0.06
 
 @dataclass(frozen=True)
 class PictureWish:
-    """What a picture is to show.
+    """The request for a picture.
 
     ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, those not named 0; with "" for the
     name, of all. ``elevation`` and ``azimuth`` in degrees are where the eye stands; ``width`` and
@@ -78,12 +78,12 @@ def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
     return stack.pose(_by_chamber(laminate, wish.pressures_kpa))
 
 
-def _by_chamber(laminate: Laminate, asked: Mapping[str, float]) -> tuple[float, ...]:
+def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float, ...]:
     names = [chamber.name for chamber in laminate.chambers]
-    unknown = [name for name in asked if name and name not in names]
+    unknown = [name for name in values if name and name not in names]
     if unknown:
         raise DesignError(f"chamber {unknown[0]} is not there; the chambers are {', '.join(names)}")
-    return tuple(float(asked.get(name, asked.get("", 0.0))) for name in names)
+    return tuple(float(values.get(name, values.get("", 0.0))) for name in names)
 
 
 def write_picture(
@@ -91,7 +91,7 @@ def write_picture(
     stack: Stack,
     wish: PictureWish,
     path: Path,
-    told: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
     """Writes ``path``, as what its ending says, and returns the pose shown.
 
@@ -107,7 +107,7 @@ def write_picture(
         path.write_bytes(picture_png(laminate, stack, pose, wish))
     else:
         poses = list(_poses(stack, pose, wish))
-        path.write_bytes(animation(laminate, stack, poses, wish, ending, told))
+        path.write_bytes(animation(laminate, stack, poses, wish, ending, progress))
     return pose
 
 
@@ -126,13 +126,13 @@ def animation(
     poses: Sequence[Pose],
     wish: PictureWish,
     ending: str = ".gif",
-    told: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> bytes:
     """Poses one after the other, for ever, as GIF or WebP."""
     from PIL import Image
 
     shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
-    images = _images(shown, laminate, wish, told)
+    images = _images(shown, laminate, wish, progress)
     out = BytesIO()
     if ending == ".webp":
         images[0].save(
@@ -169,7 +169,7 @@ def animation(
 def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
     """Poses of a moving picture, which ends where it began."""
     turns = [number / wish.frames * math.tau for number in range(wish.frames)]
-    found: list[Pose] = []
+    poses: list[Pose] = []
     if wish.motion == "circle":
         if stack.chambers < 3:
             raise DesignError("pressure goes round three chambers or more; use motion inflate")
@@ -181,8 +181,8 @@ def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
             tuple(p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures) for turn in turns
         ]
     for step in steps:
-        found.append(stack.pose(step, near=found[-1] if found else None))
-    return found
+        poses.append(stack.pose(step, near=poses[-1] if poses else None))
+    return poses
 
 
 def _swell(cosine: float) -> float:
@@ -195,7 +195,7 @@ def _images(
     shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
     laminate: Laminate,
     wish: PictureWish,
-    told: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Image]:
     """All poses seen from one place at one scale."""
     from sbafab.reports.canvas import view_of
@@ -211,8 +211,8 @@ def _images(
         image = rendered(bodies, view, width, height, GROUND)
         _write(image, _caption(laminate, pose, moving=len(shown) > 1), view.scale)
         images.append(image)
-        if told is not None:
-            told(len(images), len(shown))
+        if progress is not None:
+            progress(len(images), len(shown))
     return images
 
 
@@ -227,18 +227,18 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
 
 
 def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
-    """What is shown; above it what the paper measured beside a bend or height by the model."""
+    """Return the caption, above it the paper's measured bend or height beside the model's."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
     if any(note.startswith("drawn outline") for note in laminate.notes):
         model += ", drawn pockets as discs"
     if moving:
         return (f"{laminate.name}, {model}",)
-    what = "bend" if pose.bend > 0.5 else "height"
-    bent = f", bent {pose.bend:.0f} degrees" if what == "bend" else f", {pose.height:.1f} mm high"
-    said = f"{laminate.name} at {pressures} kPa{bent} ({model})"
-    beside = counterparts_of_pose(len(pose.pressures)).get(what)
-    return (beside.short, said) if beside else (said,)
+    figure = "bend" if pose.bend > 0.5 else "height"
+    bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"
+    caption = f"{laminate.name} at {pressures} kPa{bent} ({model})"
+    beside = counterparts_of_pose(len(pose.pressures)).get(figure)
+    return (beside.short, caption) if beside else (caption,)
 
 
 def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
@@ -286,8 +286,8 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
     if ending == ".png":
         from sbafab.reports.solid_png import solid_png
 
-        told = replace(laminate, notes=(WHY,))
-        path.write_bytes(solid_png(told, width, height))
+        captioned = replace(laminate, notes=(WHY,))
+        path.write_bytes(solid_png(captioned, width, height))
     elif ending == ".glb":
         from sbafab.meshing.formats.glb import write_glb
         from sbafab.meshing.solid import solid
@@ -387,17 +387,17 @@ def _edges(buffer: Buffer) -> NDArray[np.bool_]:
     import numpy as np
 
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
-    found = np.zeros(depth.shape, dtype=bool)
+    edges = np.zeros(depth.shape, dtype=bool)
     for axis in (0, 1):
         before = tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))
-        found[before] |= np.abs(np.diff(depth, axis=axis)) > EDGE_MM
-    return found & (buffer.body >= 0)
+        edges[before] |= np.abs(np.diff(depth, axis=axis)) > EDGE_MM
+    return edges & (buffer.body >= 0)
 
 
 def _shadow(
     surfaces: Sequence[Surface], view: View, size: tuple[int, int], ground: float
 ) -> NDArray[np.float64]:
-    """How much of the light above is kept from the ground, by pixel: 0 to 1."""
+    """Return the share of the light above that does not reach the ground, by pixel: 0 to 1."""
     import numpy as np
 
     points = np.concatenate([surface.points for surface in surfaces])

@@ -44,8 +44,8 @@ class PageGrid:
 
 def layers_svg(laminate: Laminate) -> str:
     """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
-    held = pins_when_added(laminate)
-    cards = [pattern_card(laminate, layers, held) for layers in laminate.patterns.values()]
+    holding = pins_when_added(laminate)
+    cards = [pattern_card(laminate, layers, holding) for layers in laminate.patterns.values()]
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     rows = max(0, len(laminate.notes) - 1) + max(0, len(_warnings(laminate)) - 1)
     block = BLOCK + max(NOTE_ROW * rows, FILM_ROW * max(0, len(films) - 2))
@@ -102,8 +102,8 @@ def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool)
             for row, note in enumerate(laminate.notes or ("",))
         ),
         *(
-            draw.text((x + 3.0, y + block - 2.1 - NOTE_ROW * row), said)
-            for row, said in enumerate(reversed(_warnings(laminate) or ("",)))
+            draw.text((x + 3.0, y + block - 2.1 - NOTE_ROW * row), warning)
+            for row, warning in enumerate(reversed(_warnings(laminate) or ("",)))
         ),
         *_films(laminate, pinned, (width / 2 + 18.0, y)),
         *_scale_bar(grid.scale, (width - MARGIN - 4.0, y)),
@@ -111,8 +111,8 @@ def _title_block(laminate: Laminate, grid: PageGrid, block: float, pinned: bool)
 
 
 def _warnings(laminate: Laminate) -> tuple[str, ...]:
-    said = dict.fromkeys(layer.film.warning for layer in laminate.layers)
-    return tuple(filter(None, said))
+    warnings = dict.fromkeys(layer.film.warning for layer in laminate.layers)
+    return tuple(filter(None, warnings))
 
 
 def _count(count: int, noun: str) -> str:
@@ -127,8 +127,8 @@ def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
         x, y = at[0], at[1] + 3.4 + FILM_ROW * row
         fill = draw.film_fill(film)
         parts.append(draw.box((x, y), (x + 6.0, y + 3.6), fill=fill, stroke=ink(film).line))
-        known = film.product.startswith(film.material)
-        name = film.product if known else f"{film.material}, {film.product}"
+        distinct = film.product.startswith(film.material)
+        name = film.product if distinct else f"{film.material}, {film.product}"
         words = f"{name}, {coord(film.thickness)} thick"
         parts.append(draw.text((x + 8.0, y + 2.8), words))
     if pinned:
@@ -168,7 +168,7 @@ LEAD = 5.0
 
 @dataclass(frozen=True)
 class CardFrame:
-    """Where profile coordinates land on the page."""
+    """The place of profile coordinates on the page."""
 
     left: float
     top: float
@@ -219,7 +219,7 @@ class Card:
 
 
 def pattern_card(
-    laminate: Laminate, layers: tuple[Layer, ...], held: Mapping[int, Sequence[Pin]]
+    laminate: Laminate, layers: tuple[Layer, ...], holding: Mapping[int, Sequence[Pin]]
 ) -> Card:
     """The card of the layers that share one pattern; ``held`` says which pins hold each layer."""
     profile = layers[0].profile
@@ -234,7 +234,7 @@ def pattern_card(
             max(high_x, r),
             max(high_y, r),
         )
-    pins = tuple(pin for pin in laminate.pins if all(pin in held[x.index] for x in layers))
+    pins = tuple(pin for pin in laminate.pins if all(pin in holding[x.index] for x in layers))
     if laminate.panel is not None:
         # Corner pins stand in the sheet round the part.
         pins = ()
@@ -326,17 +326,17 @@ def _overall(card: Card, frame: CardFrame) -> list[str]:
     """Width below and height at the left, outside everything that is drawn."""
     profile = card.layers[0].profile
     low_x, low_y, high_x, high_y = profile.bounds
-    left, top = frame.at((low_x, high_y))
+    x0, top = frame.at((low_x, high_y))
     right, bottom = frame.at((high_x, low_y))
     edge_left, edge_bottom = frame.at((card.bounds[0], card.bounds[1]))
-    below, beside = edge_bottom - bottom + 3.8, left - edge_left + 3.8
+    below, beside = edge_bottom - bottom + 3.8, x0 - edge_left + 3.8
     width, height = length(high_x - low_x), length(high_y - low_y)
-    corners = (left, bottom), (right, bottom)
+    corners = (x0, bottom), (right, bottom)
     if is_disc(profile, profile.outers[0]):
         return draw.dimension(*corners, f"⌀{width}", (0.0, 1.0), below)
     return [
         *draw.dimension(*corners, width, (0.0, 1.0), below),
-        *draw.dimension((left, top), (left, bottom), height, (-1.0, 0.0), beside),
+        *draw.dimension((x0, top), (x0, bottom), height, (-1.0, 0.0), beside),
     ]
 
 
@@ -358,7 +358,7 @@ def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[
 
 
 def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
-    """Where on the page a mark pulls its words to."""
+    """Return the point on the page toward which a mark pulls its words."""
     if isinstance(mark, WidthDimension):
         return min(frame.at(mark.start), frame.at(mark.end), key=lambda p: (-p[0], p[1]))
     if mark.phantom:
@@ -368,7 +368,7 @@ def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
 
 
 def _touch(mark: Circle, frame: CardFrame, elbow: Point) -> Point:
-    """Where the arrow meets the circle: radially under its leader, or on the arc itself."""
+    """Return point where the arrow meets the circle: radially under its leader, or on the arc."""
     if mark.toward is not None or mark.phantom:
         return _aim(mark, frame)
     x, y = frame.at(mark.centre)

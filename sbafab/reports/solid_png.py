@@ -90,10 +90,10 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
             shapes[prism.name] = _shape(prism, cut, camera)
         _paint(prism, shapes[prism.name], camera, canvas)
     base = next(iter(shapes.values()))
-    what = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
+    content = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
-        f"{laminate.name}: {laminate.bonded_materials} solid of {what} before inflation, cut open "
-        f"at {cut.chamber}; height exaggerated {factor} times"
+        f"{laminate.name}: {laminate.bonded_materials} solid of {content} before inflation, cut "
+        f"open at {cut.chamber}; height exaggerated {factor} times"
         + "".join(f"; {note}" for note in laminate.notes)
     )
     return canvas.png([rings[0] for rings in base.faces], caption, laminate.bonded_materials)
@@ -205,7 +205,7 @@ def _raised(points: list[Point], lift: float) -> list[Point]:
     return [(x, y - lift) for x, y in points]
 
 
-# The piece a picture cuts out of the laminate, so that pockets, bores and neck rings show.
+# The sector that the picture cuts away, so that pockets, bores and neck rings show.
 
 
 LEAST_SECTOR = math.radians(44.0)
@@ -222,7 +222,7 @@ class RemovedSector:
     removed: Region
 
     def on_face(self, edge: Edge) -> bool:
-        """Whether an edge lies on one of the two faces of the cut."""
+        """Return True if an edge lies on one of the two faces of the cut."""
         if not isinstance(edge, Line):
             return False
         return any(

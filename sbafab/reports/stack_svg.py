@@ -44,7 +44,7 @@ class Rod:
 
 def rods(laminate: Laminate, origin: Point, direction: Point) -> tuple[Rod, ...]:
     """The pins that a vertical plane meets, in the laminate's order; places from ``origin``."""
-    found = []
+    pin_rods = []
     for pin in laminate.pins:
         dx, dy = pin.centre[0] - origin[0], pin.centre[1] - origin[1]
         along, aside = dx * direction[0] + dy * direction[1], dx * direction[1] - dy * direction[0]
@@ -52,20 +52,22 @@ def rods(laminate: Laminate, origin: Point, direction: Point) -> tuple[Rod, ...]
         if abs(aside) < radius:
             half = math.sqrt(radius**2 - aside**2)
             stacks, steps = _stands(laminate, pin)
-            found.append(Rod(pin.name, (along - half, along + half), stacks, steps))
-    return tuple(rod for rod in found if rod.stacks)
+            pin_rods.append(Rod(pin.name, (along - half, along + half), stacks, steps))
+    return tuple(rod for rod in pin_rods if rod.stacks)
 
 
 def _stands(laminate: Laminate, pin: Pin) -> tuple[tuple[tuple[int, int], ...], tuple[int, ...]]:
     """Lowest and highest layer that the pin holds, stack by stack, and the steps."""
-    held = {
+    pinned = {
         layer.index
         for layers in laminate.patterns.values()
         if pin in laminate.pins_holding(layers[0])
         for layer in layers
     }
     steps = [step for step in assembly(laminate) if pin in step.pins]
-    spans = [(min(own), max(own)) for step in steps if (own := held.intersection(step.layers))]
+    spans = [
+        (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
+    ]
     whole = [
         span
         for span in dict.fromkeys(spans)
@@ -127,7 +129,9 @@ def chamber_section(laminate: Laminate) -> StackSection:
         (bore.centre for bore in laminate.bores if bore.chamber == chamber.name),
         chamber.centres[0],
     )
-    inlet = next((found for found in laminate.inlets if found.chamber == chamber.name), None)
+    inlet = next(
+        (candidate for candidate in laminate.inlets if candidate.chamber == chamber.name), None
+    )
     direction = inlet.direction if inlet else (1.0, 0.0)
     layers, hidden, break_above = _shown(laminate)
     lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
@@ -212,7 +216,7 @@ SectionDimension = tuple[Interval, str]
 
 @dataclass(frozen=True)
 class StackView:
-    """Where the section lands on the page."""
+    """The place of the section on the page."""
 
     section: StackSection
     across: float
@@ -315,14 +319,14 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
-    what = (
+    content = (
         f"Section through {view.section.chamber} along its inlet. "
         f"Height exaggerated {view.factor}{draw.TIMES}, {coord(laminate.thickness)} in all "
         "(nominal). All dimensions in mm."
     )
     return [
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
-        draw.text((10.0, 18.6), what),
+        draw.text((10.0, 18.6), content),
         *(
             draw.text((10.0, 23.4 + 4.2 * row), note, bold=True)
             for row, note in enumerate(laminate.notes)
@@ -336,13 +340,13 @@ def _breaks(view: StackView) -> list[str]:
     if section.hidden:
         last = next(s.layer for s in section.slabs if s.layer.index == section.break_above)
         base = view.y(last.z + last.film.thickness, last.index)
-        left = view.x(section.low) - (0.0 if section.cropped else 3.0)
+        x0 = view.x(section.low) - (0.0 if section.cropped else 3.0)
         right = view.x(_reach(section)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
-            parts.append(_wave((left, y), (right, y)))
+            parts.append(_wave((x0, y), (right, y)))
         noun = "balloon" if section.hidden == 1 else "balloons"
         words = f"\u2026 {section.hidden} more {noun} \u2026"
-        middle = ((left + right) / 2, base - BREAK / 2 + 1.0)
+        middle = ((x0 + right) / 2, base - BREAK / 2 + 1.0)
         parts.append(draw.text(middle, words, anchor="middle"))
     if section.cropped:
         x = view.x(section.low)
@@ -351,7 +355,7 @@ def _breaks(view: StackView) -> list[str]:
 
 
 def _reach(section: StackSection) -> float:
-    """How far the layers above the break go toward the inlet."""
+    """Return the distance by which the layers above the break go toward the inlet."""
     above = [s for s in section.slabs if s.layer.index > section.break_above]
     return max(end for slab in above for _, end in slab.spans)
 
@@ -493,12 +497,12 @@ def _legend(view: StackView, page: float) -> list[str]:
 
 
 def _bonding(films: Iterable[Film]) -> str:
-    """What flows into a gap: the structural film, if there is one alone."""
-    found = [film.material for film in films if not film.is_mask]
-    return found[0] if len(found) == 1 else "the film that melts"
+    """Return the material that flows into a gap: the structural film, if there is one alone."""
+    structural = [film.material for film in films if not film.is_mask]
+    return structural[0] if len(structural) == 1 else "the film that melts"
 
 
-# What the section's leaders point at, measured on the section itself.
+# Targets of the section's leaders, measured on the section itself.
 
 
 class StackLabel(NamedTuple):
@@ -522,8 +526,8 @@ def layer_labels(section: StackSection) -> list[StackLabel]:
         words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
         if slab.layer.role == "chamber-mask" and end > base_end:
             words += ", inlet strip"
-        found = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
-        labels.append(found._replace(film=slab.layer.film))
+        placed_label = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
+        labels.append(placed_label._replace(film=slab.layer.film))
     return labels
 
 
@@ -540,7 +544,7 @@ def pin_labels(section: StackSection, beyond_tab: bool) -> list[StackLabel]:
 
 def feature_labels(section: StackSection) -> list[StackLabel]:
     """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
-    found = [
+    features = [
         _bond(section),
         _pocket(section),
         _neck_ring(section),
@@ -548,7 +552,7 @@ def feature_labels(section: StackSection) -> list[StackLabel]:
         _bore(section),
         _lumen(section),
     ]
-    return [label for label in found if label is not None]
+    return [label for label in features if label is not None]
 
 
 def _joints(section: StackSection, kind: str) -> list[Joint]:

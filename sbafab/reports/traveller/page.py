@@ -205,7 +205,7 @@ class SheetRow:
     counts: str
     size: str
     minutes: str
-    said: str
+    note: str
 
 
 def sheet_rows(
