@@ -34,7 +34,7 @@ def reproduce(out: Path, as_json: bool) -> None:
     for section, rows in found.items():
         click.echo(f"\n{section}")
         for row in rows:
-            click.echo(f"  {row.what:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
+            click.echo(f"  {row.figure:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
     click.echo(f"\nwritten to {out / FOLDER}: reproduction.md, reproduction.json, charts")
 
 

@@ -198,7 +198,7 @@ def plan_job(
 
 
 def _shared_settings(job: CheckedJob, designs: Sequence[DesignPlan]) -> CutSettings:
-    """Return settings of shared sheets: one hash over all designs, the waivers and limits of all."""
+    """Return settings of shared sheets: one hash over all designs, waivers and limits of all."""
     each = [plan.settings for plan in designs]
     hashes = "".join(settings.design_sha256 for settings in each)
     waived = [rule for settings in each for rule in settings.waived]

@@ -32,8 +32,8 @@ from sbafab.results.records import (
 from sbafab.results.store import Lab
 from sbafab.version import GENERATOR
 
-SAID = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
-"""What can be said of an actuator, by its name."""
+RESULT_NAMES = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
+"""Names of the values that a result of an actuator may have."""
 
 
 def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:

@@ -255,8 +255,8 @@ def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[f
     """
     figures = {}
     if burst is not None:
-        rows = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
-        figures["burst_kpa"] = (burst, rows)
+        model_text = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
+        figures["burst_kpa"] = (burst, model_text)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
             if figure.name == name and figure.model.title.startswith(model):
