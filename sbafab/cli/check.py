@@ -18,12 +18,10 @@ from sbafab.errors import SbafabError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sbafab.assemblies.records import Assembly
     from sbafab.cli.printing import Group
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.checked import Checked
-    from sbafab.process import Progress
+    from sbafab.output.job import CheckedJob
     from sbafab.rules.finding import Finding
 
 YIELD = "registration-yield"
@@ -172,6 +170,7 @@ def _of_source(asked: CheckRequest) -> Told:
     from sbafab.cli.printing import shown_progress
     from sbafab.design.records import Design
     from sbafab.errors import DesignError
+    from sbafab.output.job import check_job
 
     found = load(asked.source, asked.assignments, asked.waivers)
     with shown_progress(asked.as_json) as progress:
@@ -181,47 +180,27 @@ def _of_source(asked: CheckRequest) -> Told:
                     "--target-yield goes with a design, and this is an assembly; check its "
                     "parts' designs one by one"
                 )
-            return _of_assembly(found, progress)
+            return _of_job(check_job(found, progress=progress))
         has_target = found.rules.target_yield is not None
         if asked.target is not None:
             found = load_design(asked.source, _asking(asked, asked.target), asked.waivers)
-        return _of_design(found, progress)._replace(has_target=has_target)
+        return _of_job(check_job(found, progress=progress))._replace(has_target=has_target)
 
 
-def _of_design(design: Design, progress: Progress) -> Told:
-    """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
-    from sbafab.output.checked import check as run_check
-
-    checked = run_check(design, progress)
-    return _of_checked(design.name, checked.findings, [checked])
-
-
-def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
-    """Those of its designs and between its parts, likewise."""
-    from sbafab.output.job import check_job
-
-    checked = check_job(assembly, progress=progress)
-    return _of_checked(assembly.name, checked.findings, checked.designs, checked.between)
-
-
-def _of_checked(
-    name: str,
-    findings: Sequence[Finding],
-    checked: Sequence[Checked],
-    between: Sequence[Finding] | None = None,
-) -> Told:
+def _of_job(job: CheckedJob) -> Told:
+    """Findings and notes; what press and sheets cannot do is refused, as a run would do."""
     from sbafab.cli.printing import groups_of, notes_of
     from sbafab.models.formulas import size_said, sizes
     from sbafab.output.checked import refuse_undoable
-    from sbafab.rules.deck import has_failed
 
-    if not has_failed(findings):
-        refuse_undoable(checked)
-    designs = [one.design for one in checked]
-    groups = groups_of(checked, between)
-    measured = {one.design.name: sizes(one.design, one.laminate) for one in checked}
-    said = {one.design.name: size_said(one.design, one.laminate) for one in checked}
-    return Told("design", name, findings, groups, notes_of(checked), designs, measured, said)
+    if not job.failed:
+        refuse_undoable(job.designs)
+    designs = [checked.design for checked in job.designs]
+    groups = groups_of(job.designs, job.between)
+    measured = {each.design.name: sizes(each.design, each.laminate) for each in job.designs}
+    said = {each.design.name: size_said(each.design, each.laminate) for each in job.designs}
+    notes = notes_of(job.designs)
+    return Told("design", job.name, job.findings, groups, notes, designs, measured, said)
 
 
 def _advice(asked: CheckRequest, target: float) -> Advice:
