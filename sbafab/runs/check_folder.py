@@ -39,6 +39,8 @@ from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.meshing.surface import Surface, open_edges
+from sbafab.models.figures import Asked, Factors
+from sbafab.models.prediction import predict
 from sbafab.nesting.records import NestPart, parts_of
 from sbafab.output.artefacts import (
     ARTEFACTS,
@@ -302,9 +304,6 @@ def _prediction_problems(
     """The prediction, asked for again what the file says that was asked for."""
     if "predict.json" not in claims.files:
         return []
-    from sbafab.models.figures import Asked, Factors
-    from sbafab.models.prediction import predict
-
     try:
         told = _Predicted.model_validate_json((folder / "predict.json").read_bytes()).asked
         measured = told.pocket_loss, told.modulus_mpa
