@@ -1,4 +1,4 @@
-"""The program from Python: the commands' names, each a function.
+"""The program from Python: a function for each command.
 
 >>> import sbafab
 >>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
@@ -112,7 +112,7 @@ def parted(options: Mapping[str, Any], record: type) -> tuple[dict[str, Any], di
     )
 
 
-# A design from its file to its laminate, what the rules find in it, and its shapes.
+# A design from its file to its laminate, findings and shapes.
 
 
 def templates() -> list[str]:
@@ -390,7 +390,7 @@ def simulate(
     return run(design, simulator, Wish(**wish), Path(out), export=export)
 
 
-# What a lab measures: the kerf of its laser, and what came out of the press.
+# Measurements of a lab: the kerf of its laser, results of its actuators.
 
 
 def kerf(

@@ -182,7 +182,7 @@ def _number(text: str, column: str, where: str) -> float:
     return float(text.replace(",", "."))
 
 
-# Finding records by what a traveller's code says, by a serial or by a design's name.
+# Records found by a traveller's code, a serial or a design's name.
 
 
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")

@@ -177,7 +177,7 @@ def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
         )
 
 
-# What a design promises, kept beside its records so that a report needs no design file.
+# Promises of a design, stored with its records so that a report needs no design file.
 
 
 FIGURES = {

@@ -1,4 +1,4 @@
-"""What a lab's records say together: success, measured against predicted, tolerances.
+"""Evaluation of a lab's records: success, measured against predicted, tolerances.
 
 Designs that build the same actuator (``Build.actuator``) count as one. An actuator that was mended
 and tested again counts by its first attempt.
