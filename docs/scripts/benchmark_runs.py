@@ -32,14 +32,13 @@ AIMS = {
 """Seconds that were aimed at."""
 GROWN = ("balloons", "chambers", "edges", "copies")
 """Sections whose growth is told, in one table."""
-RATES = ("decks", "compiled", "processes", "poses")
+RATES = ("decks", "processes", "poses")
 """Tables that tell rates: each has what another program took in the same run."""
 ONCE = ("memory",)
 """Tables of one long run."""
 TABLES = (
     "plates",
     "decks",
-    "compiled",
     "processes",
     "memory",
     "poses",

@@ -10,8 +10,9 @@ from sbafab.output.artefacts import ARTEFACTS
 
 HEAD = """# File formats
 
-What a program may rely on. Each of these but a design file and the list of templates carries the id
-of its format as `schema`; additions keep the id, a change that would break a reader gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests hold what is written and printed against them.
+Each format but a design file and the list of templates carries its id as `schema`; additions keep the id, an
+incompatible change gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests
+validate what is written and printed.
 
 | name | id | what it describes | schema |
 |---|---|---|---|

@@ -22,21 +22,6 @@ WIDE = 260
 """Pixels of a picture."""
 RED = "#c1121f"
 
-CHOSEN = {
-    "bond-width": "narrow neck ring",
-    "mask-overhang": "separator grown too little",
-    "facing-films": "mask no larger than the smaller neighbour",
-    "sealing": "strip between two chambers",
-    "channel-clear": "narrow bore in a mask",
-    "tube-fit": "strip with a narrow place",
-    "piece-count": "mask island in the waste",
-    "pin-holes": "sheet without a tooling hole",
-    "film-limits": "slit in a mask",
-    "registration-nominal": "neck ring off its axis",
-}
-"""The fault of the tests' catalogue that shows a rule best."""
-
-
 ZOOM = {"bond-width": 1.7, "mask-overhang": 1.7, "tube-fit": 2.5, "film-limits": 1.7}
 """Rules whose pictures show this many mm round the place only: what is wrong is small."""
 
@@ -67,7 +52,7 @@ def _found(rule: str, laminate: Laminate, limits: Limits = EXACT) -> Finding:
 
 
 def _of_fault(rule: str) -> Pair:
-    fault = FAULTS[CHOSEN[rule]]
+    fault = next(fault for fault in FAULTS.values() if fault.rule == rule)
     good = built(*fault.design)
     profile = fault.change(good.layer(fault.layer).profile)
     bad = spoiled(good, fault.layer, profile, fault.pieces)
@@ -220,3 +205,6 @@ OTHERS: dict[str, Callable[[], Pair]] = {
     "registration-worst-case": _worst_case,
     "registration-yield": _yield,
 }
+
+PICTURED = CHOSEN.keys() | OTHERS.keys()
+"""Rules that have a pair of pictures."""

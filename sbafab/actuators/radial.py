@@ -6,12 +6,12 @@ Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal, Self
 
 from pydantic import Field
 
 from sbafab.actuators.ears import (
-    NOTE,
     Ear,
     Ray,
     head_reach,
@@ -26,12 +26,10 @@ from sbafab.actuators.stacking import (
     BalloonShape,
     BalloonStack,
     CutFilm,
-    balloon_cuts,
     bonded,
-    channel_pin,
     check_neck,
     drawn_pocket,
-    layers,
+    stacked,
     tab_and_strip,
 )
 from sbafab.design.records import Chamber as ChamberSection
@@ -39,11 +37,10 @@ from sbafab.design.records import Design, Drawn, Form, Free, Inlet, Slots, Stack
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region, rectangle, section, stadium, strip
-from sbafab.laminate.laminate import Bore, Chamber, Laminate
+from sbafab.geometry.region import Region, rectangle, section, stadium, strip, union
+from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
@@ -135,7 +132,7 @@ class RadialDesign(Design):
         return (width, length, Free("stack.balloons", 1, 3, 1), *super().free[1:])
 
     def completed(self) -> Self:
-        """The same design with inlet and window sizes filled in."""
+        """Return the design with inlet and window sizes filled in."""
         completed = super().completed()
         if self.chamber.outline is not None:
             return completed
@@ -145,7 +142,7 @@ class RadialDesign(Design):
 
 
 def build(design: RadialDesign) -> Laminate:
-    """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    """Return the flat laminate of a radial design. Raises DesignError where parts do not fit."""
     if design.registration.method == METHOD:
         raise DesignError(
             "a radial design cannot be made in registered sheets, for its balloons' bridges would "
@@ -154,7 +151,7 @@ def build(design: RadialDesign) -> Laminate:
         )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
-    check_neck(design, [pocket], [(0.0, 0.0)])
+    check_neck(design, [pocket])
     outline = bonded(pocket, bond)
     count = design.chamber.count
     centres = tuple(((i - (count - 1) / 2) * design.pitch, 0.0) for i in range(count))
@@ -166,9 +163,9 @@ def build(design: RadialDesign) -> Laminate:
     bottom, inlets = _bottom(design, shape, outline, centres)
     sheet = _sheet(design, outline)
     ears = _ears(design, bottom, sheet, outline, centres)
-    held = tails(inlets, bottom.outline, ears, design, sheet)
+    inlet_tails = tails(inlets, bottom.outline, ears, design, sheet)
     stack = BalloonStack(
-        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held
+        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=inlet_tails
     )
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
@@ -179,34 +176,10 @@ def build(design: RadialDesign) -> Laminate:
         CutFilm("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
         CutFilm("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
-    manifold = design.inlet.manifold
-    names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
-    bored = zip(names, centres, strict=True) if design.stack.balloons > 1 else ()
-    bores = tuple(Bore(name, centre, design.bore.diameter) for name, centre in bored)
-    return Laminate(
-        name=design.name,
-        family=design.family,
-        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
-        chambers=(Chamber("chamber1", centres),)
-        if manifold
-        else tuple(Chamber(n, (centre,)) for n, centre in zip(names, centres, strict=True)),
-        bores=bores,
-        inlets=inlets,
-        pins=(
-            *(
-                channel_pin(f"channel{number}", bore.centre, design.bore)
-                for number, bore in enumerate(bores, start=1)
-            ),
-            *(ear.pin for ear in ears),
-            *(pin for tail in held for pin in tail.pins),
-        ),
-        lumen=None,
-        balloons=design.stack.balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(NOTE,) if ears else (),
-        tube=design.tube.outer_diameter,
-    )
+    parts = [centres] if design.inlet.manifold else [(centre,) for centre in centres]
+    chambers = [Chamber(f"chamber{number}", part) for number, part in enumerate(parts, start=1)]
+    laminate = stacked(design, stack, chambers, inlets, carrier, "channel")
+    return replace(laminate, tube=design.tube.outer_diameter)
 
 
 def _slot(design: RadialDesign) -> tuple[float, float]:
@@ -276,14 +249,14 @@ def _bottom(
     """The bottom balloons with tabs, strips and, for a manifold, the bridges between them."""
     count, manifold = len(centres), design.inlet.manifold
     fed = [centres[(count - 1) // 2]] if manifold else centres
-    made = [
+    feeds = [
         tab_and_strip(
             design, f"chamber{number}", shape.pockets, centre, (0.0, 1.0), outline.bounds[3]
         )
         for number, centre in enumerate(fed, start=1)
     ]
-    tabs = [tab for tab, _, _ in made]
-    strips = [mask for _, mask, _ in made]
+    tabs = [tab for tab, _, _ in feeds]
+    strips = [mask for _, mask, _ in feeds]
     if manifold and count > 1:
         width = design.strip_width
         tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
@@ -299,7 +272,7 @@ def _bottom(
     pieces = 1 if manifold else count
     return (
         BalloonShape(bottom, union([shape.pockets, *strips]), pieces, pieces),
-        tuple(inlet for _, _, inlet in made),
+        tuple(inlet for _, _, inlet in feeds),
     )
 
 
@@ -336,9 +309,8 @@ def _ears(
     return placed(rays, bottom.outline | sheet, bottom.outline, design)
 
 
-# Where ears of an outline of any shape start: inside it, two below and two above beside its tab.
-#
-# The tab stands on the outline's upper side, on its axis at x = 0.
+# Starts of ears on an outline of any shape: two below, and two above beside its tab, which stands
+# on the upper side at x = 0.
 
 
 Side = Literal[-1, 1]
@@ -347,7 +319,7 @@ STEP = 0.25
 
 
 def film_feet(design: Design, outline: Region) -> tuple[Point, Point]:
-    """Starts of two film ears at the lower side, a quarter of the width beside its middle.
+    """Return starts of two film ears at the lower side, a quarter of the width beside its middle.
 
     Raises DesignError where the outline has no room for both.
     """
@@ -366,12 +338,12 @@ def mask_feet(
 ) -> tuple[tuple[Point, Point | None], ...]:
     """Starts of two mask ears at the upper side, clear of the tab and the ``head`` of its tail.
 
-    With each the point of the outline that it is joined from, where it starts beside the outline.
+    With each the point of the outline that it is joined from, if it starts beside the outline.
     """
     half, overhang = _half(design), design.mask.overhang
     tab = max(design.strip_width / 2 + design.bond.width, head)
     beside = tab + 2 * overhang + half
-    found: list[tuple[Point, Point | None]] = []
+    feet: list[tuple[Point, Point | None]] = []
     for x in (-beside, beside):
         # A mask reaches past the outline: an ear may stand half beside it.
         inner = x - math.copysign(half - design.bond.width, x)
@@ -380,8 +352,8 @@ def mask_feet(
         start = start or joint
         if start is None:
             raise DesignError(_no_room(design.bond.width))
-        found.append(((x, start[1]), joint))
-    return tuple(found)
+        feet.append(((x, start[1]), joint))
+    return tuple(feet)
 
 
 def _no_room(width: float) -> str:
@@ -437,7 +409,7 @@ def _nearest(
 
 
 def _ahead(outline: Region, start: Point, side: Side, design: Design) -> float:
-    """How far the outline reaches past ``start`` in the way of an ear."""
+    """Reach of the outline past ``start`` in the way of an ear, mm."""
     half = _half(design) + 2 * design.mask.overhang
     _, low, _, high = outline.bounds
     band = outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))

@@ -45,8 +45,7 @@ from sbafab.as_built.sheets import Lot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
-from sbafab.assemblies.files import load_assembly
-from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, part_entry
+from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
 from sbafab.design.files import design_sha256, validated
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError

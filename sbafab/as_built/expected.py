@@ -20,8 +20,9 @@ from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.verify import check_contours
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Edge, edge_from_bulge
-from sbafab.geometry.region import Contour, Region, centroid, circle
+from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import cut_settings
 from sbafab.rules import registration_yield

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from sbafab.cutting.chaining import check_clear
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import tidy
+from sbafab.geometry.contour import Contour, circle, tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point
 from sbafab.geometry.offset import Kerf, rim, shrink, widths
-from sbafab.geometry.region import Contour, Region, circle
+from sbafab.geometry.region import Region
 
 KINK = 0.05
 """Radians: arcs along one curve turn less where they join, corners of a path more."""

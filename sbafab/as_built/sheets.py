@@ -30,11 +30,11 @@ from sbafab.cutting.sheets import FOLDER
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_surroundings
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Edge, Point
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.contour import Mark
+from sbafab.geometry.edges import Edge, Point, meeting_points
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.offset import Kerf
-from sbafab.geometry.region import Mark, Region, rectangle
+from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Material, in_order
 from sbafab.laminate.laminate import Layer, SheetPanel, freed
 from sbafab.nesting.check import check_placed

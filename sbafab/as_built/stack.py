@@ -10,9 +10,9 @@ from typing import NamedTuple
 from sbafab.actuators.stacking import channel_pin, film_of
 from sbafab.as_built.cut_files import LayerFile
 from sbafab.design.records import Design
-from sbafab.geometry.boolean import tidy
+from sbafab.geometry.contour import Contour, tidy
 from sbafab.geometry.edges import Edge, Line, Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import (
     LOOSE,

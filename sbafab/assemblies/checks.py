@@ -1,4 +1,4 @@
-"""Checks between two parts: tubes that are wrapped, lines in lumens and inlets, glued faces."""
+"""Checks of assemblies as findings: joints, supply tubes, ways through holes, collisions."""
 
 from __future__ import annotations
 
@@ -25,168 +25,169 @@ if TYPE_CHECKING:
 WHOLE = Place()
 
 
-def found(
+def _finding(
     rule: str,
-    good: bool,
+    passed: bool,
     limit: float | None,
     measured: float | None,
     message: str,
     unit: str = "mm",
 ) -> Finding:
-    return Finding(rule, "pass" if good else "fail", limit, measured, unit, WHOLE, message)
+    return Finding(rule, "pass" if passed else "fail", limit, measured, unit, WHOLE, message)
 
 
 def joints(assembled: Assembled) -> Iterator[tuple[PlacedPart, PlacedPart]]:
-    """Each part that hangs on another, with that other."""
+    """Yield each part that is fixed on another, with that host."""
     for placed in assembled.parts:
-        other = assembled.on(placed)
-        if other is not None:
-            yield placed, other
+        host = assembled.on(placed)
+        if host is not None:
+            yield placed, host
 
 
 def tube_match(assembled: Assembled) -> Iterator[Finding]:
-    """What is bent round a tube was made for it, or at least goes round it once."""
+    """Check that an SBA bent round a tube was made for it, or at least goes round it once."""
     tolerance = assembled.assembly.rules.tube_tolerance
-    for placed, other in joints(assembled):
-        if not isinstance(placed, PlacedSba) or not isinstance(other.part, Tube):
+    for placed, host in joints(assembled):
+        if not isinstance(placed, PlacedSba) or not isinstance(host.part, Tube):
             continue
         if placed.radius is None:
             continue
-        outer = other.part.outer_diameter
+        outer = host.part.outer_diameter
         wrap = placed.made.design.form.wrap
         if wrap is not None:
-            own = wrap.tube_diameter
-            off = abs(own - outer)
+            design_diameter = wrap.tube_diameter
+            off = abs(design_diameter - outer)
             good = holds(tolerance, off)
             message = (
-                f"{placed.name}, made for a tube of {own:g}, goes round {other.name} of {outer:g}"
+                f"{placed.name}, made for a tube of {design_diameter:g}, goes round {host.name} "
+                f"of {outer:g}"
             )
             if not good:
                 message += (
                     f"; set tube.outer_diameter = {outer:g} in its design, or change the tube"
                 )
-            yield found("tube-match", good, tolerance, off, message)
+            yield _finding("tube-match", good, tolerance, off, message)
             continue
         walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
         width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
-        yield found(
+        yield _finding(
             "tube-match",
             holds(room, width),
             room,
             width,
-            f"{placed.name} takes {width:.2f} of the {room:.2f} round {other.name}, tabs included"
+            f"{placed.name} takes {width:.2f} of the {room:.2f} round {host.name}, tabs included"
             + ("" if holds(room, width) else "; take a thicker tube or a smaller actuator"),
         )
 
 
 def inlet_match(assembled: Assembled) -> Iterator[Finding]:
-    """A line in an inlet goes into the strip that is opened to it."""
-    for placed, other in joints(assembled):
+    """Check that a line in an inlet fits the opened strip."""
+    for placed, host in joints(assembled):
         if placed.part.at != "inlet" or not isinstance(placed.part, Line):
             continue
-        if not isinstance(other, PlacedSba):
+        if not isinstance(host, PlacedSba):
             continue
-        inlet = inlet_of(placed.name, placed.part, other)
+        inlet = inlet_of(placed.name, placed.part, host)
         limit = 2 * inlet.width / math.pi
         outer = placed.part.outer_diameter
-        yield found(
+        yield _finding(
             "inlet-match",
             holds(limit, outer),
             limit,
             outer,
             f"{placed.name} has an outer diameter of {outer:g}, and the inlet of {inlet.chamber} "
-            f"in {other.name}, {inlet.width:g} wide, opens to {limit:.3f}"
+            f"in {host.name}, {inlet.width:g} wide, opens to {limit:.3f}"
             + ("" if holds(limit, outer) else "; set inlet.tube_outer_diameter in its design"),
         )
 
 
 def line_clearance(assembled: Assembled) -> Iterator[Finding]:
-    """What is left round a line in the lumen or tube that it runs through."""
+    """Check the clearance round a line in the lumen or tube that it runs through."""
     limit = assembled.assembly.rules.line_clearance
-    for placed, other in joints(assembled):
+    for placed, host in joints(assembled):
         if placed.part.at != "lumen" or not isinstance(placed.part, Line):
             continue
-        lumen = _opening(other)
+        lumen = _opening(host)
         if lumen is None:
             continue
-        left = lumen - placed.part.outer_diameter
-        good = holds(left, limit)
-        yield found(
+        clearance = lumen - placed.part.outer_diameter
+        good = holds(clearance, limit)
+        yield _finding(
             "line-clearance",
             good,
             limit,
-            left,
-            f"{placed.name} of {placed.part.outer_diameter:g} in the lumen of {other.name}, "
-            f"{lumen:g}, leaves {left:.3f} in diameter"
+            clearance,
+            f"{placed.name} of {placed.part.outer_diameter:g} in the lumen of {host.name}, "
+            f"{lumen:g}, leaves {clearance:.3f} in diameter"
             + ("" if good else f"; take a line of at most {lumen - limit:g} or a wider lumen"),
         )
 
 
 def _opening(placed: PlacedPart) -> float | None:
-    """Diameter of what a line runs through, mm; None for a part without lumen."""
+    """Return the diameter of the lumen of a part, mm; None for a part without lumen."""
     if isinstance(placed.part, Tube):
         return placed.part.inner_diameter
     return placed.made.laminate.lumen if placed.made is not None else None
 
 
 def seat(assembled: Assembled) -> Iterator[Finding]:
-    """How much of the smaller of two glued faces lies on the other.
+    """Check the share of the smaller of two glued faces that lies on the other.
 
-    What is laid round a tube must lie on it, and a line in a lumen must run through it; a line in
-    an inlet is held by its strip.
+    A part round a tube must lie on it, and a line in a lumen must run through it; a line in
+    an inlet is fixed by its strip.
     """
     limit = assembled.assembly.rules.seat_share
-    for placed, other in joints(assembled):
+    for placed, host in joints(assembled):
         if placed.part.at == "lumen":
-            yield _through(placed, other, limit)
+            yield _through(placed, host, limit)
         elif placed.part.at == "outside":
-            yield _around(placed, other, limit)
+            yield _around(placed, host, limit)
         elif placed.part.at != "inlet":
-            own, under = _lower_face(placed), _face_of(other, placed.part.at)
-            share = (own & under).area / min(own.area, under.area)
+            lower, under = _lower_face(placed), _face_of(host, placed.part.at)
+            share = (lower & under).area / min(lower.area, under.area)
             good = holds(share, limit)
-            message = f"{share:.0%} of the smaller face of {placed.name} on {other.name} is glued"
+            message = f"{share:.0%} of the smaller face of {placed.name} on {host.name} is glued"
             if not good:
                 message += "; move it with offset, or use a larger part: an opening lies under it"
-            yield found("seat", good, limit, share, message, "")
+            yield _finding("seat", good, limit, share, message, "")
 
 
-def _through(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
+def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
     """A line in the lumen of another part, both along that part's axis."""
     start, end = placed.part.along, placed.part.along + placed.height
-    inside = max(0.0, min(end, other.height) - max(start, 0.0))
-    share = inside / min(placed.height, other.height)
+    inside = max(0.0, min(end, host.height) - max(start, 0.0))
+    share = inside / min(placed.height, host.height)
     good = holds(share, limit)
-    message = f"{inside:.3f} of {placed.name} lie in the lumen of {other.name}"
+    message = f"{inside:.3f} of {placed.name} lie in the lumen of {host.name}"
     if not good:
         message += (
-            f", which reaches from 0 to {other.height:.3f}; along = {start:g} puts the line from "
+            f", which reaches from 0 to {host.height:.3f}; along = {start:g} puts the line from "
             f"{start:g} to {end:g}"
         )
-    return found("seat", good, limit, share, message, "")
+    return _finding("seat", good, limit, share, message, "")
 
 
-def _around(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
+def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
     """A part on the side of a tube, whose face lies from ``along`` both ways."""
-    own = _face_of(placed, "bottom").turned(placed.turn)
-    x0, y0, x1, y1 = own.bounds
-    along, length = placed.part.along, other.height
+    lower = _face_of(placed, "bottom").turned(placed.turn)
+    x0, y0, x1, y1 = lower.bounds
+    along, length = placed.part.along, host.height
     low, high = max(y0, -along), min(y1, length - along)
-    share = (own & rectangle((x0, low), (x1, high))).area / own.area if low < high else 0.0
+    share = (lower & rectangle((x0, low), (x1, high))).area / lower.area if low < high else 0.0
     if not holds(share, limit):
         message = (
-            f"{share:.0%} of {placed.name} lies on {other.name}, which is {length:g} long; "
+            f"{share:.0%} of {placed.name} lies on {host.name}, which is {length:g} long; "
             f"along = {along:g} puts it from {along + y0:.2f} to {along + y1:.2f}"
         )
-        return found("seat", False, limit, share, message, "")
+        return _finding("seat", False, limit, share, message, "")
     if placed.radius is None:
         remedy = f"build the joint of {placed.name} up with adhesive"
-        message = f"{remedy}: it is stiff and touches the round {other.name} in a line only"
+        message = f"{remedy}: it is stiff and touches the round {host.name} in a line only"
         return Finding("seat", "warn", limit, 0.0, "", WHOLE, message, remedy=remedy)
-    message = f"{share:.0%} of {placed.name} lies on {other.name}"
+    message = f"{share:.0%} of {placed.name} lies on {host.name}"
     if holds(share, 1.0):
-        return found("seat", True, limit, share, message, "")
-    remedy = f"move {placed.name} along {other.name}, or glue well what lies on it"
+        return _finding("seat", True, limit, share, message, "")
+    remedy = f"move {placed.name} along {host.name}, or glue well what lies on it"
     message = (
         f"{remedy}: {message}, the rest hangs past its end; along = {along:g} puts it from "
         f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
@@ -195,12 +196,12 @@ def _around(placed: PlacedPart, other: PlacedPart, limit: float) -> Finding:
 
 
 def _lower_face(placed: PlacedPart) -> Region:
-    """The face that is glued on, as it lies on the other part's."""
+    """Return the face that is glued on, as it lies on the host's."""
     part = placed.part
-    own = _face_of(placed, "bottom").turned(part.turn)
+    region = _face_of(placed, "bottom").turned(part.turn)
     if part.at in ("bottom", "start"):
-        own = own.mirrored()
-    return own.moved(*part.offset)
+        region = region.mirrored()
+    return region.moved(*part.offset)
 
 
 def _face_of(placed: PlacedPart, at: str | None) -> Region:
@@ -210,17 +211,17 @@ def _face_of(placed: PlacedPart, at: str | None) -> Region:
     return layers[-1 if at == "top" else 0].profile
 
 
-# The supply tubes of actuators: how far tabs and tubes stand out once folded, and where they run.
+# Supply tubes: the size of folded tabs with tubes in them, and the tubes' runs.
 #
-# The paper says nothing of them. Tabs fold back over the edge that they leave; their tubes then lie
-# along what the actuator stands on, away from it.
+# The paper does not describe them. Tabs fold back over the edge that they leave; their tubes then
+# lie along the actuator's host, away from the actuator.
 
 
 @dataclass(frozen=True)
 class SupplyRun:
     """A supply tube along the outside of a tube, ``angle`` degrees round it from its marked line.
 
-    ``over`` are the parts whose balloons it would lie on.
+    ``over`` are the parts with balloons under it.
     """
 
     chamber: str
@@ -229,20 +230,20 @@ class SupplyRun:
 
 
 def folded_diameter_with_tubes(placed: PlacedPart, assembled: Assembled) -> float | None:
-    """Diameter in mm over tabs that are folded back with a tube in each; None without an inlet.
+    """Return the diameter in mm over folded tabs with a tube in each; None without an inlet.
 
-    Inside lies what they fold over: the outline where a tab leaves it, or the tube below if that
-    is wider. On it lie the tab's two films, with the supply tube and the strip's mask between them;
-    what of the strip stands out of the tab is snipped off when the tube goes in.
+    The tabs fold over the outline where they leave it, or over the tube below if that is wider. On
+    it lie the tab's two films, with the supply tube and the strip's mask between them; the strip's
+    end outside the tab is snipped off when the tube goes in.
     """
     if placed.made is None or not placed.made.laminate.inlets:
         return None
     laminate = placed.made.laminate
     inside = placed.radius or 0.0
     if placed.radius is None:
-        other = assembled.on(placed)
-        if other is not None and isinstance(other.part, Tube):
-            inside = other.part.outer_diameter / 2
+        host = assembled.on(placed)
+        if host is not None and isinstance(host.part, Tube):
+            inside = host.part.outer_diameter / 2
         roots = [math.hypot(*inlet.mouth) - inlet.length for inlet in laminate.inlets]
         inside = max(inside, *roots)
     strip = max(layer.film.thickness for layer in laminate.layers if layer.is_mask)
@@ -251,7 +252,7 @@ def folded_diameter_with_tubes(placed: PlacedPart, assembled: Assembled) -> floa
 
 
 def reach(placed: PlacedPart) -> float:
-    """Diameter in mm of the circle that holds an actuator with its tabs and strips unfolded."""
+    """Return the diameter in mm of the circle that holds an actuator with its tabs unfolded."""
     assert placed.made is not None
     layers = [layers[0] for layers in placed.made.laminate.patterns.values()]
     edges = (edge for layer in layers for edge in layer.profile.edges)
@@ -259,7 +260,7 @@ def reach(placed: PlacedPart) -> float:
 
 
 def runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
-    """Where the supply tubes of an actuator on a tube's end or start run along that tube."""
+    """Return the runs along a tube of the supply tubes of an actuator on its end or start."""
     tube = assembled.on(placed)
     if placed.made is None or tube is None or not isinstance(tube.part, Tube):
         return ()
@@ -267,36 +268,40 @@ def runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
         return ()
     around = tube.part.outer_diameter / 2
     covered = list(_covered(tube, assembled))
-    found_runs = []
+    supply = []
     for inlet in placed.made.laminate.inlets:
         angle = _angle(tube, placed.at((*inlet.mouth, 0.0)))
-        half = math.degrees(inlet.tube_diameter / 2 / around)
-        over = [name for name, middle, own in covered if _apart(angle, middle) < own + half]
-        found_runs.append(SupplyRun(inlet.chamber, angle, tuple(dict.fromkeys(over))))
-    return tuple(found_runs)
+        half_tube = math.degrees(inlet.tube_diameter / 2 / around)
+        over = [
+            name
+            for name, middle, half_stack in covered
+            if _angle_between(angle, middle) < half_stack + half_tube
+        ]
+        supply.append(SupplyRun(inlet.chamber, angle, tuple(dict.fromkeys(over))))
+    return tuple(supply)
 
 
 def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, float, float]]:
-    """Parts round a tube: name, and the middle and half of the angle that each stack takes."""
-    for other in assembled.parts:
-        if other.made is None or other.radius is None or other.part.on != tube.name:
+    """Yield the parts round a tube: name, and the middle and half of each stack's angle."""
+    for sba in assembled.parts:
+        if sba.made is None or sba.radius is None or sba.part.on != tube.name:
             continue
-        for piece in other.made.laminate.layers[-1].profile.pieces:
-            low_x, low_y, high_x, high_y = piece.turned(other.turn).bounds
+        for piece in sba.made.laminate.layers[-1].profile.pieces:
+            low_x, low_y, high_x, high_y = piece.turned(sba.turn).bounds
             # A part's own turn comes first when it is placed, and is taken off again here.
             x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
-            own = math.radians(-other.turn)
+            unturn = math.radians(-sba.turn)
             middle = (
-                x * math.cos(own) - y * math.sin(own),
-                x * math.sin(own) + y * math.cos(own),
+                x * math.cos(unturn) - y * math.sin(unturn),
+                x * math.sin(unturn) + y * math.cos(unturn),
                 0.0,
             )
-            half = math.degrees((high_x - low_x) / 2 / other.radius)
-            yield other.name, _angle(tube, other.at(middle)), half
+            half = math.degrees((high_x - low_x) / 2 / sba.radius)
+            yield sba.name, _angle(tube, sba.at(middle)), half
 
 
 def _angle(tube: PlacedPart, p: Vector) -> float:
-    """Degrees of a point round a tube, anti-clockwise from its marked line."""
+    """Return the angle of a point round a tube, degrees anti-clockwise from its marked line."""
     origin = tube.at((0.0, 0.0, 0.0))
     x, y = (
         sum((b - a) * (d - a) for a, b, d in zip(origin, tube.at(unit), p, strict=True))
@@ -305,42 +310,44 @@ def _angle(tube: PlacedPart, p: Vector) -> float:
     return math.degrees(math.atan2(y, x)) % 360
 
 
-def _apart(one: float, other: float) -> float:
-    off = abs(one - other) % 360
+def _angle_between(a: float, b: float) -> float:
+    off = abs(a - b) % 360
     return min(off, 360 - off)
 
 
 def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
-    """Whether supply tubes stay off balloons that press on the wall of a lumen."""
+    """Check that supply tubes stay off balloons that press on the wall of a lumen."""
     if assembled.assembly.deploy.lumen_diameter is None:
         return
     for placed in assembled.parts:
-        own = runs(placed, assembled)
-        if not own:
+        supply = runs(placed, assembled)
+        if not supply:
             continue
-        crossing = [run for run in own if run.over]
+        crossing = [run for run in supply if run.over]
         if not crossing:
             message = f"the supply tubes of {placed.name} run past all balloons"
-            yield found("supply-tubes", True, 0, 0, message, "tubes")
+            yield _finding("supply-tubes", True, 0, 0, message, "tubes")
             continue
         names = ", ".join(dict.fromkeys(name for run in crossing for name in run.over))
         message = (
-            f"{len(crossing)} of {len(own)} supply tubes of {placed.name} would lie on balloons of "
-            f"{names} and be squeezed against the lumen; {_remedy(placed, assembled, own)}"
+            f"{len(crossing)} of {len(supply)} supply tubes of {placed.name} would lie on balloons "
+            f"of {names} and be squeezed against the lumen; {_remedy(placed, assembled, supply)}"
         )
         yield Finding("supply-tubes", "fail", 0, len(crossing), "tubes", WHOLE, message)
 
 
-def _remedy(placed: PlacedPart, assembled: Assembled, own: Sequence[SupplyRun]) -> str:
-    """The turn, in whole degrees, that keeps every tube farthest from balloons."""
+def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun]) -> str:
+    """Return the remedy: the turn, in whole degrees, with every tube farthest from balloons."""
     tube = assembled.on(placed)
     assert tube is not None
     covered = list(_covered(tube, assembled))
 
     def room(turn: int) -> float:
-        """Degrees between the nearest tube and balloon."""
+        """Return the degrees between the nearest tube and balloon."""
         return min(
-            _apart(run.angle + turn, middle) - half for run in own for _, middle, half in covered
+            _angle_between(run.angle + turn, middle) - half
+            for run in supply
+            for _, middle, half in covered
         )
 
     best = max(range(360), key=lambda turn: (round(room(turn), 6), -turn))
@@ -349,15 +356,15 @@ def _remedy(placed: PlacedPart, assembled: Assembled, own: Sequence[SupplyRun]) 
     return f"turn = {(placed.turn + best) % 360:g} leads them between"
 
 
-# Checks of the whole against its way: through an aperture, into a lumen, against the wall.
+# Ways of the whole: through an aperture, into a lumen, against its wall.
 
 
 PRESSED = 0.95 / 1.865
-"""Measured over nominal thickness of the paper's 15-balloon 3-DoF actuator (Sec. 4)."""
+"""Ratio of measured to nominal thickness of the paper's 15-balloon 3-DoF actuator (Sec. 4)."""
 
 
 class _Passage(NamedTuple):
-    """What a part needs of a hole: as nominal films add up, and as the paper's pressed ones do."""
+    """The diameter that a part needs, mm, with nominal films and films pressed as the paper's."""
 
     name: str
     nominal: float
@@ -366,10 +373,10 @@ class _Passage(NamedTuple):
 
 
 def aperture(assembled: Assembled) -> Iterator[Finding]:
-    """Whether each part passes the aperture, lobes folded and all else as it is.
+    """Check that each part passes the aperture, lobes folded and all else as it is.
 
-    Folded sizes are predicted: where only the thinner, pressed laminate passes, or the paper says
-    nothing of how a part folds, the verdict is a warning.
+    Folded sizes are predicted: where only the thinner, pressed laminate passes, or the paper gives
+    no folded size of a part, the verdict is a warning.
     """
     hole = assembled.assembly.deploy.aperture_diameter
     if hole is None:
@@ -378,7 +385,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
     worst = max(needs, key=lambda need: (need.pressed > hole, need.nominal))
     message = f"{worst.name} {worst.how} needs {worst.nominal:.2f} of the aperture's {hole:g}"
     if holds(hole, worst.nominal):
-        yield found("aperture", True, hole, worst.nominal, message)
+        yield _finding("aperture", True, hole, worst.nominal, message)
     elif holds(hole, worst.pressed):
         remedy = "try it in the aperture first"
         message = (
@@ -388,7 +395,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
         yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
     else:
         message += "; use fewer balloons, smaller chambers or a smaller part"
-        yield found("aperture", False, hole, worst.pressed, message)
+        yield _finding("aperture", False, hole, worst.pressed, message)
 
 
 def _passage(placed: PlacedPart) -> _Passage:
@@ -415,7 +422,7 @@ def _passage(placed: PlacedPart) -> _Passage:
 
 
 def _lobe_width(placed: PlacedSba) -> float | None:
-    """Width in mm of a lobe of a three-lobed actuator; None for others."""
+    """Return the width in mm of a lobe of a three-lobed actuator; None for others."""
     design = placed.made.design
     form = design.form
     if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
@@ -429,7 +436,7 @@ def _flat_diameter(placed: PlacedSba) -> float:
 
 
 def _girth(placed: PlacedPart) -> float:
-    """Diameter of the smallest round hole that a bought part passes, mm."""
+    """Return the diameter of the smallest round hole that a bought part passes, mm."""
     part = placed.part
     if isinstance(part, Tube | Line):
         return part.outer_diameter
@@ -441,7 +448,7 @@ def _girth(placed: PlacedPart) -> float:
 
 
 def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
-    """Whether the deflated assembly passes the lumen, tabs folded back with a tube in each."""
+    """Check that the deflated assembly passes the lumen, tabs folded back with a tube in each."""
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
@@ -461,7 +468,7 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
     if not good:
         message += "; make it narrower or its laminate thinner"
         message += ", or take thinner supply tubes" if how else ""
-    yield found("lumen-pass", good, lumen, widest, message)
+    yield _finding("lumen-pass", good, lumen, widest, message)
 
 
 def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
@@ -476,7 +483,7 @@ def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
 
 
 def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
-    """Whether inflated radial parts reach the lumen's wall."""
+    """Check that inflated radial parts reach the lumen's wall."""
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
@@ -491,7 +498,7 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
             f"no part expands against a lumen of {lumen:g}; add a radial design, or leave out "
             "deploy.lumen_diameter"
         )
-        yield found("lumen-brace", False, lumen, None, message)
+        yield _finding("lumen-brace", False, lumen, None, message)
         return
     widest, name = max(sizes)
     good = holds(widest, lumen)
@@ -499,62 +506,61 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
     message += f"{lumen:g}"
     if not good:
         message += "; use wider or longer chambers, more balloons or a thicker tube"
-    yield found("lumen-brace", good, lumen, widest, message)
+    yield _finding("lumen-brace", good, lumen, widest, message)
 
 
-# Parts that run into each other: solids in place, deflated, their pockets filled.
+# Collisions of solids in place, deflated, their pockets filled.
 
 
 TOUCH = 0.05
-"""mm3 of overlap up to which two parts touch: arcs are chords here."""
-NAME = "collision"
+"""Overlap in mm3 up to which two parts only touch: arcs are chords here."""
 
 
 def collision(assembled: Assembled) -> Iterator[Finding]:
-    """A finding for every two parts that share space, or one that says none do.
+    """Check that no two parts share space: a finding for each pair that does, or one for none.
 
-    What is bent round a tube lies on it by construction and is not held against it.
+    An SBA bent round a tube lies on it by construction; this pair is not compared.
     """
     surfaces = {p.name: placed_surface(p, filled=True) for p in assembled.parts}
     boxes = {name: _box(surface) for name, surface in surfaces.items()}
     solids: dict[str, Any] = {}
     worst = 0.0
-    hit = False
-    for number, one in enumerate(assembled.parts):
-        for other in assembled.parts[:number]:
-            if _lies_on(one, other) or not _meet(boxes[one.name], boxes[other.name]):
+    has_collision = False
+    for number, a in enumerate(assembled.parts):
+        for b in assembled.parts[:number]:
+            if _lies_on(a, b) or not _meet(boxes[a.name], boxes[b.name]):
                 continue
-            for name in (one.name, other.name):
+            for name in (a.name, b.name):
                 if name not in solids:
                     solids[name] = _solid(surfaces[name])
-            shared = solids[one.name] ^ solids[other.name]
+            shared = solids[a.name] ^ solids[b.name]
             volume = float(shared.volume())
             worst = max(worst, volume)
             if volume > TOUCH:
-                hit = True
-                yield _hit(one, other, volume, _box_of(shared))
-    if not hit:
+                has_collision = True
+                yield _hit(a, b, volume, _box_of(shared))
+    if not has_collision:
         message = "no two parts run into each other, deflated, at nominal film thickness"
-        yield found(NAME, True, TOUCH, worst, message, "mm3")
+        yield _finding("collision", True, TOUCH, worst, message, "mm3")
 
 
-def _hit(one: PlacedPart, other: PlacedPart, volume: float, at: NDArray[np.float64]) -> Finding:
+def _hit(a: PlacedPart, b: PlacedPart, volume: float, at: NDArray[np.float64]) -> Finding:
     x, y, z = at
-    return found(
-        NAME,
+    return _finding(
+        "collision",
         False,
         TOUCH,
         volume,
-        f"{one.name} and {other.name} share {volume:.2f} mm3 round x {x:.1f}, y {y:.1f}, "
+        f"{a.name} and {b.name} share {volume:.2f} mm3 round x {x:.1f}, y {y:.1f}, "
         f"z {z:.1f}; move one of them (along, angle, offset, turn) or make it smaller",
         "mm3",
     )
 
 
-def _lies_on(one: PlacedPart, other: PlacedPart) -> bool:
+def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
     return any(
         upper.part.at == "outside" and upper.part.on == lower.name
-        for upper, lower in ((one, other), (other, one))
+        for upper, lower in ((a, b), (b, a))
     )
 
 
@@ -588,7 +594,7 @@ def _solid(surface: Surface) -> Any:
     )
 
 
-# The checks between the parts of an assembly, as findings; each has a stable name.
+# All checks, by stable names.
 
 
 CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
@@ -606,16 +612,18 @@ CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
 AT_MOST: frozenset[CheckName] = frozenset(
     ("tube-match", "inlet-match", "collision", "aperture", "lumen-pass", "supply-tubes")
 )
-"""Checks whose limit is the most that may be measured; of all others it is the least."""
+"""Checks with an upper limit; those of all others are lower limits."""
 
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
-    """What every check finds, in their order; failures that the assembly waives say so."""
+    """Return the findings of all checks, in their order, with failures that the assembly waives."""
     rules = assembled.assembly.rules
     return tuple(
         _waived(finding) if name in rules.waive and finding.verdict == "fail" else finding
         for name, check in CHECKS.items()
-        for finding in (_against(lowered_checks(rules, name), found) for found in check(assembled))
+        for finding in (
+            _against(lowered_checks(rules, name), result) for result in check(assembled)
+        )
     )
 
 

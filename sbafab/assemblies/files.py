@@ -1,22 +1,26 @@
-"""Assembly files in and out: TOML to records, and one clear sentence if not."""
+"""Assembly files in and out: TOML to records, resolved TOML, hashes, and the entries of parts."""
 
 from __future__ import annotations
 
 import difflib
+import hashlib
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
 from sbafab.actuators import load_design, records
-from sbafab.assemblies.records import FAMILY, KINDS, AnyPart, Assembly, CheckName, Sba
+from sbafab.assemblies.build import Assembled, PlacedPart, design_source
+from sbafab.assemblies.records import KINDS, AnyPart, Assembly, CheckName
 from sbafab.design.files import (
     ASSEMBLY,
     Change,
+    actuator_sha256,
     add_waivers,
     changed_keys,
     checked,
     design_path,
-    kit_names,
+    design_sha256,
     listed,
     override,
     read_toml,
@@ -28,10 +32,22 @@ from sbafab.design.records import Design, RuleName
 from sbafab.errors import DesignError
 
 
+def load(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Design | Assembly:
+    """Return a design or an assembly, whichever the file holds. Raises DesignError."""
+    changes = list(changes)
+    path = design_path(source)
+    data = override(read_toml(path), changes)
+    if data.get("family") != ASSEMBLY:
+        return load_design(source, changes, waivers)
+    return changed_assembly(data, path, changes, waivers)
+
+
 def load_text(text: str, path: Path) -> Design | Assembly:
-    """The same from the text of a file that would lie at ``path``. Raises DesignError."""
+    """Return the design or assembly of a text as if read from ``path``. Raises DesignError."""
     data = toml_tables(text, path.name)
-    if data.get("family") == FAMILY:
+    if data.get("family") == ASSEMBLY:
         return assembly_of(data, path)
     data.setdefault("name", path.stem)
     return validated(data, records(), path.parent)
@@ -40,26 +56,27 @@ def load_text(text: str, path: Path) -> Design | Assembly:
 def load_assembly(
     source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Assembly:
-    """An assembly from a template's name or a TOML file. Raises DesignError."""
-    found = load(source, changes, waivers)
-    if isinstance(found, Assembly):
-        return found
+    """Return an assembly from a template's name or a TOML file. Raises DesignError."""
+    result = load(source, changes, waivers)
+    if isinstance(result, Assembly):
+        return result
     raise DesignError(
-        f'{found.name} is no assembly; give a file with family = "{FAMILY}" and [parts.NAME] tables'
+        f'{result.name} is no assembly; give a file with family = "{ASSEMBLY}" and [parts.NAME] '
+        "tables"
     )
 
 
 def changed_assembly(
     data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
 ) -> Assembly:
-    """The assembly of a file's tables in which the changes are made. Raises DesignError."""
+    """Return the assembly of a file's tables with the changes made. Raises DesignError."""
     _start_where_the_user_stands(data, changes)
-    known = (*get_args(RuleName), *get_args(CheckName))
-    return assembly_of(add_waivers(data, waivers, known), path)
+    names = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, names), path)
 
 
 def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
-    """The record of an assembly file's tables. Raises DesignError with one sentence."""
+    """Return the record of an assembly file's tables. Raises DesignError with one sentence."""
     tables = data.get("parts")
     if not isinstance(tables, dict) or not tables:
         raise DesignError(
@@ -85,88 +102,86 @@ def _part(name: str, table: object) -> AnyPart:
     return checked(KINDS[kind], table, {}, f"{where}.")
 
 
-def part_design(assembly: Assembly, name: str, part: Sba) -> Design:
-    """The design of an SBA part, with the part's and the assembly's own keys set.
-
-    Raises DesignError that names the part.
-    """
-    try:
-        path = design_path(_place_of(part.design, assembly.folder))
-        table = read_toml(path)
-        if table.get("family") == FAMILY:
-            raise DesignError(
-                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
-                "one actuator"
-            )
-        data = override(table, [part.set, assembly.shared])
-        data.setdefault("name", path.stem)
-        _keep_outline(data, part, assembly.folder)
-        _keep_kit(data, part, assembly)
-        own = _waivers(data)
-        rules = [r for r in assembly.rules.waive if r in _deck_names() and r not in own]
-        return validated(add_waivers(data, rules), records(), path.parent)
-    except DesignError as error:
-        raise DesignError(f"parts.{name}: {error}") from None
-
-
-def _place_of(design: str, folder: Path) -> str | Path:
-    """A bare word names a template; what looks like a path starts at the assembly's file."""
-    return folder / design if Path(design).name != design or "." in design else design
-
-
-def _waivers(data: Mapping[str, Any]) -> list[Any]:
-    """The rules that a design file's tables waive, as far as they are written as they should."""
-    rules = data.get("rules")
-    waived = rules.get("waive") if isinstance(rules, dict) else None
-    return waived if isinstance(waived, list) else []
-
-
-def _deck_names() -> frozenset[str]:
-    from sbafab.rules.deck import RULES
-
-    return frozenset(rule.name for rule in RULES)
-
-
-def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
-    """An outline that the assembly's file names lies beside that file, not beside the design."""
-    chamber = part.set.get("chamber")
-    if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
-        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
-
-
-def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
-    """Likewise a kit's file."""
-    kit = data.get("kit")
-    is_named_here = assembly.kit is not None or "kit" in part.set
-    if is_named_here and isinstance(kit, str) and kit not in kit_names():
-        data["kit"] = str((assembly.folder / kit).absolute())
-
-
 def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
-    """A design's path typed on the command line starts there, not at the assembly's file."""
+    """Resolve a design's path on the command line against the current folder."""
     for key in changed_keys(changes):
         match key.split("."):
-            case ["parts", name, "design"] if said := data["parts"][name].get("design"):
-                if isinstance(_place_of(str(said), Path()), Path):
-                    data["parts"][name]["design"] = str(Path(str(said)).absolute())
+            case ["parts", name, "design"] if source := data["parts"][name].get("design"):
+                if isinstance(design_source(str(source), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(source)).absolute())
 
 
-# Assemblies out: resolved TOML and hash.
+DESIGN_FILE = "design.toml"
 
 
-# A design or an assembly from a file, whichever it holds.
-#
-# The records of assemblies are loaded for an assembly alone: most files hold a design.
+def plain_tables(assembly: Assembly) -> dict[str, Any]:
+    """Return the assembly's own keys as tables, with every default written out."""
+    return _without_none(assembly.model_dump(mode="json"))
 
 
-def load(
-    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
-) -> Design | Assembly:
-    """A design or an assembly, whichever the file holds. Raises DesignError."""
-    changes = list(changes)
-    path = design_path(source)
-    data = override(read_toml(path), changes)
-    if data.get("family") != ASSEMBLY:
-        return load_design(source, changes, waivers)
+def resolved(assembled: Assembled) -> dict[str, Any]:
+    """The assembly with every default written out; designs are those of the parts' folders."""
+    assembly = assembled.assembly
+    table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
+    for name, part in table["parts"].items():
+        source = assembled[name].made
+        if source is not None:
+            # The folder's design holds the keys that were set, the assembly's own among them.
+            part["design"] = f"{source.design.name}/{DESIGN_FILE}"
+            del part["set"]
+    return _without_none(table)
 
-    return changed_assembly(data, path, changes, waivers)
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def assembly_toml(assembled: Assembled) -> str:
+    """Return the ``design.toml`` of an output folder; it builds the same assembly again."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(assembled))
+
+
+def assembly_sha256(assembled: Assembled) -> str:
+    """Return the hash of all inputs of the output, the designs of the parts included."""
+    table = resolved(assembled)
+    digests = {source.design.name: design_sha256(source.design) for source in assembled.designs}
+    text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def assembled_sha256(assembled: Assembled) -> str:
+    """Return the hash of the assembly itself: parts, places, glue, and the actuators among them.
+
+    Without name, order, pose of the pictures, notes and limits.
+    """
+    parts = {}
+    for name, part in resolved(assembled)["parts"].items():
+        source = assembled[name].made
+        actuator = {} if source is None else {"design": actuator_sha256(source.design)}
+        parts[name] = {**part, **actuator, "note": None}
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def part_entry(placed: PlacedPart) -> dict[str, Any]:
+    """A part and its place: turned about its own axis, bent round a radius, rows and shift."""
+    part = placed.part
+    rounded = [[round(value, 9) + 0.0 for value in row] for row in placed.pose.rows]
+    return {
+        "name": placed.name,
+        "kind": part.kind,
+        "design": None if placed.made is None else placed.made.design.name,
+        "on": part.on,
+        "at": part.at,
+        "glue": part.glue,
+        "turn": part.turn,
+        "bent_radius": placed.radius,
+        "rows": rounded,
+        "shift": [round(value, 6) + 0.0 for value in placed.pose.shift],
+    }

@@ -1,4 +1,4 @@
-"""What an assembly file asks for: parts, what each is fixed on, and what the whole must fit.
+"""Records of an assembly file: parts, joints, places that the whole must fit, and limits.
 
 Defaults are the paper's (Sec. 2.1) where it gives a figure; else ours, and the field says so.
 Lengths are mm, angles degrees.
@@ -15,7 +15,6 @@ from sbafab.design.records import NAME_PATTERN, Laser, Order, Press, RuleName, S
 from sbafab.design.section import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
-FAMILY = "assembly"
 Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
 CheckName = Literal[
     "tube-match",
@@ -35,7 +34,7 @@ Words = Annotated[str, Field(max_length=120)]
 
 
 class Fixed(Section):
-    """Where a part is fixed. The root, which all others hang on, has no ``on``."""
+    """The joint of a part. The root, which all others hang on, has no ``on``."""
 
     on: str | None = None
     """The part that this one is fixed on."""
@@ -242,18 +241,18 @@ class Assembly(Section):
 
     @property
     def folder(self) -> Path:
-        """Where relative paths of part designs start: the folder of the assembly's file."""
+        """The start of relative paths of part designs: the folder of the assembly's file."""
         return self._folder
 
     def placed(self, folder: Path) -> Self:
-        """The same assembly with relative paths starting at ``folder``."""
+        """Return the assembly with relative paths that start at ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy
 
     @property
     def shared(self) -> dict[str, Any]:
-        """The keys that are set here for every part's design."""
+        """The keys that the assembly sets for every part's design."""
         sections = {"sheets": self.sheets, "laser": self.laser, "press": self.press}
         kit = {} if self.kit is None else {"kit": self.kit}
         return kit | {

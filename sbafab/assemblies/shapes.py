@@ -1,4 +1,4 @@
-"""The solids of parts, in their own frame and in place."""
+"""Solids and colours of parts, in their own frame and in place."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ AROUND = 48
 
 
 def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The closed surface of a part in place; ``filled`` leaves out what films enclose."""
-    own = bent_surface(placed, filled)
-    return Surface(placed.pose.points(own.points), own.faces)
+    """Return the closed surface of a part in place; ``filled`` fills its pockets."""
+    surface = bent_surface(placed, filled)
+    return Surface(placed.pose.points(surface.points), surface.faces)
 
 
 def bent_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The same before its pose: turned about its own axis and bent round its tube."""
-    own = own_surface(placed, filled)
-    turned = Surface(placed.turned(own.points), own.faces)
+    """Return the surface before its pose: turned about its own axis and bent round its tube."""
+    surface = own_surface(placed, filled)
+    turned = Surface(placed.turned(surface.points), surface.faces)
     return turned if placed.radius is None else bent(turned, placed.radius)
 
 
 def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The closed surface of a part in its own frame."""
+    """Return the closed surface of a part in its own frame."""
     part = placed.part
     if isinstance(part, Cup):
         return _bell(part)
@@ -49,7 +49,7 @@ def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
 
 
 def filled_slabs(laminate: Laminate) -> list[Slab]:
-    """Films and all that lies between two of them, pockets included: what others bump into."""
+    """Return slabs of the films and the gaps between them, pockets included, for collisions."""
     slabs = [
         Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
         for layer in laminate.tpe_layers
@@ -63,7 +63,7 @@ def filled_slabs(laminate: Laminate) -> list[Slab]:
 
 
 def face(part: AnyPart) -> Region:
-    """The end face of a bought part, at its own origin."""
+    """Return the end face of a bought part, at its own origin."""
     if isinstance(part, Tube | Line):
         return _ring(part.outer_diameter, part.inner_diameter)
     if isinstance(part, Magnet):
@@ -80,7 +80,7 @@ def _ring(outer: float, inner: float) -> Region:
 
 
 def _bell(cup: Cup) -> Surface:
-    """A cup's section, counter-clockwise from its bore, turned round its axis."""
+    """A cup's surface: its section, counter-clockwise from its bore, turned round its axis."""
     import numpy as np
 
     bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
@@ -108,12 +108,12 @@ def _bell(cup: Cup) -> Surface:
     return Surface(points, np.concatenate([lower, upper]))
 
 
-# One colour a part in pictures and solids, apart from each other for the colour blind.
+# Colours of parts in pictures and solids, distinct for the colour blind.
 
 
 RGB = tuple[int, int, int]
 FILMS: tuple[RGB, ...] = ((86, 180, 233), (0, 114, 178), (240, 228, 66), (204, 121, 167))
-"""Of the assembly's designs in their order, then from the first again (Okabe and Ito's set)."""
+"""Colours of the assembly's designs in their order, repeated (Okabe and Ito's set)."""
 BOUGHT: dict[str, RGB] = {
     "tube": (190, 190, 186),
     "magnet": (66, 66, 72),
@@ -125,8 +125,8 @@ BOUGHT: dict[str, RGB] = {
 
 
 def colours(assembled: Assembled) -> dict[str, RGB]:
-    """Screen colours by part name."""
-    designs = [made.design.name for made in assembled.designs]
+    """Return screen colours by part name."""
+    designs = [source.design.name for source in assembled.designs]
     return {
         placed.name: BOUGHT[placed.part.kind]
         if placed.made is None
@@ -136,7 +136,7 @@ def colours(assembled: Assembled) -> dict[str, RGB]:
 
 
 def linear(colour: RGB) -> tuple[float, float, float]:
-    """A screen (sRGB) colour as light adds up, 0 to 1."""
+    """Return a screen (sRGB) colour in linear light, 0 to 1."""
     r, g, b = (round(_light(value / 255), 6) for value in colour)
     return r, g, b
 

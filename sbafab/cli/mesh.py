@@ -8,11 +8,10 @@ import click
 
 from sbafab.cli.exit import run_parts
 from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
+from sbafab.meshing.formats.table import CONFORMING_ENDINGS
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import Element, Symmetry
-
-FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
 
 
 def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
@@ -70,7 +69,7 @@ def _fill(
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(FORMATS),
+    type=click.Choice(CONFORMING_ENDINGS),
     multiple=True,
     help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
 )
@@ -92,5 +91,5 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
     from sbafab.runs.run import Conforming
 
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
-    conforming = Conforming(settings, formats or FORMATS)
+    conforming = Conforming(settings, formats or CONFORMING_ENDINGS)
     run_parts(request, ("mesh",), conforming=conforming)

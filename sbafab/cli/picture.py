@@ -87,7 +87,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     from sbafab.cli.printing import print_wrapped, shown_progress
     from sbafab.errors import DesignError, OutputError
     from sbafab.models.balloons import has_balloons
-    from sbafab.models.elastic import model_form, near_discs
+    from sbafab.models.drawn import model_form, near_discs
     from sbafab.models.paper import counterparts_of_pose
     from sbafab.models.stack import stack
     from sbafab.reports.inflated_picture import (

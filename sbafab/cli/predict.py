@@ -155,7 +155,7 @@ def _refuse_for_one(design: Design) -> None:
     """Raises UsageError for an option that no model of the design takes."""
     from sbafab.design.records import Drawn
     from sbafab.models.balloons import has_balloons
-    from sbafab.models.elastic import model_form
+    from sbafab.models.drawn import model_form
 
     form = model_form(design)
     of = f"and {design.name} has other ones; leave it out"

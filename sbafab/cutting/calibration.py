@@ -29,9 +29,8 @@ from sbafab.cutting.properties import coupon_properties
 from sbafab.cutting.sheets import sheet_svg
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region, rectangle
+from sbafab.geometry.region import Region, rectangle, union
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:

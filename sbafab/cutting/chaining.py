@@ -8,11 +8,18 @@ from collections.abc import Sequence
 
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import LEAST_AREA, tidy
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge, same_support
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.contour import COPIED, LEAST_AREA, Contour, Copies, between, circle, tidy
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Point,
+    edge_from_bulge,
+    meeting_points,
+    same_support,
+)
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import COPIED, Contour, Copies, Region, between, circle
+from sbafab.geometry.region import Region
 
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""

@@ -15,8 +15,9 @@ from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.dxf_write import skeleton
 from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour, Copies, circle
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs
-from sbafab.geometry.region import Contour, Copies, Region, circle
+from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

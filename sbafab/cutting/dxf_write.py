@@ -19,8 +19,8 @@ from sbafab.cutting.properties import (
     REFERENCE,
     DxfProfile,
 )
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
-from sbafab.geometry.region import Contour
 
 QUARTER = math.sqrt(2)
 """The chord of a quarter turn, in radii."""

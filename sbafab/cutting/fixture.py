@@ -12,9 +12,8 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, disc, polygon, rectangle
+from sbafab.geometry.region import Region, disc, polygon, rectangle, union
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from sbafab.cutting.properties import kerf_text
 from sbafab.errors import DesignError, GeometryError
-from sbafab.geometry.arcs import run_chords
-from sbafab.geometry.boolean import tidy
+from sbafab.geometry.contour import Contour, run_chords, tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
-from sbafab.geometry.offset import Kerf, Lost, beam_path, place_of, widths
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.offset import Kerf, Lost, beam_path, widths
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import place_of
 from sbafab.laminate.laminate import Role
 
 

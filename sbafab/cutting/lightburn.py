@@ -31,8 +31,9 @@ from sbafab.cutting.properties import (
 from sbafab.cutting.second_cut import PATH, laser_path, marks, properties_of
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
-from sbafab.geometry.region import Contour, Copies, Region, coord
+from sbafab.geometry.region import Region, coord
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.markup import quoteattr
 

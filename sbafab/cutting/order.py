@@ -7,8 +7,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 
 ORIGIN: Point = (0.0, 0.0)
 SWEEPS = 6

@@ -28,8 +28,9 @@ from sbafab.cutting.properties import (
 )
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Contour, Region, coord, path_data
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.films import Material
 from sbafab.nesting.records import Nest, Placement, Stock
 from sbafab.process import Counted

@@ -12,8 +12,9 @@ from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
 from sbafab.cutting.order import PointsLeft
 from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 
 TOLERANCE = 0.001
 """Written contours lie within this of the exact ones, in mm."""

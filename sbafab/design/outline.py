@@ -25,11 +25,10 @@ from sbafab.design.strands import (
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError, elliptical_arc, fit_arcs
 from sbafab.geometry.arrangement import split_edges
-from sbafab.geometry.boolean import tidy
-from sbafab.geometry.edges import EPSILON, Edge, Line, Point
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.contour import Contour, tidy
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import close_pairs
-from sbafab.geometry.region import Contour, Region, centroid
+from sbafab.geometry.region import Region, centroid
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

@@ -1,22 +1,22 @@
-"""Boolean operations on regions of lines and arcs, exact but for points that are made one (SAME).
+"""Boolean operations on contours of lines and arcs, exact but for points within SAME made one.
 
-Contours that meet are laid over each other; a piece stays if what is asked for lies on one side of
-it only; the pieces that stay are chained into contours. Those that meet no other stay or fall whole
-(``apart.py``). Nothing is flattened on the way.
+Contours that meet are laid over each other; a piece stays if the result lies on one side of it
+only; the pieces that stay are chained into contours. Contours that meet no other stay or fall
+whole. Nothing is flattened on the way.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from operator import lt
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from sbafab.errors import GeometryError, InconsistentError
-from sbafab.geometry.arcs import run_sweep
-from sbafab.geometry.arrangement import DIGIT, Arrangement, by_owner, overlaid, overlay
-from sbafab.geometry.cache import MOST, cached, stored
+from sbafab.geometry.arrangement import Arrangement, overlaid, overlay
+from sbafab.geometry.cache import stored
+from sbafab.geometry.contour import LEAST_AREA, Contour, in_reading_order, tidy
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -24,183 +24,82 @@ from sbafab.geometry.edges import (
     Edge,
     Line,
     Point,
-    distance_to,
     from_end_to_end,
-    left_normal,
-    quarter_arcs,
+    meeting_points,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Contour, Region, circle
 
-Found = TypeVar("Found")
-WantedTurns = Callable[[int], bool]
-"""Whether a place belongs to a region, from how often chains wind round it."""
+Result = TypeVar("Result")
+Membership = Callable[[int], bool]
+"""True if a place belongs to a region, from the winding number of the chains there."""
+CountedContour = tuple[Contour, int]
+"""A contour, and how many times it counts."""
 
-WAYS = (1, 4, 16, 64)
-"""With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
-quarter of a micrometre are one.
+TOLERANCES = (1, 4, 16, 64)
+"""Multiples of EPSILON with which edges are cut where they meet, tried in turn; with the last,
+points within a quarter of a micrometre are one.
 """
 
 
-def union(regions: Iterable[Region]) -> Region:
-    solid = [region for region in regions if not region.is_empty]
-    if len(solid) < 2:
-        return solid[0] if solid else Region()
-    return _union(*solid)
-
-
-@cached
-def _union(*regions: Region) -> Region:
-    return enclosed([contour for region in regions for contour in region.contours])
-
-
-def intersection(a: Region, b: Region) -> Region:
-    if a.is_empty or b.is_empty:
-        return Region()
-    return _intersection(a, b)
-
-
-@cached
-def _intersection(a: Region, b: Region) -> Region:
-    return enclosed([*a.contours, *b.contours], 1)
-
-
-def difference(a: Region, b: Region) -> Region:
-    if a.is_empty or b.is_empty:
-        return a
-    return _difference(a, b)
-
-
-@cached
-def _difference(a: Region, b: Region) -> Region:
-    own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
-    (found,) = _enclosed([*own, *other], [_more_than(0)])
-    return found
-
-
-def divided(region: Region, by: Region) -> tuple[Region, Region]:
-    """What of a region lies outside another, and what inside: ``region - by`` and ``region & by``.
-
-    Both come of one arrangement.
-    """
-    if region.is_empty or by.is_empty:
-        return region, Region()
-    return _divided(region, by)
-
-
-@cached
-def _divided(region: Region, by: Region) -> tuple[Region, Region]:
-    own, other = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in by.contours)
-    outside, inside = _enclosed([*own, *other], [_is_outside, _is_inside])
-    return outside, inside
-
-
-@lru_cache(maxsize=MOST)
-def _is_outside(turns: int) -> bool:
-    """Whether the first of two regions is there alone."""
-    own, other = by_owner(turns, 2)
-    return own > 0 >= other
-
-
-@lru_cache(maxsize=MOST)
-def _is_inside(turns: int) -> bool:
-    """Whether both of two regions are there."""
-    own, other = by_owner(turns, 2)
-    return own > 0 and other > 0
-
-
-def _more_than(turns: int) -> WantedTurns:
-    """Wanted is what chains wind round more often than so."""
+def more_than(turns: int) -> Membership:
+    """Membership of places that chains wind round more than so many times."""
     return partial(lt, turns)
 
 
-def wound(edges: Sequence[Edge], above: int) -> Region:
-    """The points that closed chains of edges wind round more than ``above`` times.
+def combined(
+    contours: Iterable[CountedContour], memberships: Sequence[Membership]
+) -> list[tuple[Contour, ...]]:
+    """Return the contours of a region for each membership, in reading order.
 
-    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    Raises GeometryError where no tolerance gives one answer.
     """
-    return arranged([edges], partial(_wound, above))
-
-
-def _wound(above: int, found: Arrangement) -> Region:
-    return _region(_loops(found, _more_than(above)))
-
-
-def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
-    """The same for contours, each a closed chain by itself."""
-    (found,) = _enclosed([(contour, 1) for contour in contours], [_more_than(above)])
-    return found
-
-
-def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Region]:
-    """The regions of the places that are wanted, from how often chains wind round them."""
-    found: list[list[Contour]] = [[] for _ in wanted]
-    for group in grouped(chains_of(chains)):
+    results: list[list[Contour]] = [[] for _ in memberships]
+    for group in grouped(chains_of(contours)):
         if group.is_alone:
-            own = [_whole(group.chains[0], group.outside, is_in) for is_in in wanted]
+            parts = [_whole(group.chains[0], group.outside, is_in) for is_in in memberships]
         else:
-            own = _cut(group, wanted)
-        for contours, more in zip(found, own, strict=True):
-            contours.extend(more)
-    return [Region(in_reading_order(contours)) for contours in found]
+            parts = _in_some_way(partial(_cut, group, memberships))
+        for result, part in zip(results, parts, strict=True):
+            result.extend(part)
+    return [in_reading_order(result) for result in results]
 
 
-def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
+def _whole(chain: ClosedChain, outside: int, is_in: Membership) -> list[Contour]:
     """A chain that nothing meets, with the material on its left; nothing if it bounds none."""
     contour = chain.contour
     inside = outside + (-chain.turns if contour.is_hole else chain.turns)
-    if wanted(inside) == wanted(outside):
+    if is_in(inside) == is_in(outside):
         return []
-    return [contour if wanted(outside) == contour.is_hole else turned_round(contour)]
+    return [contour if is_in(outside) == contour.is_hole else turned_round(contour)]
 
 
-def _cut(group: ChainGroup, wanted: Sequence[WantedTurns]) -> list[list[Contour]]:
-    """The contours of each region, where chains meet each other."""
-    return _in_some_way(partial(_cut_with, group, wanted))
-
-
-def _cut_with(
-    group: ChainGroup, wanted: Sequence[WantedTurns], tolerance: float
+def _cut(
+    group: ChainGroup, memberships: Sequence[Membership], tolerance: float
 ) -> list[list[Contour]]:
-    found = Arrangement(overlay(group.edges, tolerance, group.clear))
-    return [_contours(_loops(found, is_in, group.outside)) for is_in in wanted]
+    """The contours of each region, where chains meet each other."""
+    arrangement = Arrangement(overlay(group.edges, tolerance, group.clear))
+    return [bounding(arrangement, is_in, group.outside) for is_in in memberships]
 
 
-def _loops(found: Arrangement, wanted: WantedTurns, outside: int = 0) -> Iterable[Sequence[Edge]]:
-    """Loops round what is wanted, where other chains wind so often round all of it."""
-    return found.loops(
-        found.edging({turns for turns in set(found.left) if wanted(turns + outside)})
-    )
+def bounding(arrangement: Arrangement, is_in: Membership, outside: int = 0) -> list[Contour]:
+    """Contours round the faces of a membership, all of which lie inside ``outside`` more turns."""
+    turns = {turns for turns in set(arrangement.left) if is_in(turns + outside)}
+    loops = map(tidy, arrangement.loops(arrangement.edging(turns)))
+    return [settled(contour) for contour in loops if contour is not None]
 
 
-def _contours(loops: Iterable[Sequence[Edge]]) -> list[Contour]:
-    return [settled(contour) for contour in map(tidy, loops) if contour is not None]
+def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Result]) -> Result:
+    """Return ``read`` of the closed chains of edges of all owners, laid over each other.
 
-
-def _region(loops: Iterable[Sequence[Edge]]) -> Region:
-    """The region inside closed chains that meet nowhere."""
-    return Region(in_reading_order(_contours(loops)))
-
-
-def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
-    """What is read from the closed chains of edges of all owners, laid over each other.
-
-    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    Raises GeometryError where no tolerance gives one answer.
     """
-    return _in_some_way(partial(_arranged_with, owners, read))
+    return _in_some_way(lambda tolerance: read(Arrangement(overlaid(owners, tolerance))))
 
 
-def _arranged_with(
-    owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found], tolerance: float
-) -> Found:
-    return read(Arrangement(overlaid(owners, tolerance)))
-
-
-def _in_some_way(read: Callable[[float], Found]) -> Found:
-    """What is read where edges are cut with a tolerance, the finest that gives one answer."""
+def _in_some_way(read: Callable[[float], Result]) -> Result:
+    """Return ``read`` of the finest tolerance for cutting edges that gives one answer."""
     place: Point | None = None
-    for coarser in WAYS:
+    for coarser in TOLERANCES:
         try:
             return read(coarser * EPSILON)
         except InconsistentError as fault:
@@ -212,25 +111,22 @@ def _in_some_way(read: Callable[[float], Found]) -> Found:
     )
 
 
-# Closed chains of edges told apart: which of them meet, and which lie inside which.
+# Groups of closed chains that meet, and their nesting.
 #
 # Bores, lumens and outlines one inside the other make most of a laminate. Chains that stay clear
-# of all others are not cut and need no arrangement: how often the others wind round one of their
-# points says what lies on both sides of them.
+# of all others are not cut and need no arrangement: the winding number of the others round one of
+# their points gives those on both sides.
 
 
-FAR: Final = 1e-3
-"""mm: chains that stay so far from each other are not cut, however coarsely points are made one."""
-
-Wound = tuple[Contour, int]
-"""A closed chain of edges, and how often it counts."""
+FAR = 1e-3
+"""mm: chains that stay so far from each other are not cut, at any tolerance."""
 
 
 class ClosedChain:
-    """A closed chain, and how often it and its twins count together.
+    """A closed chain, and how many times it and its twins count together.
 
-    ``drawn`` is the first of them; ``contour`` is what a boolean leaves of it where nothing meets
-    it, if it is ``alone``: where it stays clear of itself.
+    ``drawn`` is the first of them; ``contour`` is its tidy form if it is ``alone``, which means
+    that it stays clear of itself.
     """
 
     __slots__ = ("alone", "circle", "contour", "drawn", "start", "turns")
@@ -244,42 +140,42 @@ class ClosedChain:
         self.turns = turns
         self.start: Point = self.contour.edges[0].start
 
-    def turns_round(self, other: ClosedChain) -> int:
-        """How often its contour winds round another chain that it stays clear of."""
+    def turns_round(self, chain: ClosedChain) -> int:
+        """Winding number of the contour round another chain that it stays clear of."""
         if self.circle is None:
-            return self.contour.winding(other.start)
+            return self.contour.winding(chain.start)
         (centre, radius) = self.circle
-        if math.dist(centre, other.start) > radius:
+        if math.dist(centre, chain.start) > radius:
             return 0
         return -1 if self.contour.is_hole else 1
 
 
-def chains_of(wound: Iterable[Wound]) -> list[ClosedChain]:
+def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
     """Chains in the order of their first, those that run along the same edges as one.
 
-    What cancels out is left out.
+    Chains that cancel out are left out.
     """
-    found: list[ClosedChain] = []
+    chains: list[ClosedChain] = []
     circles: dict[tuple[Point, float], ClosedChain] = {}
-    others: dict[Edge, list[ClosedChain]] = {}
-    for contour, turns in wound:
+    by_edge: dict[Edge, list[ClosedChain]] = {}
+    for contour, turns in contours:
         chain = ClosedChain(contour, turns)
         if chain.circle is not None:
             twin = circles.setdefault(chain.circle, chain)
             if twin is not chain:
-                alike = twin.contour.is_hole == chain.contour.is_hole
-                twin.turns += turns if alike else -turns
+                same_way = twin.contour.is_hole == chain.contour.is_hole
+                twin.turns += turns if same_way else -turns
                 continue
         elif chain.alone:
             edges = chain.contour.edges
-            filed = others.setdefault(edges[0], [])
-            known = next((one for one in filed if one.contour.edges == edges), None)
-            if known is not None:
-                known.turns += turns
+            candidates = by_edge.setdefault(edges[0], [])
+            equal = next((first for first in candidates if first.contour.edges == edges), None)
+            if equal is not None:
+                equal.turns += turns
                 continue
-            filed.append(chain)
-        found.append(chain)
-    return [chain for chain in found if chain.turns]
+            candidates.append(chain)
+        chains.append(chain)
+    return [chain for chain in chains if chain.turns]
 
 
 class ChainGroup:
@@ -296,12 +192,12 @@ class ChainGroup:
 
     @property
     def is_alone(self) -> bool:
-        """Whether it is one chain that meets nothing."""
+        """True if it is one chain that meets nothing."""
         return len(self.chains) == 1 and self.chains[0].alone
 
     @property
     def edges(self) -> list[tuple[Edge, int]]:
-        """The edges of all its chains, and how often each counts."""
+        """The edges of all its chains, and how many times each counts."""
         return [(edge, chain.turns) for chain in self.chains for edge in chain.drawn.edges]
 
     @property
@@ -318,40 +214,39 @@ def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:
     """Chains by groups that stay clear of each other."""
     count = len(chains)
     home = list(range(count))
-    round_it: list[dict[int, int]] = [{} for _ in range(count)]
+    windings: list[dict[int, int]] = [{} for _ in range(count)]
+    """For each chain, the winding numbers of others round it."""
     boxes = [chain.contour.bounds for chain in chains]
     for j in range(count):
-        left, low, right, high = widened(boxes[j], FAR)
+        low_x, low_y, high_x, high_y = widened(boxes[j], FAR)
         for i in range(j):
-            box = boxes[i]
-            if box[0] > right or box[2] < left or box[1] > high or box[3] < low:
+            a, b = boxes[i], boxes[j]
+            if a[0] > high_x or a[2] < low_x or a[1] > high_y or a[3] < low_y:
                 continue
             if _meet(chains[i], chains[j]):
                 first, second = sorted((_home(home, i), _home(home, j)))
                 home[second] = first
-                continue
-            own = boxes[j]
-            if box[0] <= own[0] and box[1] <= own[1] and box[2] >= own[2] and box[3] >= own[3]:
-                round_it[j][i] = chains[i].turns_round(chains[j])
+            elif a[0] <= b[0] and a[1] <= b[1] and a[2] >= b[2] and a[3] >= b[3]:
+                windings[j][i] = chains[i].turns_round(chains[j])
             else:
-                round_it[i][j] = chains[j].turns_round(chains[i])
+                windings[i][j] = chains[j].turns_round(chains[i])
     members: dict[int, list[int]] = {}
     for i in range(count):
         members.setdefault(_home(home, i), []).append(i)
     groups: list[ChainGroup] = []
-    for leader, together in members.items():
+    for leader, numbers in members.items():
         outside = {
             sum(
                 chains[i].turns * turns
-                for i, turns in round_it[one].items()
+                for i, turns in windings[number].items()
                 if _home(home, i) != leader
             )
-            for one in together
+            for number in numbers
         }
         if len(outside) > 1:
-            # One that meets none of them winds round some of a group only.
+            # A chain that meets none of them winds round some of a group only.
             return [ChainGroup(list(chains), 0)]
-        groups.append(ChainGroup([chains[one] for one in together], outside.pop()))
+        groups.append(ChainGroup([chains[number] for number in numbers], outside.pop()))
     return groups
 
 
@@ -362,36 +257,35 @@ def _home(home: list[int], number: int) -> int:
 
 
 def _meet(a: ClosedChain, b: ClosedChain) -> bool:
-    """Whether two chains may come within FAR of each other."""
+    """Return True if two chains may come within FAR of each other."""
     if a.circle is not None and b.circle is not None:
-        one, r = a.circle
-        other, s = b.circle
-        gap = math.dist(one, other)
+        (p, r), (q, s) = a.circle, b.circle
+        gap = math.dist(p, q)
         return not max(gap - r - s, abs(r - s) - gap) > FAR
     edges, boxes = b.contour.edges, b.contour.boxes
     low_x, low_y, high_x, high_y = widened(b.contour.bounds, FAR)
-    for edge, own in zip(a.contour.edges, a.contour.boxes, strict=True):
-        if own[0] > high_x or own[2] < low_x or own[1] > high_y or own[3] < low_y:
+    for edge, box in zip(a.contour.edges, a.contour.boxes, strict=True):
+        if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
             continue
-        if not _clear_of_all(edge, own, edges, boxes):
+        if not _clear_of_all(edge, box, edges, boxes):
             return True
     return False
 
 
 def _clear_of_all(
-    edge: Edge, box: Bounds, others: tuple[Edge, ...], boxes: tuple[Bounds, ...]
+    edge: Edge, box: Bounds, obstacles: tuple[Edge, ...], boxes: tuple[Bounds, ...]
 ) -> bool:
-    """Whether an edge surely stays farther than FAR from all others."""
-    left, low, right, high = widened(box, FAR)
-    for other, own in zip(others, boxes, strict=True):
-        meets = own[0] <= right and own[2] >= left and own[1] <= high and own[3] >= low
-        if meets and not _clear(edge, other):
+    """Return True if an edge surely stays farther than FAR from all obstacles."""
+    low_x, low_y, high_x, high_y = widened(box, FAR)
+    for obstacle, b in zip(obstacles, boxes, strict=True):
+        meets = b[0] <= high_x and b[2] >= low_x and b[1] <= high_y and b[3] >= low_y
+        if meets and not _clear(edge, obstacle):
             return False
     return True
 
 
 def _clear(a: Edge, b: Edge) -> bool:
-    """Whether two edges surely stay farther than FAR from each other."""
+    """Return True if two edges surely stay farther than FAR from each other."""
     if isinstance(a, Arc):
         if isinstance(b, Arc):
             gap = math.dist(a.centre, b.centre)
@@ -406,41 +300,41 @@ def _clear(a: Edge, b: Edge) -> bool:
 
 
 def _clear_of_circle(line: Line, arc: Arc) -> bool:
-    """Whether a line keeps clear of an arc's whole circle, outside or inside."""
+    """Return True if a line keeps clear of an arc's whole circle, outside or inside."""
     if abs(line.to_left(arc.centre)) > arc.radius + FAR:
         return True
     return line.farthest_from(arc.centre) < arc.radius - FAR
 
 
 def alone(contour: Contour) -> Contour | None:
-    """What a boolean leaves of a contour that no other meets; None where it may meet itself."""
-    known = contour.__dict__
-    if "alone" not in known:
-        found = tidy(contour.edges) if _keeps_clear(contour) else None
-        # No contour is kept within itself, or it would outlive its last use.
-        known["alone"] = found is not None and (found.edges == contour.edges or found)
-        if found is not None:
-            found.__dict__["alone"] = True
-    whole: Contour | bool = known["alone"]
+    """The tidy form of a contour that stays clear of itself; None where it may meet itself."""
+    values = contour.__dict__
+    if "alone" not in values:
+        form = tidy(contour.edges) if _keeps_clear(contour) else None
+        # No contour is stored within itself, or it would outlive its last use.
+        values["alone"] = form is not None and (form.edges == contour.edges or form)
+        if form is not None:
+            form.__dict__["alone"] = True
+    whole: Contour | bool = values["alone"]
     if isinstance(whole, bool):
         return contour if whole else None
     return whole
 
 
 def settled(contour: Contour) -> Contour:
-    """A contour that has been cut where it meets others or itself, and needs not be once more."""
+    """Mark a contour as staying clear of itself: it has been cut where it met edges."""
     contour.__dict__["alone"] = True
     return contour
 
 
 def meets_itself(contour: Contour) -> Contour:
-    """A contour that is known to come near itself, so that nobody looks."""
+    """Mark a contour that comes near itself, so that ``alone`` need not look."""
     contour.__dict__["alone"] = False
     return contour
 
 
 def turned_round(contour: Contour) -> Contour:
-    """What a boolean leaves of a contour that is alone where the material is on its other side."""
+    """The tidy form of a contour that is alone, with the material on its other side."""
     return stored(contour, "turned_round", _turned)
 
 
@@ -452,7 +346,7 @@ def _turned(contour: Contour) -> Contour:
 
 
 def _keeps_clear(contour: Contour) -> bool:
-    """Whether no edges of a contour come within FAR of each other but where one follows another."""
+    """Return True if only edges that follow each other come within FAR of each other."""
     edges, count = contour.edges, len(contour.edges)
     least = max(LEAST_AREA, FAR * contour.length)
     if abs(contour.area) < least or any(from_end_to_end(edge) is not edge for edge in edges):
@@ -480,87 +374,4 @@ def _keeps_clear(contour: Contour) -> bool:
 # Contours as booleans hand them out: edges of one support joined, dust left out.
 
 
-LEAST_AREA = 1e-7
-"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON, as
-they are on average where no place in them is ROOM wide.
-"""
-ROOM = 50 * EPSILON
-"""mm: a tenth of a micrometre."""
-QUARTER = math.pi / 2
-NANOMETRE = 1e-6
-"""mm."""
-
-
-def tidy(loop: Sequence[Edge]) -> Contour | None:
-    """One contour with edges of one support joined and arcs of at most a quarter turn."""
-    contour = Contour(tuple(loop))
-    if abs(contour.area) < LEAST_AREA:
-        return None
-    if abs(contour.area) < 2 * EPSILON * contour.length and not _has_room(contour):
-        return None
-    if contour.circle is not None:
-        whole = circle(*contour.circle)
-        return whole if contour.area > 0 else whole.reversed()
-    edges = [edge for run in contour.runs for edge in _joined(run)]
-    first = _first_edge(edges)
-    return Contour((*edges[first:], *edges[:first]))
-
-
-def _has_room(contour: Contour) -> bool:
-    """Whether there is a place in a contour of hardly any width, beside an edge, that is ROOM wide.
-
-    A long sliver would hide it in its average.
-    """
-    into = -ROOM / 2 if contour.area < 0 else ROOM / 2
-    for edge in contour.edges:
-        if edge.length < ROOM:
-            continue
-        for share in (0.25, 0.5, 0.75):
-            x, y = edge.at(share)
-            nx, ny = left_normal(edge, (x, y))
-            p = (x + into * nx, y + into * ny)
-            if contour.winding(p) and all(
-                distance_to(other, p) > 0.99 * ROOM / 2 for other in contour.edges
-            ):
-                return True
-    return False
-
-
-def _first_edge(edges: Sequence[Edge]) -> int:
-    """The first edge of those that start at the least x, and of these at the least y, to 1 nm."""
-    left = min([edge.start[0] for edge in edges]) + 2 * NANOMETRE
-    found, least = 0, (math.inf, math.inf)
-    for i, edge in enumerate(edges):
-        x, y = edge.start
-        # What lies farther to the right is not rounded to the least x.
-        if x <= left and (place := (nanometres(x), nanometres(y))) < least:
-            found, least = i, place
-    return found
-
-
-def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
-    head, end = run[0], run[-1].end
-    if isinstance(head, Line):
-        return [Line(head.start, end)]
-    if len(run) == 1 and 0 < (head.sweep if head.ccw else -head.sweep) < QUARTER:
-        return run
-    return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))
-
-
 # Coordinates in whole nanometres: shapes that differ by a hair come in one order.
-
-
-def nanometres(value: float) -> int:
-    """The whole nanometres nearest to so many mm."""
-    return math.floor(value * 1e6 + 0.5)
-
-
-def in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
-    """Outer contours, then holes, each from left to right."""
-    # Most regions have one or two.
-    return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
-
-
-def _reading_order(contour: Contour) -> tuple[bool, int, int, int]:
-    low_x, low_y, high_x, _ = contour.bounds
-    return contour.is_hole, nanometres(low_x), nanometres(low_y), nanometres(high_x)

@@ -1,4 +1,4 @@
-"""Values kept once computed: attributes of records, values of contours, results of functions."""
+"""Caches: attributes of records, values stored in contours, results of functions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Arguments = ParamSpec("Arguments")
 Several = TypeVar("Several", bound=tuple[object, ...])
 
 MOST = 256
-"""Results that a function keeps; this bounds the memory over any number of designs."""
+"""Results that a function's cache holds, which bounds the memory over any number of designs."""
 
 
 class cached_attribute(Generic[Value]):  # noqa: N801
@@ -60,7 +60,7 @@ class Exact:
         raise NotImplementedError
 
     def is_exactly(self, other: object) -> bool:
-        """Whether the other record holds the very same numbers."""
+        """Return True if the other record holds exactly the same numbers."""
         raise NotImplementedError
 
 
@@ -88,16 +88,16 @@ def _hash(value: object) -> int:
     return hash(value)
 
 
-def _are_same(values: tuple[object, ...], others: tuple[object, ...]) -> bool:
-    return len(values) == len(others) and all(map(_is_same, values, others))
+def _are_same(a: tuple[object, ...], b: tuple[object, ...]) -> bool:
+    return len(a) == len(b) and all(map(_is_same, a, b))
 
 
-def _is_same(value: object, other: object) -> bool:
-    if isinstance(value, Exact):
-        return value.is_exactly(other)
-    if isinstance(value, tuple) and value and isinstance(value[0], Exact):
-        return isinstance(other, tuple) and _are_same(value, other)
-    return value == other
+def _is_same(a: object, b: object) -> bool:
+    if isinstance(a, Exact):
+        return a.is_exactly(b)
+    if isinstance(a, tuple) and a and isinstance(a[0], Exact):
+        return isinstance(b, tuple) and _are_same(a, b)
+    return a == b
 
 
 class _Results(Generic[Value]):
@@ -116,10 +116,10 @@ class _Results(Generic[Value]):
 
 
 def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[Arguments, Value]:
-    """Return the function with its last ``most`` results kept.
+    """Return the function with a cache of its last ``most`` results.
 
-    Arguments are regions, tuples of them, and other values that hash. A result is returned again,
-    and so must not be changed.
+    Arguments are regions, tuples of them, and other values that hash. A result is shared between
+    calls and must not be changed.
     """
     results: _Results[tuple[Value]] = _Results(most)
     by_key = results.by_key
@@ -139,9 +139,9 @@ def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[A
 def cached_batch(
     function: Callable[[list[Several]], Sequence[Value]], most: int = MOST
 ) -> Callable[[Sequence[Several]], list[Value]]:
-    """Return a function of many argument tuples at once, with its last ``most`` results kept.
+    """Return a function of many argument tuples at once with a cache of its last ``most`` results.
 
-    Only tuples without a kept result are passed on, all together. Results must not be changed.
+    Only tuples that are not in the cache are passed on, all together. Results must not be changed.
     """
     results: _Results[Value] = _Results(most)
     by_key = results.by_key

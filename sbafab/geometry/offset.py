@@ -1,4 +1,4 @@
-"""Growing and shrinking regions by a distance, arcs staying arcs."""
+"""Offsets of regions that keep arcs as arcs: growing and shrinking, and the path of a beam."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Literal, NamedTuple
 
 from sbafab.errors import GeometryError
 from sbafab.geometry.arcs import biarc, ellipse
-from sbafab.geometry.boolean import FAR, alone, enclosed, meets_itself, wound
+from sbafab.geometry.boolean import FAR, alone, meets_itself
 from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import (
     EPSILON,
     Arc,
@@ -21,11 +22,10 @@ from sbafab.geometry.edges import (
     distance_to,
     edge_from_bulge,
     left_turn,
+    meeting_points,
 )
-from sbafab.geometry.intersect import meeting_points
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
-from sbafab.geometry.region import Contour, Region, circle
-from sbafab.geometry.width import least_gap
+from sbafab.geometry.region import Region, enclosed, wound
 
 CUSP = 3.0
 """Radians: a path that turns by more is taken to turn back on itself."""
@@ -47,7 +47,7 @@ def _grown(region: Region, distance: float) -> Region:
 
 
 def shrink(region: Region, distance: float) -> Region:
-    """The points at least ``distance`` inside the region."""
+    """Return the points at least ``distance`` inside the region."""
     if distance < 0:
         return grow(region, -distance)
     if distance < EPSILON or region.is_empty:
@@ -57,19 +57,19 @@ def shrink(region: Region, distance: float) -> Region:
 
 @cached
 def _shrunk(region: Region, distance: float) -> Region:
-    # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
+    # The outside grows: its winding number is 0 or more, that of the remaining material -1.
     outside = [contour.reversed() for contour in region.contours]
     chains = [_chain(contour, distance) for contour in outside]
     return enclosed([chain.reversed() for chain in chains if chain.edges])
 
 
 def fillet(region: Region, radius: float) -> Region:
-    """The region with every concave corner rounded to ``radius``, gaps narrower filled."""
+    """Return the region with concave corners rounded to ``radius`` and narrower gaps filled."""
     return shrink(grow(region, radius), radius)
 
 
 def _chain(contour: Contour, distance: float) -> Contour:
-    """A closed chain that winds round what the contour does, and the bands beside its edges."""
+    """A closed chain that winds round the contour's inside and the bands beside its edges."""
     if contour.circle is not None and alone(contour):
         centre, radius = contour.circle
         radius += -distance if contour.is_hole else distance
@@ -83,7 +83,7 @@ def _chain(contour: Contour, distance: float) -> Contour:
 
 
 def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
-    """The edges, those that follow each other but for a rounding by way of one point."""
+    """Yield the edges with ends that differ by a rounding made one point."""
     starts = [edge.start for edge in edges]
     for i, start in enumerate(starts):
         end = edges[i - 1].end
@@ -95,7 +95,7 @@ def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
 
 
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
-    """The edges of such a chain.
+    """Yield the edges of such a chain.
 
     The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
     round one by one, by way of the corner, or straight on where both cover the difference.
@@ -122,7 +122,7 @@ def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
 
 
 def _both_cover(before: Edge, after: Edge, distance: float) -> bool:
-    """Whether the bands of two lines both hold the triangle of a corner and the ends beside it."""
+    """True if the bands of two lines both hold the triangle of a corner and the ends beside it."""
     if not (isinstance(before, Line) and isinstance(after, Line)):
         return False
     turn = left_turn(before, after)
@@ -159,7 +159,7 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
         yield Arc(start, end, (x, y), distance, True)
 
 
-# What the middle of a beam follows: tracks known in closed form, their crossings, arcs on them.
+# Tracks of a beam's middle in closed form, their crossings, and arcs along them.
 
 
 TOLERANCE = 0.0001
@@ -167,10 +167,10 @@ TOLERANCE = 0.0001
 STEP, CORNER_STEP = math.radians(15), math.radians(30)
 """Most that one arc turns along a curve, and round a corner."""
 LEAST_ARCS = 3
-"""So many arcs follow every curve: four points tell the circle it was, when the kerf is undone."""
+"""Fewest arcs of a curve: four points identify its circle when the kerf is undone."""
 SHORT = 1e-3
 SHARES = tuple(0.75**k for k in range(16, 0, -1))
-"""Shares of two tracks from whose ends on they are looked at for a crossing."""
+"""Shares of two tracks from whose ends a crossing is searched."""
 
 
 def rim(a: float, b: float, angle: float) -> Point:
@@ -181,9 +181,9 @@ def rim(a: float, b: float, angle: float) -> Point:
 
 
 class Track(NamedTuple):
-    """What the beam follows: an arc of ``turn`` times ``radius`` (0: a corner), or a straight edge.
+    """The source of a piece of path: an arc of ``turn`` times ``radius`` (0: a corner), or a line.
 
-    Its points are parameters of the outward normal's angle; of the straight edge's length.
+    The parameter is the angle of the outward normal; along a line, the length.
     """
 
     beam: tuple[float, float]
@@ -202,7 +202,7 @@ class Track(NamedTuple):
         return cx + r * math.cos(t) + ex, cy + r * math.sin(t) + ey
 
     def bend(self, t: float) -> float:
-        """Radius of curvature, positive to the left of the normal's turn: source and rim added."""
+        """Radius of curvature of source and rim, positive to the left of the normal's turn."""
         a, b = self.beam
         rim_bend = (a * b) ** 2 / math.hypot(a * math.cos(t), b * math.sin(t)) ** 3
         return self.turn * self.radius + rim_bend
@@ -214,18 +214,18 @@ class Track(NamedTuple):
         return -bend * math.sin(t), bend * math.cos(t)
 
     def runs_on(self, t: float) -> bool:
-        """Whether the beam moves on there; it moves back in a hollow narrower than its rim."""
+        """True if the beam moves forward; in a hollow narrower than its rim it moves back."""
         return self.turn >= 0 or self.bend(t) < 0
 
 
 def crossing(
-    one: tuple[Track, float, float], other: tuple[Track, float, float]
+    arriving: tuple[Track, float, float], leaving: tuple[Track, float, float]
 ) -> tuple[float, float]:
-    """The parameters at which a track that ends meets one that starts.
+    """Return the parameters at which a track that ends meets one that starts.
 
-    Looked for from there, and where the beam moves back there, from farther away.
+    Searched from there, and where the beam moves back there, from farther away.
     """
-    (before, far, end), (after, start, on) = one, other
+    (before, far, end), (after, start, on) = arriving, leaving
     if before.runs_on(end) and after.runs_on(start):
         if math.dist(before.at(end), after.at(start)) < 2 * EPSILON:
             return end, start
@@ -244,16 +244,16 @@ def crossing(
     return end, start
 
 
-def _met(one: Track, s: float, other: Track, t: float) -> tuple[float, float] | None:
-    """The parameters at which two tracks cross, both running on, from near ones by Newton."""
+def _met(before: Track, s: float, after: Track, t: float) -> tuple[float, float] | None:
+    """The parameters at which two forward tracks cross, by Newton's method from near ones."""
     first = s, t
     for _ in range(8):
-        (x, y), (u, v) = one.at(s), other.at(t)
+        (x, y), (u, v) = before.at(s), after.at(t)
         if max(abs(s - first[0]), abs(t - first[1])) > 0.5:
             return None
         if math.hypot(u - x, v - y) < 1e-10:
-            return (s, t) if one.runs_on(s) and other.runs_on(t) else None
-        (px, py), (qx, qy) = one.rate(s), other.rate(t)
+            return (s, t) if before.runs_on(s) and after.runs_on(t) else None
+        (px, py), (qx, qy) = before.rate(s), after.rate(t)
         det = px * qy - py * qx
         if abs(det) < 1e-3 * math.hypot(px, py) * math.hypot(qx, qy):
             return None
@@ -263,7 +263,7 @@ def _met(one: Track, s: float, other: Track, t: float) -> tuple[float, float] | 
 
 
 def arcs_along(track: Track, t0: float, t1: float) -> list[Edge]:
-    """Arcs through points of the track, as many as keep within the tolerance."""
+    """Return arcs through points of the track, as many as keep within the tolerance."""
     step, tolerance = (STEP, TOLERANCE) if track.radius else (CORNER_STEP, TOLERANCE / 10)
     count = max(1, math.ceil(abs(t1 - t0) / step - 1e-9))
     if track.radius * abs(t1 - t0) > SHORT:
@@ -297,7 +297,7 @@ def through(
 
 
 def _through(start: Point, middle: Point, end: Point) -> Edge:
-    """The arc from start through a point half way to the end."""
+    """Return the arc from start to end through a point half way."""
     (ax, ay), (bx, by) = (
         (middle[0] - start[0], middle[1] - start[1]),
         (end[0] - middle[0], end[1] - middle[1]),
@@ -320,7 +320,7 @@ Kerf = float | tuple[float, float]
 Fate = Literal["vanishes", "splits in parts", "runs into another"]
 
 FINE = 0.00005
-"""Farthest a stretched arc may lie off, mm: it tells where the pieces of the path end."""
+"""Farthest a stretched arc may lie off, mm; its error shifts the ends of the path's pieces."""
 SHORTEST = 4 * EPSILON
 """An arc shorter than this is stretched as a line."""
 STRETCHED_STEP, MOST_PIECES = math.radians(30), 1000
@@ -330,12 +330,10 @@ SMOOTH = 1e-3
 PROJECTIONS, BEND = 3, 0.01
 """Steps to the point of a track nearest to another; its radius (mm) where its way counts as much.
 """
-SHARP = 15.0
-"""Degrees: notches sharper than this are no slots."""
 
 
 class Lost(NamedTuple):
-    """A contour that the path does not follow once, and why."""
+    """A contour that the path does not follow exactly once, and the reason."""
 
     contour: Contour
     fate: Fate
@@ -343,7 +341,7 @@ class Lost(NamedTuple):
 
 @dataclass(frozen=True)
 class BeamPath:
-    """The path, and the first contour of the region that has no one path of its own."""
+    """The path, and the first contour of the region that has no single path of its own."""
 
     region: Region
     lost: Lost | None
@@ -388,18 +386,8 @@ def beam_path(region: Region, kerf: Kerf) -> BeamPath:
     return BeamPath(Region(tuple(contours)), lost)
 
 
-def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
-    """Where a contour is lost: the slot that closes, or else the contour's middle."""
-    if lost.fate != "vanishes":
-        slot = least_gap(region, SHARP, max(widths(kerf)))
-        if slot is not None:
-            return slot.middle
-    low_x, low_y, high_x, high_y = lost.contour.bounds
-    return (low_x + high_x) / 2, (low_y + high_y) / 2
-
-
 class _Source(NamedTuple):
-    """The true edge that a piece of the stretched region is of; whether it starts or ends it."""
+    """The true edge of a piece of the stretched region, and whether the piece starts or ends it."""
 
     edge: Edge
     is_first: bool
@@ -407,7 +395,7 @@ class _Source(NamedTuple):
 
 
 class _Sources(NamedTuple):
-    """The stretched region's edges by place, and what each is of."""
+    """The stretched region's edges by place, and the source of each."""
 
     near: EdgeIndex
     of: Sequence[_Source]
@@ -416,9 +404,9 @@ class _Sources(NamedTuple):
 
 
 def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
-    """Edges within FINE of the stretched edge, without kinks: a kink would be taken for a corner.
+    """Return edges within FINE of the stretched edge, without kinks, which would count as corners.
 
-    The ends are those of the edge, exactly; what is too short to turn is a line.
+    The ends are exactly those of the edge; an edge too short to turn is a line.
     """
     start, end = ((p[0] * sx, p[1] * sy) for p in (edge.start, edge.end))
     if isinstance(edge, Line) or math.dist(start, end) < SHORTEST:
@@ -452,7 +440,7 @@ def _unit(way: Point, sign: float) -> Point:
 
 
 def _nearest(near: EdgeIndex, p: Point, reach: float) -> int:
-    """Which of the edges lies nearest to a point ``reach`` away from them."""
+    """Return the number of the edge nearest to a point ``reach`` away from them."""
     numbers = list(near.numbers(widened((*p, *p), 1.01 * reach))) or range(len(near.edges))
     return min(numbers, key=lambda n: (round(distance_to(near.edges[n], p), 9), n))
 
@@ -467,18 +455,18 @@ def _lost(
         for contour in grown.contours
     ]
     for number, contour in enumerate(originals):
-        own = [sources for sources in followed if number in sources]
-        if not own:
+        paths = [sources for sources in followed if number in sources]
+        if not paths:
             return Lost(contour, "vanishes")
-        if len(own) > 1:
+        if len(paths) > 1:
             return Lost(contour, "splits in parts")
-        if len(own[0]) > 1:
+        if len(paths[0]) > 1:
             return Lost(contour, "runs into another")
     return None
 
 
 def _track(edge: Edge, sources: _Sources) -> Track:
-    """What a piece of the stretched path follows, in true measure."""
+    """Return the track of a piece of the stretched path, in true measure."""
     near, reach = sources.near, sources.reach
     if isinstance(edge, Arc) and edge.ccw and abs(edge.radius - reach) < EPSILON:
         for number in near.numbers(widened((*edge.centre, *edge.centre), 2 * EPSILON)):
@@ -494,7 +482,7 @@ def _track(edge: Edge, sources: _Sources) -> Track:
 
 
 def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, float]) -> Contour:
-    """A contour of the path from its stretched image and what each of its edges follows."""
+    """Return a contour of the path from its stretched image and the tracks of its edges."""
     count = len(edges)
     starts = [
         i
@@ -507,9 +495,9 @@ def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, f
         return Contour(tuple(arcs_along(track, start, start + track.turn * math.tau)))
     spans: list[tuple[Track, float, float]] = []
     for i, after in zip(starts, [*starts[1:], starts[0] + count], strict=True):
-        own = [edges[k % count] for k in range(i, max(after, i + 1))]
-        t0 = _parameter(tracks[i], own[0], own[0].start, scale)
-        stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, own, scale))
+        stretch = [edges[k % count] for k in range(i, max(after, i + 1))]
+        t0 = _parameter(tracks[i], stretch[0], stretch[0].start, scale)
+        stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, stretch, scale))
         # Where the beam moves back from end to end, the pieces beside cross each other.
         spans += [
             (tracks[i], s, t)
@@ -535,7 +523,7 @@ def _untangled(contour: Contour) -> Contour:
 
 
 def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:
-    """Both ends, and between them where the beam's flat side moves back, for it crosses itself."""
+    """Both ends, and between them where the beam's flat side moves back and crosses itself."""
     flat = 0.0 if track.beam[1] > track.beam[0] else math.pi / 2
     low, high = sorted((t0, t1))
     sides = [
@@ -560,9 +548,9 @@ def _parameter(track: Track, edge: Edge, p: Point, scale: tuple[float, float]) -
     return t
 
 
-def _last(track: Track, t0: float, own: Sequence[Edge], scale: tuple[float, float]) -> float:
-    """The parameter at the end of a track's own edges, on from ``t0`` the way the track turns."""
-    t1 = _parameter(track, own[-1], own[-1].end, scale)
+def _last(track: Track, t0: float, edges: Sequence[Edge], scale: tuple[float, float]) -> float:
+    """The parameter at the end of a track's edges, on from ``t0`` the way the track turns."""
+    t1 = _parameter(track, edges[-1], edges[-1].end, scale)
     if track.line is not None:
         return t1
     # No edge turns by more than a half: their turns tell how often the normal has come round.
@@ -570,23 +558,23 @@ def _last(track: Track, t0: float, own: Sequence[Edge], scale: tuple[float, floa
         math.remainder(
             _parameter(track, e, e.end, scale) - _parameter(track, e, e.start, scale), math.tau
         )
-        for e in own
+        for e in edges
     )
     t1 += math.tau * round((t0 + turn - t1) / math.tau)
     return t1 if (t1 - t0) * track.turn > 0 else t0
 
 
 def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
-    """Edges along the tracks, which end where they cross the next."""
+    """Yield edges along the tracks, which end where they cross the next."""
     starts, ends = [t0 for _, t0, _ in spans], [t1 for _, _, t1 in spans]
     for i, span in enumerate(spans):
         ends[i - 1], starts[i] = crossing(spans[i - 1], span)
-    seen = [
+    visible = [
         i
         for i, (track, _, _) in enumerate(spans)
         if math.dist(track.at(starts[i]), track.at(ends[i])) > EPSILON
     ]
-    for i, following in zip(seen, [*seen[1:], *seen[:1]], strict=True):
+    for i, following in zip(visible, [*visible[1:], *visible[:1]], strict=True):
         track = spans[i][0]
         start, end = track.at(starts[i]), spans[following][0].at(starts[following])
         miss = math.dist(end, track.at(ends[i]))

@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, get_args
 
-from sbafab.geometry.boolean import divided, union
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region, coord, path_data
+from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.markup import escape
 from sbafab.notebook import table_html
@@ -31,10 +30,10 @@ from sbafab.notebook import table_html
 class SheetPanel:
     """The registered sheets of a laminate, pressed together as a batch.
 
-    ``places`` are the axes of the copies, the first at the origin; ``sheets`` what the first cut
-    leaves of each layer, bottom to top and seen from above; ``second`` all slots of the second cut;
-    ``window`` the room that every film sheet leaves round one copy; ``batches`` how many such
-    panels make all copies.
+    ``places`` are the axes of the copies, the first at the origin; ``sheets`` each layer after the
+    first cut, bottom to top and seen from above; ``second`` all slots of the second cut; ``window``
+    the room that every film sheet leaves round one copy; ``batches`` the number of such panels that
+    make all copies.
     """
 
     outline: Region
@@ -53,7 +52,7 @@ class SheetPanel:
         return high_x - low_x, high_y - low_y
 
     def holds(self, p: Point, place: Point) -> bool:
-        """Whether a point of a sheet lies in the window of the copy at ``place``."""
+        """Return True if a point of a sheet lies in the window of the copy at ``place``."""
         return self.window.contains((p[0] - place[0], p[1] - place[1]))
 
 
@@ -61,7 +60,7 @@ class SheetPanel:
 class Freed:
     """A sheet after the second cut: ``parts`` of each copy in its own frame, frame and crumbs.
 
-    A part that is still held is part of the ``frame``, and missing.
+    A part that is not cut free is part of the ``frame``, and missing.
     """
 
     frame: Region
@@ -70,9 +69,9 @@ class Freed:
 
 
 def freed(panel: SheetPanel, layer: Layer) -> Freed:
-    """What the sheet of a layer falls into.
+    """Return the pieces into which the sheet of a layer falls.
 
-    Mask sheets fall apart in the first cut; what the second one takes of a mask is past the part.
+    Mask sheets fall apart in the first cut; the second cut takes nothing of a mask's parts.
     """
     cut = Region() if layer.is_mask else panel.second
     return _freed(panel.sheets[layer.index - 1], cut, panel)
@@ -85,7 +84,7 @@ def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
     if not pieces:
         return Freed(Region(), tuple(Region() for _ in places))
     frame = max(pieces, key=lambda piece: Region(piece.outers).area)
-    found: list[list[Region]] = [[] for _ in places]
+    pieces_of_copies: list[list[Region]] = [[] for _ in places]
     crumbs = []
     for piece in pieces:
         if piece is frame:
@@ -96,8 +95,10 @@ def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
             crumbs.append(piece)
         else:
             x, y = places[home]
-            found[home].append(piece.moved(-x, -y))
-    parts = tuple(Region(tuple(c for piece in own for c in piece.contours)) for own in found)
+            pieces_of_copies[home].append(piece.moved(-x, -y))
+    parts = tuple(
+        Region(tuple(c for piece in copy for c in piece.contours)) for copy in pieces_of_copies
+    )
     return Freed(frame, parts, tuple(crumbs))
 
 
@@ -106,7 +107,7 @@ ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
 LOOSE = 0.2
-"""mm by which a hole may miss its pin in place or diameter and still be the pin's."""
+"""Tolerance in mm of place and diameter within which a hole belongs to a pin."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,7 +116,7 @@ class Layer:
 
     ``index`` counts from 1 at the bottom; ``balloon`` likewise (None for a sheet and its mask);
     ``z`` is the height of the layer's lower face with every film at its nominal thickness.
-    ``pieces`` is how many separate parts the role asks for. ``pattern`` names the shape: equal
+    ``pieces`` is the number of separate parts of its role. ``pattern`` names the shape: equal
     profiles of one material share it.
     """
 
@@ -138,11 +139,10 @@ class Layer:
 
     @property
     def is_mask(self) -> bool:
-        """Whether nothing bonds to it."""
+        """True if nothing bonds to it."""
         return self.film.is_mask
 
     def _repr_html_(self) -> str:
-
         return layer_html(self)
 
 
@@ -172,7 +172,7 @@ class Chamber:
 
 @dataclass(frozen=True)
 class Inlet:
-    """Where the tube of a chamber goes in: the strip's mouth at the tab's end.
+    """The mouth of a chamber's inlet strip at the tab's end, where its tube goes in.
 
     ``mouth`` is the middle of the tab's end, ``direction`` the unit vector outward, ``length``
     the straight run of the strip inward from the mouth, ``width`` the strip's, ``tube_diameter``
@@ -208,13 +208,13 @@ class Pin:
 
 @dataclass(frozen=True, repr=False)
 class Laminate:
-    """A stack of layers, bottom to top, with what the layers alone do not tell.
+    """A stack of layers, bottom to top, with its chambers, inlets and pins.
 
-    ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
-    ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
-    stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
-    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if it is; ``lumen``
-    that of the channel through all layers, mm.
+    ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty where
+    only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
+    ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
+    the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
+    layers, mm.
     """
 
     name: str
@@ -239,8 +239,8 @@ class Laminate:
     @cached_attribute
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
-        known: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
-        found: list[Interface] = []
+        regions: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
+        interfaces: list[Interface] = []
         below: Layer | None = None
         masks: list[Layer] = []
         for layer in self.layers:
@@ -249,13 +249,15 @@ class Laminate:
                 continue
             if below is not None:
                 key = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
-                if key not in known:
-                    known[key] = interface_regions(
+                if key not in regions:
+                    regions[key] = interface_regions(
                         below.profile, layer.profile, [mask.profile for mask in masks]
                     )
-                found.append(Interface.between(len(found) + 1, below, layer, masks, known[key]))
+                interfaces.append(
+                    Interface.between(len(interfaces) + 1, below, layer, masks, regions[key])
+                )
             below, masks = layer, []
-        return tuple(found)
+        return tuple(interfaces)
 
     @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:
@@ -297,7 +299,7 @@ class Laminate:
         return self.layers[index - 1]
 
     def first_cut(self, layer: Layer) -> Region:
-        """What the cut file of a layer cuts: its profile, or its registered sheet.
+        """Return the region in a layer's cut file: its profile, or its registered sheet.
 
         A mask sheet is laid face down, so it is cut turned over.
         """
@@ -325,25 +327,10 @@ class Laminate:
         )
 
     def _repr_html_(self) -> str:
-
         return laminate_html(self)
 
 
-__all__ = [
-    "Bore",
-    "Chamber",
-    "Inlet",
-    "Interface",
-    "InterfaceKind",
-    "Laminate",
-    "Layer",
-    "ROLES",
-    "Pin",
-    "Role",
-]
-
-
-# Interfaces: what bonds and what stays open between two consecutive TPE layers.
+# Interfaces between consecutive TPE layers: bonded and open areas.
 
 
 InterfaceKind = Literal["chamber", "separator", "bond"]
@@ -414,14 +401,14 @@ def interface_regions(
     return mask, contact, *divided(contact, mask)
 
 
-# How far a laminate reaches from its axis.
+# Diameters and mass.
 
 
 def outline_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle round the axis that holds all films, tabs and ears taken off.
+    """Return the diameter of the circle round the axis that holds all films without tabs and ears.
 
-    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on every film as it is cut: what of it
-    lies within the laminate's outline.
+    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on each film's part within the laminate's
+    outline.
     """
     films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
     return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
@@ -433,7 +420,7 @@ def overall_diameter(laminate: Laminate) -> float:
 
 
 def beyond_the_outline(laminate: Laminate) -> str:
-    """What makes the overall diameter larger than the outline's, counted: "3 inlet tabs"."""
+    """The parts outside the outline, which make the overall diameter larger: "3 inlet tabs"."""
     count = len(laminate.inlets)
     tabs = f"{count} inlet tab{'s' if count > 1 else ''}"
     return f"{tabs} and the ears" if laminate.registration == "ears" else tabs
@@ -456,7 +443,7 @@ def _round_axis(regions: Iterable[Region]) -> float:
     )
 
 
-# Plan views of a layer and of a laminate, as a notebook shows them.
+# Plan views of layers and laminates for notebooks.
 
 
 SHOWN_MM = 80.0
@@ -464,7 +451,7 @@ BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 
 def laminate_html(laminate: Laminate) -> str:
-    """The laminate in plan, with what each colour is, a scale and its layers in order."""
+    """Return the laminate in plan, with a legend, a scale and its layers in order."""
     rows = [
         (f"{layers[0].pattern}", layers[0].film.material, layers[0].role, _numbers(layers))
         for layers in laminate.patterns.values()
@@ -474,7 +461,7 @@ def laminate_html(laminate: Laminate) -> str:
 
 
 def layer_html(layer: Layer) -> str:
-    """The layer in plan, with what its colour is and a scale."""
+    """Return the layer in plan, with a legend and a scale."""
     return layer_svg(layer) + _legend(layer.profile.bounds, (layer,))
 
 
@@ -517,9 +504,9 @@ def laminate_svg(laminate: Laminate) -> str:
 
 
 def _profile(layer: Layer, opacity: float) -> str:
-    own = ink(layer.film)
+    colours = ink(layer.film)
     return (
-        f'<path d="{path_data(layer.profile)}" fill="{own.fill}" stroke="{own.line}" '
+        f'<path d="{path_data(layer.profile)}" fill="{colours.fill}" stroke="{colours.line}" '
         f'fill-opacity="{coord(opacity)}"/>'
     )
 

@@ -1,4 +1,4 @@
-"""The partition of the plane by the edges of several regions.
+"""Partition of the plane by the edges of regions, prisms over it, and the flat solid and cavities.
 
 Every edge of every region is an edge of the partition, so surfaces put together from its cells
 meet edge to edge.
@@ -12,9 +12,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.arcs import facets
+from sbafab.geometry.contour import Contour, facets
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region, rectangle
+from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.meshing.surface import Surface, open_edges
 
@@ -173,40 +173,40 @@ def fuse(slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()) -> S
 
 
 def _strips(regions: Sequence[Region], cuts: Sequence[float]) -> Iterator[Region]:
-    """What lies between two cuts each, and before the first and past the last of them."""
+    """Return the strips between two cuts each, before the first and past the last of them."""
     if not cuts:
         return
     boxes = [region.bounds for region in regions]
     low = min(box[0] for box in boxes) - 1, min(box[1] for box in boxes) - 1
     high = max(box[2] for box in boxes) + 1, max(box[3] for box in boxes) + 1
-    for left, right in pairwise([low[0], *cuts, high[0]]):
-        yield rectangle((left, low[1]), (right, high[1]))
+    for start, end in pairwise([low[0], *cuts, high[0]]):
+        yield rectangle((start, low[1]), (end, high[1]))
 
 
 def closed_surface(
-    what: str, slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()
+    name: str, slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()
 ) -> Surface:
-    """The verified surface of the slabs; ``what`` names it in errors.
+    """Return the verified surface of the slabs; ``name`` names it in errors.
 
     Raises OutputError if an edge does not join two triangles, or the volume is off.
     """
-    surface = sealed(what, fuse(slabs, sagitta, cuts))
+    surface = sealed(name, fuse(slabs, sagitta, cuts))
     expected = sum(slab.volume for slab in slabs)
     if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
         raise OutputError(
-            f"The mesh of {what} holds {surface.volume:.4f} mm3 where its films add up to "
+            f"The mesh of {name} holds {surface.volume:.4f} mm3 where its films add up to "
             f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
         )
     return surface
 
 
-def sealed(what: str, surface: Surface) -> Surface:
+def sealed(name: str, surface: Surface) -> Surface:
     """The surface itself. Raises OutputError if an edge does not join two triangles."""
     gaps = open_edges(surface)
     if len(gaps):
         x, y, z = gaps[0]
         raise OutputError(
-            f"The mesh of {what} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
+            f"The mesh of {name} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
             f"y {y:.3f}, z {z:.3f}; move profiles apart that touch in one point there."
         )
     return surface
@@ -373,7 +373,7 @@ def _channels(
 
 
 def _opening(holes: Iterable[Contour], axis: Point) -> Region | None:
-    """What the smallest hole round the axis leaves open."""
+    """Return the region that the smallest hole round the axis leaves open, or None."""
     round_axis = [hole for hole in holes if hole.winding(axis) != 0]
     if not round_axis:
         return None

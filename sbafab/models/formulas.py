@@ -1,7 +1,5 @@
-"""Bending of parallel chambers: constant curvature from their lengths.
-
-A plane through the chambers' ends, the nearest one where there are more than three, gives the
-length on the axis and the gradient across it; the axis is then an arc.
+"""Closed formulas: bend of parallel chambers, burst pressure, folded diameter, force by virtual
+work, inlet tubes, tip stiffness, and overall sizes.
 """
 
 from __future__ import annotations
@@ -28,8 +26,8 @@ if TYPE_CHECKING:
 
 
 class Bend(NamedTuple):
-    """Angle of the top (radians), where it leans to (radians from x), length of the axis (mm),
-    tip (..., 3) in mm, from the middle of the base.
+    """Angle of the top (radians), direction in which it leans (radians from x), length of the axis
+    (mm), tip (..., 3) in mm, from the middle of the base.
     """
 
     angle: NDArray[np.float64]
@@ -39,8 +37,10 @@ class Bend(NamedTuple):
 
 
 def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
-    """The bend of chambers with ``lengths`` (..., n) mm at ``axes`` (n, 2) mm, n >= 2.
+    """Return the bend of chambers with ``lengths`` (..., n) mm at ``axes`` (n, 2) mm, n >= 2.
 
+    Constant curvature: a plane through the chambers' ends, the nearest one where there are more
+    than three, gives the length on the axis and the gradient across it; the axis is then an arc.
     Valid to about half a turn: past pi the tip would come down through the base.
     """
     places = np.asarray(axes, dtype=float)
@@ -95,7 +95,7 @@ LOBES = 3
 
 
 def folded_diameter(width: float, thickness: float) -> float:
-    """Circle (mm) round three lobes folded into a triangle, their outer corners on it.
+    """Return the circle (mm) round three lobes folded into a triangle, their outer corners on it.
 
     Each lobe is a bar ``width`` long and ``thickness`` deep, a chord of the circle; their inner
     faces are the triangle's sides.
@@ -104,11 +104,13 @@ def folded_diameter(width: float, thickness: float) -> float:
     return 2 * math.hypot(inside + thickness, width / 2)
 
 
-# Force of a chamber that is held at a height: virtual work, F dh = p dv (paper, Sec. 4.3).
+# Blocked force of a chamber at a height: virtual work, F dh = p dv (paper, Sec. 4.3).
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
-    """Newtons from a pressure and dv/dh in mm2. Raises DesignError past the burst pressure."""
+    """Return the force in N by a pressure and dv/dh in mm2. Raises DesignError past the burst
+    pressure.
+    """
     pressure = np.asarray(pressure_kpa, dtype=float)
     good = (pressure >= 0) & (pressure <= BURST.value)
     if not good.all():
@@ -120,43 +122,45 @@ def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
 
 
 def work_uj(pressure_kpa: float, volume_ul: float) -> float:
-    """Microjoules that air at constant pressure puts in: 1 kPa x 1 ul = 1 uJ.
+    """Return the work in uJ of air at constant pressure: 1 kPa x 1 ul = 1 uJ.
 
     An upper bound of the integral of p dv up to that pressure.
     """
     return pressure_kpa * volume_ul
 
 
-# Which tube goes into an inlet strip.
+# Tubes of inlet strips.
 
 
 def largest_tube(width: float, strip: float = 0.0) -> float:
-    """Outer diameter (mm) of the tube that fills a flat channel ``width`` mm wide, opened round.
+    """Return the outer diameter (mm) of the tube that fills a flat channel ``width`` mm wide.
 
-    Half the perimeter of what lies in it is the channel's width: the tube, and along one side of it
-    a PTFE strip ``strip`` mm thick.
+    The tube and a PTFE strip ``strip`` mm thick along one side of it have half their perimeter
+    equal to the channel's width.
     """
     return 2 * width / math.pi - strip
 
 
-# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and the I it takes.
+# The cantilever formula E = F l^3 / (3 delta I) (paper, Sec. 4.4), and its I.
 
 
 SAGITTA = 1e-4
 
 
 def tip_stiffness(modulus_kpa: float, second_moment: float, length: float) -> float:
-    """F / delta in N/mm of a cantilever, from E (kPa), I (mm4) and length (mm)."""
+    """Return F / delta in N/mm of a cantilever, from E (kPa), I (mm4) and length (mm)."""
     return 3 * modulus_kpa * 1e-3 * second_moment / length**3
 
 
 def modulus(force: float, deflection: float, length: float, second_moment: float) -> float:
-    """E in kPa, from tip force (N), deflection and length (mm), I (mm4)."""
+    """Return E in kPa, from tip force (N), deflection and length (mm), I (mm4)."""
     return force * length**3 / (3 * deflection * second_moment) * 1e3
 
 
 def second_moments(region: Region) -> tuple[float, float]:
-    """Least and largest second moment of area (mm4) of a section about its centre."""
+    """Return the least and the largest second moment of area (mm4) of a section about its
+    centre.
+    """
     x0, y0 = centroid(region)
     xx = yy = xy = 0.0
     for piece in region.polygons(SAGITTA):
@@ -171,43 +175,46 @@ def second_moments(region: Region) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-# Overall sizes in closed form, each with the paper's figure it answers to.
+# Overall sizes, each with the paper's figure.
 
 
 def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
-    """Sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
+    """Return sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
 
-    Width, length and overall diameter are those of all that is cut: masks, inlet tabs and ears
-    belong to them. The outline diameter is that of the films without tabs and ears.
+    Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
+    that of the films without tabs and ears.
     """
     low_x, low_y, high_x, high_y = laminate.bounds
-    found = {
+    sizes_mm = {
         "thickness": laminate.thickness,
         "width": high_x - low_x,
         "length": high_y - low_y,
     }
     form = design.form
     if form.wrap is not None:
-        found["pitch"] = form.wrap.pitch
-        found["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
+        sizes_mm["pitch"] = form.wrap.pitch
+        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
         reached, inflated = reached_diameter(form, laminate), inflated_diameter(form, laminate)
         if reached is not None and inflated is not None:
-            found["reached_diameter"] = reached
-            found["inflated_diameter"] = inflated
+            sizes_mm["reached_diameter"] = reached
+            sizes_mm["inflated_diameter"] = inflated
     else:
         if not laminate.outline.is_empty:
-            found["outline_diameter"] = outline_diameter(laminate)
-        found["overall_diameter"] = overall_diameter(laminate)
-    return found
+            sizes_mm["outline_diameter"] = outline_diameter(laminate)
+        sizes_mm["overall_diameter"] = overall_diameter(laminate)
+    return sizes_mm
 
 
 def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
-    """Tube plus the flat laminate on both sides; the paper gives 15.33 (Sec. 2.1)."""
+    """Return the diameter in mm of the tube with the flat laminate; the paper gives 15.33 (Sec.
+    2.1).
+    """
     return wrap.tube_diameter + 2 * laminate.thickness
 
 
 def reached_diameter(form: Form, laminate: Laminate) -> float | None:
-    """Tube plus SBAs that hold the most their films let them: what they must reach lies within it.
+    """Return the diameter in mm of the tube with SBAs at their largest volume: the reach to rely
+    on.
 
     None without a tube, or for pockets of another shape. Balloons are lenses of two arcs
     (``models.lens``); the paper's reach 27.29, about 28 (Sec. 2.1).
@@ -220,7 +227,7 @@ def reached_diameter(form: Form, laminate: Laminate) -> float | None:
 
 
 def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
-    """Tube plus SBAs as wide as can be: what they must not touch lies outside.
+    """Return the diameter in mm of the tube with SBAs as wide as can be: the clearance to provide.
 
     None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
     not stretch becomes a cylinder of diameter 2 w / pi where its ends do not hold it back: 28.06
@@ -232,29 +239,29 @@ def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
 
 
 def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None:
-    """Diameter with every balloon ``rise`` mm high."""
+    """Return the diameter in mm with every balloon ``rise`` mm high."""
     if form.wrap is None:
         return None
     return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
 
 
 def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
-    """The size in phrases: across with what stands out of it, without, flat, and its height.
+    """Return the size in phrases: overall diameter, outline diameter, flat extent, and height.
 
-    Films flow in the press: beside the height stands what the paper measured of its own.
+    Films flow in the press: beside the height stands the paper's measured one.
     """
-    found = sizes(design, laminate)
-    said = []
-    if "overall_diameter" in found:
+    sizes_mm = sizes(design, laminate)
+    phrases = []
+    if "overall_diameter" in sizes_mm:
         over = beyond_the_outline(laminate)
-        said.append(f"{found['overall_diameter']:.2f} mm overall diameter with {over}")
-    if "outline_diameter" in found:
-        said.append(f"{found['outline_diameter']:.2f} without")
-    if "deflated_diameter" in found:
-        said.append(f"{found['deflated_diameter']:.2f} mm round its tube")
+        phrases.append(f"{sizes_mm['overall_diameter']:.2f} mm overall diameter with {over}")
+    if "outline_diameter" in sizes_mm:
+        phrases.append(f"{sizes_mm['outline_diameter']:.2f} without")
+    if "deflated_diameter" in sizes_mm:
+        phrases.append(f"{sizes_mm['deflated_diameter']:.2f} mm round its tube")
     form = design.form
     flat = "flat, " if form.wrap is not None else ""
-    said.append(f"{flat}{found['width']:.2f} x {found['length']:.2f} mm")
+    phrases.append(f"{flat}{sizes_mm['width']:.2f} x {sizes_mm['length']:.2f} mm")
     row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
     height = f"folded height {laminate.thickness:.3f} mm"
-    return (*said, f"{height} {row.brief}" if row else height)
+    return (*phrases, f"{height} {row.brief}" if row else height)

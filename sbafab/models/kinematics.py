@@ -1,8 +1,9 @@
-"""Stroke and volume of a stack of balloons, by each model that knows its pockets.
+"""Stroke and volume of a stack of balloons by each geometric model of its pockets, and the actuator
+that the models take.
 
 Balloons of unlike size (a tapered stack) are taken at equal height over radius, so that one
 formula holds for all: strokes add up with l, volumes with l^3. Volumes are the mean of a chamber's
-balloons. Held at a height they all carry one force, and are then at unlike heights over radius.
+balloons. Blocked at a height they all carry one force, and are then at unlike heights over radius.
 """
 
 from __future__ import annotations
@@ -46,22 +47,25 @@ class Kinematics:
     _push: Law | None = None
 
     def stroke(self, volume: ArrayLike) -> NDArray[np.float64]:
-        """Stroke of the stack in mm at ul a balloon. Raises DesignError out of range."""
-        wanted = within(volume, self.largest_volume, "volume", "ul a balloon", self.model.name)
-        return self._stroke(wanted)
+        """Return the stroke of the stack in mm at ul a balloon. Raises DesignError out of range."""
+        volumes = within(volume, self.largest_volume, "volume", "ul a balloon", self.model.name)
+        return self._stroke(volumes)
 
     def volume(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Volume in ul a balloon at a stroke of the stack. Raises DesignError out of range."""
+        """Return the volume in ul a balloon at a stroke of the stack. Raises DesignError out of
+        range.
+        """
         return self._volume(self._within(stroke))
 
     def rate(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """dv/dh of the stack in mm2: the chamber's whole volume by the stack's stroke."""
+        """Return dv/dh of the stack in mm2: the chamber's whole volume by the stack's stroke."""
         return self._rate(self._within(stroke))
 
     def push(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Force over pressure in mm2 of the stack held at a stroke: that of every balloon in it.
+        """Return force over pressure in mm2 of the stack blocked at a stroke: that of every balloon
+        in it.
 
-        Of a tapered stack at most what its weakest balloon has when flat; what solid films of shut
+        Of a tapered stack at most that of its weakest balloon when flat; what solid films of shut
         balloons may carry beyond is not counted.
         """
         return (self._push or self._rate)(self._within(stroke))
@@ -71,7 +75,7 @@ class Kinematics:
 
 
 def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
-    """Eq. 4 and Eqs. 1 to 3 for balloons with these pocket radii (mm)."""
+    """Return Eq. 4 and Eqs. 1 to 3 for balloons with these pocket radii (mm)."""
     first, third = sum(radii), sum(radius**3 for radius in radii)
     scale = third / len(radii)
 
@@ -109,7 +113,7 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
 
 
 def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
-    """Force over pressure by stroke of unlike balloons that carry the same force.
+    """Return force over pressure by stroke of unlike balloons that carry the same force.
 
     ``rate`` is dv/dh of a balloon of radius 1 up to the stroke ``most``.
     """
@@ -123,7 +127,7 @@ def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
 
 
 def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
-    """The lens of two arcs for oblong pockets of a width and straight run (mm)."""
+    """Return the lens of two arcs for oblong pockets of a width and straight run (mm)."""
     most = lens.fullest(width, run)
     model = Model(
         lens.MODEL,
@@ -143,7 +147,9 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
 
 
 def full_stroke(radii: Sequence[float]) -> float:
-    """What the paper's balloons reach, mm of a stack: 17.5 mm for 15 of radius 2.5 (Sec. 4.6)."""
+    """Return the full stroke in mm of a stack by the paper: 17.5 for 15 of radius 2.5 (Sec.
+    4.6).
+    """
     return FULL_SHARE * sum(radii)
 
 
@@ -154,13 +160,13 @@ def _eq_4_trust(radius: float) -> str:
         f"{volume * scale:.3g} ul in {fluid}"
         for fluid, volume, error in VALID
     ]
-    said = "" if radius == VALID_RADIUS else f", scaled from d = {2 * VALID_RADIUS:g}"
+    origin = "" if radius == VALID_RADIUS else f", scaled from d = {2 * VALID_RADIUS:g}"
     if radius == 2.5:
-        said += "; the regime ends near 0.95 kPa"
-    return f"geometric regime only: {', '.join(limits)} (measured{said})"
+        origin += "; the regime ends near 0.95 kPa"
+    return f"geometric regime only: {', '.join(limits)} (measured{origin})"
 
 
-# What the models need of a design: its stacks of balloons, and how they stand to each other.
+# The actuator of a design, as the models take it.
 
 
 NOT_MEASURED = (
@@ -169,18 +175,17 @@ NOT_MEASURED = (
     "pressure, or simulate the design"
 )
 NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
-"""Of a search, which compares designs by figures without bounds."""
+"""Message of a search, which compares designs by figures without bounds."""
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """A design as the models see it.
+    """A design as the models take it.
 
-    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of
-    round pockets, empty for oblong ones. ``kinematics`` begins with the model that sets the pace;
-    it is empty for drawn outlines. ``full_stroke`` mm is what counts as full actuation.
-    ``full_height`` mm is its height then; ``thickness`` mm the flat laminate's, the press factor
-    included.
+    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of round
+    pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
+    drawn outlines. ``full_stroke`` mm counts as full actuation, ``full_height`` mm is its height
+    then; ``thickness`` mm the flat laminate's, the press factor included.
     """
 
     design: Design
@@ -194,12 +199,14 @@ class Actuator:
     thickness: float
 
     def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How long a chamber is at a stroke: from the flat thickness to the full height."""
+        """Return the length of a chamber at a stroke: from the flat thickness to the full
+        height.
+        """
         return self.thickness + stroke * (self.full_height - self.thickness) / self.full_stroke
 
     @property
     def axes(self) -> list[Point]:
-        """Where the chambers of a lobed actuator stand."""
+        """Centres of the chambers of a lobed actuator."""
         return [chamber.centres[0] for chamber in self.laminate.chambers]
 
     @property
@@ -208,17 +215,17 @@ class Actuator:
 
     @property
     def has_the_papers_film(self) -> bool:
-        """Whether what the paper measured of its film's actuators holds for this one's."""
+        """True if the films are the paper's, so that its measurements apply."""
         return all(layer.film.is_the_papers for layer in self.laminate.tpe_layers)
 
     @property
     def knows_full(self) -> bool:
-        """Whether full stroke and full height are known: of round pockets they were measured."""
+        """True if full stroke and full height are known: of round pockets they were measured."""
         return not self.radii or self.has_the_papers_film
 
     def is_like_paper(self, stacks: int, radius: float) -> bool:
-        """Whether the paper measured so many stacks of such balloons on common plates: its 1-DoF
-        actuators have one, its 3-DoF actuator three.
+        """Return True if the paper measured so many stacks of such balloons on common plates: its
+        1-DoF actuators have one, its 3-DoF actuator three.
         """
         return (
             self.has_the_papers_film
@@ -231,7 +238,7 @@ class Actuator:
 def actuator(
     design: Design, laminate: Laminate, calibration: Factors, form: Form | None = None
 ) -> Actuator:
-    """The actuator of a design of any family; ``form`` in place of its own, where one is given."""
+    """Return the actuator of a design of any family; ``form`` replaces its own."""
     balloons, form = design.stack.balloons, form or design.form
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()

@@ -1,4 +1,6 @@
-"""What the paper measured, one place for plots and for the table of docs/validation.md."""
+"""Measurements of the paper, and the counterparts of predicted figures that are off by more than a
+quarter of them.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Measured(NamedTuple):
-    """A value +- its error (0 where none is given), its unit, and where it stands."""
+    """A value +- its error (0 where none is given), its unit, and its section."""
 
     value: float
     error: float
@@ -84,33 +86,33 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 """Stroke of a full balloon over its pocket's radius: 17.5 mm of 15 balloons of radius 2.5."""
 
 
-# What the paper measured beside figures that are off by more than a quarter of it.
+# Measured counterparts of figures that are off by more than a quarter of them.
 #
 # One table for all who show such figures: predictions, searches, sweeps, pictures, pages and the
-# studio. A row holds for every design whose figure comes from the row's model: nobody measured the
-# others, and a model that is off on the paper's actuators is not better on theirs.
+# studio. A row holds for every design whose figure comes from the row's model: the others were not
+# measured, and a model that is off on the paper's actuators is not better on theirs.
 
 
-OFF = 0.25
-"""Share of a measured value by which a figure may be off and stand alone."""
+MISFIT = 0.25
+"""Relative error up to which a figure may stand without its measured counterpart."""
 STACK, BALLOON = "elastic stack", "elastic balloon"
 EQ_4, EQS_1_TO_3 = "virtual work on Eq. 4", "virtual work on Eqs. 1-3"
 FACTORS = re.compile(r"(, (press factor|pocket loss|E =)| x (press|contact) factor) ")
-"""What the name of a model says of a calibration."""
+"""Marks of a calibration in the name of a model."""
 FLAT_HEIGHT_OF_FILMS = "sum of the films"
 ONE_DOF, THREE_DOF = "1-DoF", "3-DoF"
 
 
 @dataclass(frozen=True)
 class Counterpart:
-    """A measured value, and what a model gives for the actuator on which it was measured.
+    """A measured value, and the model's value for the actuator on which it was measured.
 
     ``figure`` is a regular expression of the names of the figures that it stands beside, ``model``
-    what their models' names begin with; ``state`` says of what or in which state was ``measured``.
-    ``parallel``: it holds for actuators that bend (True), for
-    the others (False), or for all (None). ``template`` and ``recorded`` name the design and the
-    figure from which ``gave`` was taken, in the unit of ``measured``; ``at`` is the state in which
-    the model gave it, if that is not the one of the measurement.
+    the beginning of their models' names; ``state`` is the quantity or state that was ``measured``.
+    ``parallel``: it holds for actuators that bend (True), for the others (False), or for all
+    (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
+    taken, in the unit of ``measured``; ``at`` is the state in which the model gave it, if that is
+    not the one of the measurement.
     """
 
     figure: str
@@ -140,13 +142,13 @@ class Counterpart:
 
     @property
     def short(self) -> str:
-        """The same for a caption or a column."""
+        """The counterpart for a caption or a column."""
         measured = f"{self.measured} {self.state}".rstrip(",")
         return f"the paper's {self.actuator}: {measured}; this model gives it {self.gave:.4g}"
 
     @property
     def brief(self) -> str:
-        """The same in parentheses, for a line of sizes."""
+        """The counterpart in parentheses, for a line of sizes."""
         return f"(paper's {self.actuator} {self.measured.value:g}, not {self.gave:.4g})"
 
     def as_dict(self, is_calibrated: bool = False) -> dict[str, Any]:
@@ -163,7 +165,9 @@ class Counterpart:
 
 
 def _forces() -> Iterator[Counterpart]:
-    """Straight: six forces at 100 kPa (Sec. 4.3), those that a model misses by more than OFF."""
+    """Yield the straight actuators' forces at 100 kPa (Sec. 4.3) that a model misses by more than
+    MISFIT.
+    """
     gave = {
         (ONE_DOF, STACK): (1.888, 1.709, 1.355),
         (ONE_DOF, EQ_4): (None, None, 0.8422),
@@ -171,9 +175,9 @@ def _forces() -> Iterator[Counterpart]:
         (THREE_DOF, STACK): (None, 5.129, 4.069),
         (THREE_DOF, EQS_1_TO_3): (2.945, 2.905, None),
     }
-    known = {ONE_DOF: FORCE_1DOF, THREE_DOF: FORCE_3DOF}
+    measured_at = {ONE_DOF: FORCE_1DOF, THREE_DOF: FORCE_3DOF}
     for (actuator, model), values in gave.items():
-        for share, measured, value in zip(HEIGHTS, known[actuator], values, strict=True):
+        for share, measured, value in zip(HEIGHTS, measured_at[actuator], values, strict=True):
             if value is None:
                 continue
             at = f"at {100 * share:g} % of full stroke" if share else "flat"
@@ -192,7 +196,9 @@ def _forces() -> Iterator[Counterpart]:
 
 
 def _bent_forces() -> Iterator[Counterpart]:
-    """Bent, at 100 kPa (Sec. 4.3); the paper does not say with which chambers."""
+    """Yield the bent actuator's forces at 100 kPa (Sec. 4.3); the paper does not say with which
+    chambers.
+    """
     gave = {30: (1.667, None), 60: (None, 2.829), 90: (1.194, 2.341)}
     for angle, measured in FORCE_BENT:
         for chambers, value in zip(("one chamber", "2 chambers"), gave[angle], strict=True):
@@ -212,8 +218,8 @@ def _bent_forces() -> Iterator[Counterpart]:
             )
 
 
-def _others() -> Iterator[Counterpart]:
-    """Heights, bends, energy, time and stiffness (Sec. 4.1, 4.4 to 4.6)."""
+def _further_counterparts() -> Iterator[Counterpart]:
+    """Yield heights, bends, energy, time and stiffness (Sec. 4.1, 4.4 to 4.6)."""
     three, bend, full = "3dof-15mm", "of bend at most", "of full height"
     yield Counterpart(
         "deflated height", FLAT_HEIGHT_OF_FILMS, FLAT_HEIGHT, "of deflated height",
@@ -241,13 +247,13 @@ def _others() -> Iterator[Counterpart]:
             LARGEST_BEND, bend, THREE_DOF, value, f"at {kpa} kPa in {chambers}", three,
             f"bend at {kpa} kPa in {chambers}, the others empty", True,
         )  # fmt: skip
-    one, air = "1-DoF of d = 10", "to 10 kPa with air"
+    large, air = "1-DoF of d = 10", "to 10 kPa with air"
     for figure, model, value in (
         ("pneumatic input work at {} kPa, free", BALLOON, 1.770),
         ("pneumatic input work at {} kPa", "p v with Eq. 4", 5.820),
     ):
         yield Counterpart(
-            figure.format(r"\S+"), model, WORK, "at 10 kPa", one, value, "", "1dof-10mm",
+            figure.format(r"\S+"), model, WORK, "at 10 kPa", large, value, "", "1dof-10mm",
             figure.format(10),
         )  # fmt: skip
     yield Counterpart(
@@ -276,9 +282,9 @@ def _others() -> Iterator[Counterpart]:
 TIME_WITH_AIR = "time to 10 kPa with air"
 POCKET_AREA = "pressure x pocket area, flat"
 MODULUS = "cantilever modulus"
-"""Values that ``docs/validation.md`` works out of a prediction's figures."""
-COUNTERPARTS = (*_forces(), *_bent_forces(), *_others())
-"""All that validation shows to be off by more than OFF, of what predictions show."""
+"""Values that ``docs/validation.md`` computes from a prediction's figures."""
+COUNTERPARTS = (*_forces(), *_bent_forces(), *_further_counterparts())
+"""All figures of predictions that validation shows to be off by more than MISFIT."""
 
 
 @lru_cache(maxsize=4096)
@@ -292,10 +298,10 @@ def _counterpart(name: str, model: str, is_parallel: bool) -> Counterpart | None
 
 
 def counterpart(form: Form, name: str, model: str) -> Counterpart | None:
-    """Return what the paper measured beside a figure of this ``name`` by this ``model``, for a
-    design of this ``form``; None where the model is not known to be off by more than OFF.
+    """Return the measured counterpart of a figure of this ``name`` by this ``model``, for a design
+    of this ``form``; None where the model is not known to be off by more than MISFIT.
 
-    A flat height by a press factor that was measured is nobody else's.
+    A flat height by a measured press factor has none.
     """
     if model.startswith(FLAT_HEIGHT_OF_FILMS) and FACTORS.search(model):
         return None
@@ -303,18 +309,18 @@ def counterpart(form: Form, name: str, model: str) -> Counterpart | None:
 
 
 def counterparts_of_pose(chambers: int) -> dict[str, Counterpart]:
-    """Return those of what a pose of the elastic stack shows: its "height", and of several chambers
-    its "bend".
+    """Return the counterparts of a pose of the elastic stack by quantity: "height", and for several
+    chambers "bend".
     """
-    wanted = {"height": ("free height at 10 kPa", BALLOON)}
+    sought = {"height": ("free height at 10 kPa", BALLOON)}
     if chambers > 1:
-        wanted["bend"] = ("bend at 10 kPa in one chamber, the others empty", STACK)
-    found = {what: _counterpart(*names, chambers > 1) for what, names in wanted.items()}
-    return {what: row for what, row in found.items() if row is not None}
+        sought["bend"] = ("bend at 10 kPa in one chamber, the others empty", STACK)
+    rows = {quantity: _counterpart(*names, chambers > 1) for quantity, names in sought.items()}
+    return {quantity: row for quantity, row in rows.items() if row is not None}
 
 
 def counterpart_of_column(form: Form, column: str) -> Counterpart | None:
-    """Return the same for a column of a sweep: "name [unit]" or "name, model [unit]"."""
+    """Return the counterpart of a column of a sweep: "name [unit]" or "name, model [unit]"."""
     figure = column.partition(" [")[0]
     name, _, model = figure.rpartition(", ")
     for row in COUNTERPARTS:

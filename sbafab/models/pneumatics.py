@@ -1,4 +1,4 @@
-"""What feeds a chamber: fluid, tube, valve and pump (paper, Sec. 4.5 and 7).
+"""Supply of a chamber: fluid, tube, valve and pump, and filling times (paper, Sec. 4.5 and 7).
 
 Flow through the tube is laminar (Poiseuille) or, where that is less, turbulent in a smooth tube
 (Blasius). A gas is isothermal: pressures squared take the place of pressures, and its volumes are
@@ -26,7 +26,9 @@ TUBE_LENGTH = 150.0
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3, and whether it is a gas."""
+    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3; ``is_gas`` makes it
+    compressible.
+    """
 
     name: str
     viscosity: float
@@ -41,11 +43,11 @@ FLUIDS = {"water": WATER, "air": AIR}
 
 @dataclass(frozen=True)
 class Line:
-    """The line to each chamber.
+    """The supply line of a chamber.
 
     ``length`` and inner ``diameter`` of its tube in mm; ``dead_volume`` ul between pump and tube
-    (syringe, valve, fittings), where a gas is squeezed before it flows; ``delay`` s until valve or
-    pump act.
+    (syringe, valve, fittings), where a gas is compressed before it flows; ``delay`` s until valve
+    or pump act.
     """
 
     fluid: Fluid = AIR
@@ -66,11 +68,13 @@ class Line:
 
     @property
     def tube_volume(self) -> float:
-        """Ul in the tube."""
+        """Volume of the tube, ul."""
         return math.pi * self.diameter**2 / 4 * self.length
 
     def flow(self, source: float, chamber: float) -> float:
-        """ul/s from a pressure at the pump to one in the chamber; a gas at the atmosphere."""
+        """Return the flow in ul/s from a pressure at the pump to one in the chamber; a gas at the
+        atmosphere.
+        """
         drop = self._drop(source, chamber)
         head = abs(drop)
         laminar = head * math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
@@ -82,7 +86,7 @@ class Line:
         return math.copysign(min(laminar, turbulent), drop)
 
     def source_pressure(self, flow: float, chamber: float) -> float:
-        """Pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
+        """Return the pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
         low, high = chamber, chamber + 1.0
         while self.flow(high, chamber) < flow:
             high = chamber + 2 * (high - chamber)
@@ -98,11 +102,11 @@ class Line:
         return (up * up - down * down) / (2 * ATMOSPHERE_KPA)
 
     def content(self, volume: float, pressure: float) -> float:
-        """How much fluid a volume holds: ul, of a gas at the atmosphere."""
+        """Return the fluid in ul in a volume, of a gas at the atmosphere."""
         return volume * (1 + pressure / ATMOSPHERE_KPA) if self.fluid.is_gas else volume
 
 
-# Time to put a volume in at a steady flow (paper, Sec. 4.5 and 7).
+# Filling time at a steady flow (paper, Sec. 4.5 and 7).
 
 
 ATMOSPHERE_KPA = 101.325
@@ -113,9 +117,9 @@ LEAST_FLOW, MOST_FLOW = 1e-6, 1e6
 def seconds(
     volume_ul: ArrayLike, flow_ml_min: float, gas_at_kpa: float = 0.0
 ) -> NDArray[np.float64]:
-    """Seconds to a volume at a flow.
+    """Return the seconds to a volume at a steady flow.
 
-    ``gas_at_kpa`` is the pressure that a gas is squeezed to, above the atmosphere at which its
+    ``gas_at_kpa`` is the pressure that a gas is compressed to, above the atmosphere at which its
     flow is counted; leave it for a liquid. Raises DesignError for a flow that no pump has.
     """
     if not LEAST_FLOW <= flow_ml_min <= MOST_FLOW:

@@ -1,15 +1,15 @@
-"""A round balloon whose films wave in step with its rim: where nodes are, how sums become bands.
+"""A round balloon whose films wave in step with its rim: its kinematics, assembly and energy.
 
 With n waves round the rim every node of a film, and of the rim, has a place
 
     r = r0 + sum r_k cos(k n turn),  z = z0 + sum z_k cos(k n turn),  aside = sum v_k sin(k n turn)
 
 for the first few k. Films are membranes (Saint Venant and Kirchhoff's law) that bend along the
-meridian slice by slice, as in ``film_elements``, and round the hoop wave by wave. The other film
-does half a wave further on what this one does, upside down; so the rim goes up and down as a plate
-of both films whose section stays straight, its middle in its plane. A film ends half a thickness
-off that middle: as the rim tilts, the film's end goes in or out. One film and its share of the rim
-are computed; their energy is in ``wave_energy``. Lengths mm.
+meridian slice by slice, as in ``film_elements``, and round the hoop wave by wave. The rim is
+antisymmetric under a half-wave shift: the other film is the mirror image of this one, half a wave
+on. So the rim goes up and down as a plate of both films whose section stays straight, its middle in
+its plane. A film ends half a thickness off that middle: as the rim tilts, the film's end goes in or
+out. One film and its share of the rim are computed. Lengths mm, pressures kPa, energies uJ, air ul.
 """
 
 from __future__ import annotations
@@ -22,8 +22,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.models import least_energy
-from sbafab.models.balloon import both_bend
-from sbafab.models.film_elements import ROOT, Elements, air, gradient, matrix
+from sbafab.models.balloon import bonded_bending_stiffness
+from sbafab.models.film_elements import (
+    ROOT_LENGTH,
+    Elements,
+    air_volume,
+    assembled_gradient,
+    assembled_tangent,
+)
 from sbafab.models.least_energy import Descent
 
 if TYPE_CHECKING:
@@ -33,24 +39,24 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 OVERTONES = 5
-"""Waves of a film in one ripple of the rim, at most."""
+"""Harmonics of a film in one ripple of the rim."""
 SLICES = 2 * OVERTONES + 2
 """Slices of half a ripple: enough for products of four waves."""
 PLACES = 2 + 3 * OVERTONES
-"""Numbers that say where a node is: r0, z0, and r_k, z_k and v_k of each k."""
+"""Coordinates of a node: r0, z0, and r_k, z_k and v_k of each k."""
 R, Z, EDGE, UP = 0, 1, 2, 3
 """Numbers of r0, z0, r_1 and z_1. At the pocket's edge r_1 is the film's and z_1 the rim's."""
 SMOOTH = 0.25
-"""Share of the pocket's radius within which films do not wave."""
+"""Share of the pocket's radius within which films have no waves."""
 
 
 def first_of(overtone: int) -> int:
-    """Number of r_k; z_k and v_k follow."""
+    """Return the number of r_k; z_k and v_k follow."""
     return 3 * overtone - 1
 
 
 class BlockPacking(NamedTuple):
-    """Which entries of blocks go where in a band of that size."""
+    """Index map from entries of node blocks to a band of a size."""
 
     from_: NDArray[np.int_]
     into: NDArray[np.int_]
@@ -59,10 +65,9 @@ class BlockPacking(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Waving:
-    """A balloon whose rim has that many waves, and what follows from both alone.
+    """Kinematics of a balloon with a number of waves round its rim.
 
-    Of an element, places are taken as their change along it, over its length, and as the mean of
-    its ends.
+    Coordinates of an element are their change along it, over its length, and the mean of its ends.
     """
 
     balloon: Balloon
@@ -70,84 +75,88 @@ class Waving:
 
     @cached_property
     def along(self) -> Array:
-        """What changes say of r, aside and z, slice by slice: (3, slices, places)."""
-        found = np.zeros((3, SLICES, PLACES))
-        found[0, :, R] = found[2, :, Z] = 1.0
+        """Rates of r, aside and z along the meridian by the changes, in each slice: (3, slices,
+        places).
+        """
+        rows = np.zeros((3, SLICES, PLACES))
+        rows[0, :, R] = rows[2, :, Z] = 1.0
         for k, cos, sin in _overtones():
             at = first_of(k)
-            found[0, :, at], found[2, :, at + 1], found[1, :, at + 2] = cos, cos, sin
-        return found
+            rows[0, :, at], rows[2, :, at + 1], rows[1, :, at + 2] = cos, cos, sin
+        return rows
 
     @cached_property
     def around(self) -> Array:
-        """What means say of how r, aside and z change for a turn of 1 rad, and of z."""
-        found = np.zeros((4, SLICES, PLACES))
-        found[1, :, R] = found[3, :, Z] = 1.0
+        """Rates of r, aside and z for a turn of 1 rad, and z, by the means: (4, slices, places)."""
+        rows = np.zeros((4, SLICES, PLACES))
+        rows[1, :, R] = rows[3, :, Z] = 1.0
         for k, cos, sin in _overtones():
             at, n = first_of(k), k * self.waves
-            found[0, :, at], found[0, :, at + 2] = -n * sin, -sin
-            found[1, :, at], found[1, :, at + 2] = cos, n * cos
-            found[2, :, at + 1], found[3, :, at + 1] = -n * sin, cos
-        return found
+            rows[0, :, at], rows[0, :, at + 2] = -n * sin, -sin
+            rows[1, :, at], rows[1, :, at + 2] = cos, n * cos
+            rows[2, :, at + 1], rows[3, :, at + 1] = -n * sin, cos
+        return rows
 
     @cached_property
     def products(self) -> tuple[Array, ...]:
-        """Two of ``along``, one of each, two of ``around``, and two of ``along`` in r and z, all of
-        one slice: (two and slices, places x places).
+        """Products of two of ``along``, one of each, two of ``around``, and two of ``along`` in r
+        and z, all of one slice: (two and slices, places x places).
         """
         a, b = self.along, self.around
         kink = a[[0, 2]]
         return tuple(
-            np.einsum("ajm,bjn->abjmn", one, two).reshape(-1, PLACES**2)
-            for one, two in ((a, a), (a, b), (b, b), (kink, kink))
+            np.einsum("ajm,bjn->abjmn", first, second).reshape(-1, PLACES**2)
+            for first, second in ((a, a), (a, b), (b, b), (kink, kink))
         )
 
     @cached_property
-    def kept(self) -> NDArray[np.bool_]:
-        """Which places move on their own, (nodes, places)."""
-        one = self.balloon
-        number = np.arange(len(one.nodes))
-        film = (number >= one.held) & (number < one.edge)
-        found = np.zeros((len(number), PLACES), dtype=bool)
-        found[:, R] = (number > 0) | (one.bore > 0)
-        found[:, Z] = film
-        waves = film & (number > one.held) & (one.nodes >= SMOOTH * one.pocket)
-        found[:, 2:] = waves[:, None]
-        # Half a wave further on and upside down the rim is what it is here.
+    def is_free(self) -> NDArray[np.bool_]:
+        """True for the places that are degrees of freedom, (nodes, places)."""
+        balloon = self.balloon
+        number = np.arange(len(balloon.nodes))
+        film = (number >= balloon.neck_edge) & (number < balloon.edge)
+        mask = np.zeros((len(number), PLACES), dtype=bool)
+        mask[:, R] = (number > 0) | (balloon.bore > 0)
+        mask[:, Z] = film
+        waves = film & (number > balloon.neck_edge) & (balloon.nodes >= SMOOTH * balloon.pocket)
+        mask[:, 2:] = waves[:, None]
+        # The rim is antisymmetric under a half-wave shift: only even harmonics lie in its plane.
         for k in range(2, OVERTONES + 1, 2):
-            found[one.edge :, first_of(k)] = found[one.edge :, first_of(k) + 2] = True
-        found[one.edge, [EDGE, UP]] = True
-        return found
+            mask[balloon.edge :, first_of(k)] = mask[balloon.edge :, first_of(k) + 2] = True
+        mask[balloon.edge, [EDGE, UP]] = True
+        return mask
 
     @cached_property
     def freedoms(self) -> NDArray[np.int_]:
-        return np.flatnonzero(self.kept.ravel())
+        return np.flatnonzero(self.is_free.ravel())
 
     @cached_property
     def tail(self) -> Array:
-        """What the last freedoms make of the places of the last film element's two nodes, and then
-        of the rim's: (nodes x places, freedoms).
+        """Places of the last film element's two nodes, and of the rim's, by the last freedoms:
+        (nodes x places, freedoms).
         """
-        one, edge = self.balloon, self.balloon.edge
-        free = self.kept[edge - 1 :]
+        balloon, edge = self.balloon, self.balloon.edge
+        free = self.is_free[edge - 1 :]
         number = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-        rim = len(one.nodes) - edge
-        found = np.zeros((2 + rim, PLACES, int(free.sum())))
+        rim = len(balloon.nodes) - edge
+        tail = np.zeros((2 + rim, PLACES, int(free.sum())))
         for node, of in enumerate([0, 1, *range(1, 1 + rim)]):
             places = np.flatnonzero(number[of] >= 0)
             if node >= 2:
                 places = places[(places != EDGE) & (places != UP)]
-            found[node, places, number[of, places]] = 1.0
+            tail[node, places, number[of, places]] = 1.0
         # The section tilts: by -2 / thickness for each mm that the film's end goes out.
-        found[2:, UP, number[1, UP]] = 1.0
-        found[2:, UP, number[1, EDGE]] = -2 * (one.nodes[edge:] - one.pocket) / one.thickness
-        return found.reshape(-1, found.shape[-1])
+        tail[2:, UP, number[1, UP]] = 1.0
+        tail[2:, UP, number[1, EDGE]] = (
+            -2 * (balloon.nodes[edge:] - balloon.pocket) / balloon.thickness
+        )
+        return tail.reshape(-1, tail.shape[-1])
 
     @cached_property
     def packing(self) -> BlockPacking:
-        """Where entries of blocks go: of each node, with the next, and with the one after that."""
-        nodes = len(self.kept)
-        number = np.full(self.kept.size, -1)
+        """Index map of blocks: of each node, with the next, and with the one after that."""
+        nodes = len(self.is_free)
+        number = np.full(self.is_free.size, -1)
         number[self.freedoms] = np.arange(len(self.freedoms))
         by_node = number.reshape(nodes, PLACES)
         from_, row, off, begin = [], [], [], 0
@@ -165,16 +174,16 @@ class Waving:
 
     @cached_property
     def plate(self) -> Array:
-        """One film's share of the rim's bending and twisting (Kirchhoff): second derivatives by the
-        change and by the mean of z_1 along each element, (elements, 2, 2).
+        """One film's share of the rim's bending and twisting stiffness (Kirchhoff): second
+        derivatives by the change and by the mean of z_1 along each element, (elements, 2, 2).
         """
-        one, n = self.balloon, self.waves
-        length, middle = one.film.lengths, one.film.middles
-        rigid = both_bend((one, one)) / (1 - one.poisson**2) / 4
-        area = math.tau * middle * length * (np.arange(len(length)) >= one.edge)
+        balloon, n = self.balloon, self.waves
+        length, middle = balloon.film.lengths, balloon.film.middles
+        rigid = bonded_bending_stiffness((balloon, balloon)) / (1 - balloon.poisson**2) / 4
+        area = math.tau * middle * length * (np.arange(len(length)) >= balloon.edge)
         bent = np.stack([1 / middle, -((n / middle) ** 2)], -1)
         wrung = n * np.stack([1 / middle, -1 / middle**2], -1)
-        by = _squares(bent) + 2 * (1 - one.poisson) * _squares(wrung)
+        by = _squares(bent) + 2 * (1 - balloon.poisson) * _squares(wrung)
         return np.asarray(rigid * area[:, None, None] * by)
 
 
@@ -188,8 +197,8 @@ def _overtones() -> list[tuple[int, Array, Array]]:
 
 
 class Parts(NamedTuple):
-    """Of each element the change along it and the mean, (rows, elements, places), and an energy's
-    derivatives by them, first and second.
+    """Changes and means of each element, (rows, elements, places), and an energy's derivatives by
+    them, first and second.
     """
 
     change: Array
@@ -202,12 +211,14 @@ class Parts(NamedTuple):
 
 
 class Sums:
-    """An energy's derivatives node by node: ``by_node`` (rows, nodes, places), and second ones of
-    each node, ``own``, with the ``next`` one and with the one ``after`` that.
+    """An energy's derivatives assembled by node: ``by_node`` (rows, nodes, places), and second ones
+    of each node, ``diagonal``, with the ``next`` one and with the one ``after`` that.
     """
 
     def __init__(self, of: Waving, parts: Parts, kinks: Array) -> None:
-        """``kinks`` (rows, elements - 1, places, places) join changes along neighbours."""
+        """Assemble parts; ``kinks`` (rows, elements - 1, places, places) couple neighbouring
+        elements.
+        """
         self.of = of
         nodes, edge = len(of.balloon.nodes), of.balloon.edge
         one_over = 1 / of.balloon.film.lengths[:, None]
@@ -223,14 +234,14 @@ class Sums:
         self.by_node = np.zeros((count, nodes, PLACES))
         self.by_node[:, :edge] += inner[:, :edge]
         self.by_node[:, 1 : edge + 1] += outer[:, :edge]
-        self.own = np.zeros((count, nodes, PLACES, PLACES))
-        self.own[:, :edge] += first[:, :edge]
-        self.own[:, 1 : edge + 1] += second[:, :edge]
+        self.diagonal = np.zeros((count, nodes, PLACES, PLACES))
+        self.diagonal[:, :edge] += first[:, :edge]
+        self.diagonal[:, 1 : edge + 1] += second[:, :edge]
         self.next = np.zeros((count, nodes - 1, PLACES, PLACES))
         self.next[:, :edge] += across[:, :edge]
         self.after = np.zeros((count, nodes - 2, PLACES, PLACES))
         inside = kinks[:, : edge - 1]
-        self.own[:, 1:edge] -= inside + inside.swapaxes(2, 3)
+        self.diagonal[:, 1:edge] -= inside + inside.swapaxes(2, 3)
         self.next[:, 1:edge] += inside
         self.next[:, : edge - 1] += inside
         self.after[:, : edge - 1] -= inside
@@ -243,9 +254,9 @@ class Sums:
         )
 
     def _rim(
-        self, inner: Array, outer: Array, own: tuple[Array, Array], across: Array, kink: Array
+        self, inner: Array, outer: Array, diagonal: tuple[Array, Array], across: Array, kink: Array
     ) -> None:
-        """The rim, and the kink between it and the film, by the last freedoms."""
+        """Assemble the rim, and the kink between it and the film, by the last freedoms."""
         tail, rim = self.of.tail, inner.shape[1]
         by = np.zeros((len(inner), rim + 3, PLACES))
         by[:, 2:-1] += inner
@@ -253,8 +264,8 @@ class Sums:
         whole = np.zeros((len(inner), rim + 3, PLACES, rim + 3, PLACES))
         for i in range(rim):
             a, b = 2 + i, 3 + i
-            whole[:, a, :, a] += own[0][:, i]
-            whole[:, b, :, b] += own[1][:, i]
+            whole[:, a, :, a] += diagonal[0][:, i]
+            whole[:, b, :, b] += diagonal[1][:, i]
             whole[:, a, :, b] += across[:, i]
             whole[:, b, :, a] += across[:, i].swapaxes(1, 2)
         for a, b, sign in ((0, 2, 1), (0, 3, -1), (1, 2, -1), (1, 3, 1)):
@@ -265,16 +276,16 @@ class Sums:
         self.tails = tail.T @ whole.reshape(-1, size, size) @ tail
 
     def by_freedoms(self) -> tuple[Array, Array]:
-        """First derivatives by coordinate (nodes x places, rows), 0 where none may move, and second
-        ones as a band (freedoms, width, rows).
+        """Return the gradient by coordinate (nodes x places, rows), 0 for fixed ones, and the
+        tangent stiffness as a band (freedoms, width, rows).
         """
         of, how = self.of, self.of.packing
         count = len(self.by_node)
-        slopes = np.where(of.kept.ravel()[:, None], self.by_node.reshape(count, -1).T, 0.0)
+        slopes = np.where(of.is_free.ravel()[:, None], self.by_node.reshape(count, -1).T, 0.0)
         ends = len(self.by_tail[0])
         slopes[of.freedoms[-ends:]] += self.by_tail.T
         blocks = np.concatenate(
-            [part.reshape(count, -1) for part in (self.own, self.next, self.after)], 1
+            [part.reshape(count, -1) for part in (self.diagonal, self.next, self.after)], 1
         )
         size, width = how.size
         flat = np.zeros((size * width, count))
@@ -286,23 +297,19 @@ class Sums:
         return slopes, band
 
 
-# The energy of a round balloon whose films wave in step with its rim (``waving``).
-#
-# Films are membranes of Saint Venant and Kirchhoff's law; they bend along the meridian slice by
-# slice, as in ``film_elements``, and round the hoop wave by wave. One film and its share of the rim
-# are computed. Lengths mm, pressures kPa, energies uJ, air ul.
+# The energy of one film and its share of the rim.
 
 
-CLOSE = 1e-6
-"""Force out of balance, as a share of pressure times pocket area, that is none."""
-MORE = (0.001, 0.01, 0.1, 1.0)
-"""Shares of the diagonal that are added in turn where second derivatives are not those of a dip."""
+RESIDUAL = 1e-6
+"""Residual force, as a share of pressure times pocket area, that counts as equilibrium."""
+DAMPINGS = (0.001, 0.01, 0.1, 1.0)
+"""Shares of the diagonal that are added in turn where the tangent stiffness is indefinite."""
 
 
 class Slices(NamedTuple):
-    """What changes and means of elements are in each slice: along the meridian (rows, elements, 3,
-    slices), and round the hoop (.., 4, ..), of which the last is z. And an energy's derivatives by
-    them, first and second.
+    """Rates of elements in each slice: along the meridian (rows, elements, 3, slices), and round
+    the hoop (.., 4, ..), of which the last is z. And an energy's derivatives by them, first and
+    second.
     """
 
     along: Array
@@ -315,9 +322,9 @@ class Slices(NamedTuple):
 
 
 class WaveTotal(NamedTuple):
-    """Energy less the air's work of one film and its share of the rim, (rows,); its derivatives by
-    coordinate (coordinates, rows), and second ones as a band of freedoms. What films store, uJ; the
-    air on the film's side of the middle plane, ul.
+    """Energy less the air's work of one film and its share of the rim, (rows,); its gradient by
+    coordinate (coordinates, rows), and the tangent stiffness as a band of freedoms. Energy stored
+    in the films, uJ; the air on the film's side of the middle plane, ul.
     """
 
     energy: Array
@@ -328,52 +335,53 @@ class WaveTotal(NamedTuple):
 
 
 class Waves:
-    """Energies of waving films, for ``least_energy``: coordinates (nodes x places, rows).
+    """Energies of waving films, as a ``least_energy.Potential``: coordinates (nodes x places,
+    rows).
 
     ``normals`` (rows, elements, 3) are those of the mean meridian in r and z, and its stretch; they
-    say which way is out of the film where it bends round the hoop.
+    are the direction out of the film in which it bends round the hoop.
     """
 
     def __init__(self, of: Waving, pressure: Array, normals: Array) -> None:
         self.of, self.pressure, self.normals = of, pressure, normals
-        one = of.balloon
-        self.scale = pressure * one.pocket**3
-        self.close = CLOSE * pressure * math.pi * one.pocket**2
+        balloon = of.balloon
+        self.scale = pressure * balloon.pocket**3
+        self.close = RESIDUAL * pressure * math.pi * balloon.pocket**2
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        found = self.total(x, rows)
-        return Descent(found.energy, found.gradient, found.band)
+        state = self.total(x, rows)
+        return Descent(state.energy, state.gradient, state.band)
 
-    def ahead(self, state: Descent, damping: Array) -> Array:
+    def newton_step(self, state: Descent, damping: Array) -> Array:
         band = state.matrix.copy()
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.of.freedoms
-        found = np.zeros_like(state.gradient)
-        found[freedoms] = _downhill(band, -state.gradient[freedoms])
-        return found
+        step = np.zeros_like(state.gradient)
+        step[freedoms] = _newton_steps(band, -state.gradient[freedoms])
+        return step
 
     def change(self, x: Array, ahead: Array) -> Array:
-        """The largest share of its length by which a step changes an element of the mean meridian:
-        (rows,).
+        """Return the largest share of its length by which a step changes an element of the mean
+        meridian: (rows,).
         """
         length, by = (
             np.hypot(np.diff(y[R::PLACES], axis=0), np.diff(y[Z::PLACES], axis=0))
             for y in (x, ahead)
         )
-        held = self.of.balloon.held
-        return np.asarray((by[held:] / length[held:]).max(0))
+        neck_edge = self.of.balloon.neck_edge
+        return np.asarray((by[neck_edge:] / length[neck_edge:]).max(0))
 
     def total(self, x: Array, rows: NDArray[np.int_]) -> WaveTotal:
-        """The energy at coordinates ``x`` of these rows."""
-        of, one = self.of, self.of.balloon
-        p, held, edge = self.pressure[rows], one.held, one.edge
-        places = x.reshape(len(one.nodes), PLACES, -1).transpose(2, 0, 1).copy()
-        places[:, :held, Z] = places[:, held, None, Z]
+        """Return the energy at coordinates ``x`` of these rows."""
+        of, balloon = self.of, self.of.balloon
+        p, neck_edge, edge = self.pressure[rows], balloon.neck_edge, balloon.edge
+        places = x.reshape(len(balloon.nodes), PLACES, -1).transpose(2, 0, 1).copy()
+        places[:, :neck_edge, Z] = places[:, neck_edge, None, Z]
         ends = of.tail.shape[1]
         rim = (of.tail @ x[of.freedoms[-ends:]]).T.reshape(len(p), -1, PLACES)
         inner = np.concatenate([places[:, :edge], rim[:, 2:-1]], 1)
         outer = np.concatenate([places[:, 1 : edge + 1], rim[:, 3:]], 1)
-        change, mean = (outer - inner) / one.film.lengths[:, None], (outer + inner) / 2
+        change, mean = (outer - inner) / balloon.film.lengths[:, None], (outer + inner) / 2
         slices = self._slices(change, mean)
         stored = self._stretched(slices)
         kinks, bent = self._bent(slices)
@@ -383,15 +391,15 @@ class Waves:
         sums = Sums(of, parts, self._joined(kinks))
         volume = volume + self._inner_face(sums, places, p) + self._lid(sums, places, p)
         # The film's end comes down as the rim tilts, and all of the film with it.
-        down = p * math.pi * one.pocket**2 / (2 * one.thickness)
+        down = p * math.pi * balloon.pocket**2 / (2 * balloon.thickness)
         end = x[PLACES * edge + EDGE]
         sums.by_node[:, edge, EDGE] += 2 * down * end
-        sums.own[:, edge, EDGE, EDGE] += 2 * down
+        sums.diagonal[:, edge, EDGE, EDGE] += 2 * down
         energy = stored - p * volume + down * end**2
         return WaveTotal(energy, *sums.by_freedoms(), stored, volume)
 
     def _slices(self, change: Array, mean: Array) -> Slices:
-        """What each slice feels, with derivatives of nothing."""
+        """Return the rates in each slice, with all derivatives 0."""
         of = self.of
         size = change.shape[:2]
         along = (change @ of.along.reshape(-1, PLACES).T).reshape(*size, 3, SLICES)
@@ -401,12 +409,12 @@ class Waves:
         return Slices(along, around, *blank)
 
     def _stretched(self, at: Slices) -> Array:
-        """Stretching and shearing: (rows,)."""
-        one = self.of.balloon
-        flat, nu = one.film, one.poisson
-        size = (math.tau * flat.middles * flat.lengths * one.thickness / SLICES)[:, None]
-        plane = one.modulus / (1 - nu**2) * size
-        c12, c33 = plane * nu, one.modulus / (2 * (1 + nu)) * size
+        """Add stretching and shearing, and return its energy: (rows,)."""
+        balloon = self.of.balloon
+        flat, nu = balloon.film, balloon.poisson
+        size = (math.tau * flat.middles * flat.lengths * balloon.thickness / SLICES)[:, None]
+        plane = balloon.modulus / (1 - nu**2) * size
+        c12, c33 = plane * nu, balloon.modulus / (2 * (1 + nu)) * size
         f, g = at.along, at.around[:, :, :3]
         e1, e2, e12 = ((f * f).sum(2) - 1) / 2, ((g * g).sum(2) - 1) / 2, (f * g).sum(2)
         s1, s2, s12 = plane * e1 + c12 * e2, plane * e2 + c12 * e1, c33 * e12
@@ -427,11 +435,13 @@ class Waves:
         return np.asarray((s1 * e1 + s2 * e2 + s12 * e12).sum((1, 2)) / 2)
 
     def _air(self, at: Slices, p: Array) -> Array:
-        """Air in ul between the middle of the film and the middle plane: (rows,)."""
-        one = self.of.balloon
-        number = np.arange(len(one.film.lengths))
-        size = math.tau / SLICES * one.film.middles * one.film.lengths
-        part = (size * ((number >= one.held) & (number < one.edge)))[:, None]
+        """Add the air between the middle of the film and the middle plane, and return it in ul:
+        (rows,).
+        """
+        balloon = self.of.balloon
+        number = np.arange(len(balloon.film.lengths))
+        size = math.tau / SLICES * balloon.film.middles * balloon.film.lengths
+        part = (size * ((number >= balloon.neck_edge) & (number < balloon.edge)))[:, None]
         r, aside = at.along[:, :, 0], at.along[:, :, 1]
         turned, out, high = (at.around[:, :, k] for k in (0, 1, 3))
         flat = r * out - aside * turned
@@ -452,22 +462,22 @@ class Waves:
         return np.asarray((part * high * flat).sum((1, 2)))
 
     def _bent(self, at: Slices) -> tuple[Array, Array]:
-        """Bending along the meridian, as ``film_elements.bending`` has it, in each slice.
+        """Add bending along the meridian, as in ``film_elements.bending``, in each slice.
 
-        Gives what joins neighbours, by the changes in r and z along each: (rows, elements - 1, 2,
-        2, slices); and the energy, (rows,).
+        Returns the coupling of neighbours, by the changes in r and z along each: (rows, elements -
+        1, 2, 2, slices); and the energy, (rows,).
         """
-        one = self.of.balloon
-        flat, held, edge = one.film, one.held, one.edge
+        balloon = self.of.balloon
+        flat, neck_edge, edge = balloon.film, balloon.neck_edge, balloon.edge
         length = flat.lengths[:, None]
         dr, dz = at.along[:, :, 0] * length, at.along[:, :, 2] * length
         square = dr * dr + dz * dz
         slope = np.arctan2(-dz, dr)
         kink = slope[:, 1 : edge + 1] - slope[:, :edge]
         number = np.arange(len(flat.lengths))
-        free = (number >= held) & (number < edge)
-        bends = np.where(free, flat.lengths, 2 * ROOT * flat.thickness)
-        rigid = math.tau * one.rigidity / SLICES
+        free = (number >= neck_edge) & (number < edge)
+        bends = np.where(free, flat.lengths, 2 * ROOT_LENGTH * flat.thickness)
+        rigid = math.tau * balloon.bending_stiffness / SLICES
         stiff = (2 * rigid * flat.nodes[1 : edge + 1] / (bends[:edge] + bends[1 : edge + 1]))[
             :, None
         ]
@@ -498,7 +508,7 @@ class Waves:
         return joined, energy
 
     def _parts(self, at: Slices, change: Array, mean: Array) -> Parts:
-        """What slices say together of changes and means."""
+        """Return the derivatives by changes and means, summed over the slices."""
         of = self.of
         size = change.shape[:2]
         # Round the hoop, slices were divided by the radius.
@@ -516,28 +526,30 @@ class Waves:
         )
         parts = Parts(change, mean, first, second, *blocks)
         # The neck stays level.
-        held = of.balloon.held
-        parts.by_change[:, :held, Z] = parts.changes[:, :held, Z] = parts.changes[
-            :, :held, :, Z
+        neck_edge = of.balloon.neck_edge
+        parts.by_change[:, :neck_edge, Z] = parts.changes[:, :neck_edge, Z] = parts.changes[
+            :, :neck_edge, :, Z
         ] = 0.0
-        parts.mixed[:, :held, Z] = 0.0
+        parts.mixed[:, :neck_edge, Z] = 0.0
         return parts
 
     def _joined(self, kinks: Array) -> Array:
-        """What joins changes along neighbours: (rows, elements - 1, places, places)."""
+        """Return the coupling of the changes along neighbours: (rows, elements - 1, places,
+        places).
+        """
         size = kinks.shape[:2]
-        found = (kinks.reshape(*size, -1) @ self.of.products[3]).reshape(*size, PLACES, PLACES)
-        found[:, : self.of.balloon.held, Z] = 0.0
-        return found
+        blocks = (kinks.reshape(*size, -1) @ self.of.products[3]).reshape(*size, PLACES, PLACES)
+        blocks[:, : self.of.balloon.neck_edge, Z] = 0.0
+        return blocks
 
     def _waves_bend(self, parts: Parts, rows: NDArray[np.int_]) -> Array:
-        """Films that bend round the hoop, wave by wave: (rows,)."""
-        one = self.of.balloon
-        length, middle = one.film.lengths, one.film.middles
+        """Add the bending of films round the hoop, wave by wave, and return its energy: (rows,)."""
+        balloon = self.of.balloon
+        length, middle = balloon.film.lengths, balloon.film.middles
         normal, stretch = self.normals[rows, :, :2], self.normals[rows, :, 2]
         number = np.arange(len(length))
-        film = (number >= one.held) & (number < one.edge)
-        area = math.tau * middle * length * one.rigidity / 2 * film
+        film = (number >= balloon.neck_edge) & (number < balloon.edge)
+        area = math.tau * middle * length * balloon.bending_stiffness / 2 * film
         energy = np.zeros(len(rows))
         for k in range(1, OVERTONES + 1):
             pair = slice(first_of(k), first_of(k) + 2)
@@ -554,7 +566,7 @@ class Waves:
         return energy
 
     def _plate_bends(self, parts: Parts) -> Array:
-        """The rim, as thick as both films: (rows,)."""
+        """Add the bending of the rim, as thick as both films, and return its energy: (rows,)."""
         plate = self.of.plate
         rise, up = parts.change[:, :, UP], parts.mean[:, :, UP]
         by_rise = plate[:, 0, 0] * rise + plate[:, 0, 1] * up
@@ -567,23 +579,26 @@ class Waves:
         return np.asarray((by_rise * rise + by_up * up).sum(1) / 2)
 
     def _inner_face(self, sums: Sums, places: Array, p: Array) -> Array:
-        """What the film's inner face holds more than its middle, in ul, by the mean meridian."""
-        one = self.of.balloon
+        """Add the volume between the film's middle and its inner face, by the mean meridian, and
+        return it in ul.
+        """
+        balloon = self.of.balloon
         lie = Elements.of(places[:, :, R], places[:, :, Z])
         thick, thin = (
-            air(one.film._replace(thickness=by), one.edge, lie) for by in (one.thickness, 0.0)
+            air_volume(balloon.film._replace(thickness=by), balloon.edge, lie)
+            for by in (balloon.thickness, 0.0)
         )
         slopes = [a - b for a, b in zip(thick.slopes, thin.slopes, strict=True)]
         curves = [a - b for a, b in zip(thick.curves, thin.curves, strict=True)]
-        none = np.zeros((len(p), one.edge))
-        size = (len(p), len(one.nodes), 2)
-        sums.by_node[:, :, :2] -= p[:, None, None] * gradient(slopes).T.reshape(size)
-        band = -p[:, None, None] * matrix(curves, [none] * 4).transpose(2, 0, 1)
+        none = np.zeros((len(p), balloon.edge))
+        size = (len(p), len(balloon.nodes), 2)
+        sums.by_node[:, :, :2] -= p[:, None, None] * assembled_gradient(slopes).T.reshape(size)
+        band = -p[:, None, None] * assembled_tangent(curves, [none] * 4).transpose(2, 0, 1)
         r, z = band[:, 0::2], band[:, 1::2]
-        sums.own[:, :, R, R] += r[:, :, 0]
-        sums.own[:, :, Z, Z] += z[:, :, 0]
-        sums.own[:, :, R, Z] += r[:, :, 1]
-        sums.own[:, :, Z, R] += r[:, :, 1]
+        sums.diagonal[:, :, R, R] += r[:, :, 0]
+        sums.diagonal[:, :, Z, Z] += z[:, :, 0]
+        sums.diagonal[:, :, R, Z] += r[:, :, 1]
+        sums.diagonal[:, :, Z, R] += r[:, :, 1]
         for i, j, by in (
             (R, R, r[:, :, 2]),
             (R, Z, r[:, :, 3]),
@@ -594,35 +609,35 @@ class Waves:
         return thick.energy - thin.energy
 
     def _lid(self, sums: Sums, places: Array, p: Array) -> Array:
-        """Air in ul under the neck and the bore in it."""
-        held = self.of.balloon.held
-        r, z = places[:, held, R], places[:, held, Z]
+        """Add the air under the neck and the bore in it, and return it in ul."""
+        neck_edge = self.of.balloon.neck_edge
+        r, z = places[:, neck_edge, R], places[:, neck_edge, Z]
         press = -math.pi * p
-        sums.by_node[:, held, R] += 2 * press * r * z
-        sums.by_node[:, held, Z] += press * r**2
-        sums.own[:, held, R, R] += 2 * press * z
-        sums.own[:, held, R, Z] += 2 * press * r
-        sums.own[:, held, Z, R] += 2 * press * r
+        sums.by_node[:, neck_edge, R] += 2 * press * r * z
+        sums.by_node[:, neck_edge, Z] += press * r**2
+        sums.diagonal[:, neck_edge, R, R] += 2 * press * z
+        sums.diagonal[:, neck_edge, R, Z] += 2 * press * r
+        sums.diagonal[:, neck_edge, Z, R] += 2 * press * r
         return np.asarray(math.pi * r**2 * z)
 
 
-def _downhill(band: Array, wanted: Array) -> Array:
-    """Newton's steps; with more on the diagonal where second derivatives are not a dip's."""
-    found = least_energy.solve_positive(band, wanted)
-    if found is not None:
-        return found
+def _newton_steps(band: Array, right_side: Array) -> Array:
+    """Return Newton's steps; with a larger diagonal where the tangent stiffness is indefinite."""
+    step = least_energy.solve_positive(band, right_side)
+    if step is not None:
+        return step
     rows = band.shape[-1]
     if rows > 1:
         # Only those that need more are given more.
         halves = slice(None, rows // 2), slice(rows // 2, None)
         return np.concatenate(
-            [_downhill(band[..., half], wanted[..., half]) for half in halves], -1
+            [_newton_steps(band[..., half], right_side[..., half]) for half in halves], -1
         )
     diagonal = np.abs(band[:, 0])
-    for more in MORE:
+    for more in DAMPINGS:
         band = band.copy()
         band[:, 0] += more * diagonal
-        found = least_energy.solve_positive(band, wanted)
-        if found is not None:
-            return found
-    return least_energy.solve(band, wanted)
+        step = least_energy.solve_positive(band, right_side)
+        if step is not None:
+            return step
+    return least_energy.solve(band, right_side)

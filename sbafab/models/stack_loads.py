@@ -1,8 +1,9 @@
-"""A chain of plates: where tilting and rising levels put each plate, and how it moves with them.
+"""Energy of a stack under load: kinematics of its chain of plates, springs of its levels, and
+external forces.
 
 A level has three freedoms: its rise (mm) and the tilt of its upper plate, a rotation vector in the
-lower plate's plane (rad). Half of the tilt comes before the rise and half after: what constant
-curvature within a level does. Arrays have a row a level.
+lower plate's plane (rad). Half of the tilt comes before the rise and half after, as by constant
+curvature within a level. Arrays have a row a level.
 """
 
 from __future__ import annotations
@@ -26,45 +27,47 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 SMALL = 1e-8
-"""Square of the angle below which its functions are those at this one."""
+"""Square of the angle below which functions of the angle are replaced by those at this one."""
 BASE = np.eye(3)
-SIGNS = np.zeros((3, 3, 3))
+LEVI_CIVITA = np.zeros((3, 3, 3))
 """The Levi-Civita symbol."""
-SIGNS[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
-SIGNS[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
-CROSS = SIGNS.transpose(1, 2, 0).reshape(3, 9)
+LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
+LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
+CROSS = LEVI_CIVITA.transpose(1, 2, 0).reshape(3, 9)
 
 
-def _felt() -> Array:
-    """Matrix (12, 24) behind ``felt``."""
-    found = np.zeros((12, 6, 4))
-    arms, forces = found[:9].reshape(3, 3, 6, 4), found[9:]
-    one = np.eye(3)
+def _force_motion_matrix() -> Array:
+    """Return the matrix (12, 24) behind ``force_motions``."""
+    matrix = np.zeros((12, 6, 4))
+    arms, forces = matrix[:9].reshape(3, 3, 6, 4), matrix[9:]
+    unit = np.eye(3)
     # (turn x x) x f is x (turn . f) less turn (x . f).
-    arms[:, :, :3, :3] = np.einsum("kc,lr->klrc", one, one) - np.einsum("kl,rc->klrc", one, one)
-    arms[:, :, :3, 3] = SIGNS.transpose(1, 2, 0)
-    forces[:, 3:, :3] = -SIGNS.transpose(1, 2, 0)
-    forces[:, 3:, 3] = one
-    return found.reshape(12, 24)
+    arms[:, :, :3, :3] = np.einsum("kc,lr->klrc", unit, unit) - np.einsum("kl,rc->klrc", unit, unit)
+    arms[:, :, :3, 3] = LEVI_CIVITA.transpose(1, 2, 0)
+    forces[:, 3:, :3] = -LEVI_CIVITA.transpose(1, 2, 0)
+    forces[:, 3:, 3] = unit
+    return matrix.reshape(12, 24)
 
 
-FELT = _felt()
+FORCE_MOTION = _force_motion_matrix()
 
 
-def _turned() -> Array:
-    """Matrix (12, 13) behind ``_rotations``: of 1, x, y, xx, xy, yx, yy, 1, then xx, xy, yx, yy."""
-    found = np.zeros((12, 13))
-    turn, rate = found[:, :9].reshape(12, 3, 3), found[:, 9:].reshape(12, 2, 2)
+def _rotation_matrix() -> Array:
+    """Return the matrix (12, 13) behind ``_rotations``: of 1, x, y, xx, xy, yx, yy, 1, then xx, xy,
+    yx, yy.
+    """
+    matrix = np.zeros((12, 13))
+    turn, rate = matrix[:, :9].reshape(12, 3, 3), matrix[:, 9:].reshape(12, 2, 2)
     turn[0] = BASE
     # The vector (x, y, 0) as a cross product, then that twice.
-    turn[1:3] = SIGNS[:, :2].transpose(1, 0, 2)
+    turn[1:3] = LEVI_CIVITA[:, :2].transpose(1, 0, 2)
     turn[3:7] = (turn[1:3, None] @ turn[None, 1:3]).reshape(4, 3, 3)
     rate[7] = BASE[:2, :2]
     rate[8:] = np.eye(4).reshape(4, 2, 2)
-    return found
+    return matrix
 
 
-TURNED = _turned()
+ROTATION = _rotation_matrix()
 
 
 class Chain(NamedTuple):
@@ -72,7 +75,7 @@ class Chain(NamedTuple):
     columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
 
     A level's tilt turns all beyond it about its middle: ``middles`` (n, 3) in mm; ``turns``
-    (n, 2, 3) is what a unit of either turns it by.
+    (n, 2, 3) are the rotations by a unit of either tilt.
     """
 
     places: Array
@@ -82,8 +85,8 @@ class Chain(NamedTuple):
     turns: Array
 
 
-def chain(freedoms: Array, pitch: float) -> Chain:
-    """The plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
+def plate_chain(freedoms: Array, pitch: float) -> Chain:
+    """Return the plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
     count = len(freedoms)
     turned, rates = _rotations(freedoms[:, 1:] / 2)
     axes = np.empty((count + 1, 3, 3))
@@ -106,14 +109,14 @@ def chain(freedoms: Array, pitch: float) -> Chain:
 
 @lru_cache(maxsize=16)
 def _sums(count: int) -> Array:
-    """Matrix (count + 1, count) that adds up the rows before each place."""
+    """Return the matrix (count + 1, count) that adds up the rows before each place."""
     return np.tri(count + 1, count, -1)
 
 
 def _rotations(vectors: Array) -> tuple[Array, Array]:
-    """Rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and what a unit of each component,
-    half before and half after, turns by in the xy plane between (n, 2, 2): Rodrigues' formula, and
-    the mean of the left and the right Jacobian.
+    """Return rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and the rotation by a unit of
+    each component, half before and half after, in the xy plane between (n, 2, 2): Rodrigues'
+    formula, and the mean of the left and the right Jacobian.
     """
     count = len(vectors)
     # A column a level: numpy is the faster the longer its last axis.
@@ -128,56 +131,59 @@ def _rotations(vectors: Array) -> tuple[Array, Array]:
     np.multiply((1 - np.cos(angle)) / safe, pairs, out=parts[3:7])
     parts[7] = sine
     np.multiply((1 - sine) / safe, pairs, out=parts[8:])
-    found = parts.T @ TURNED
-    return found[:, :9].reshape(count, 3, 3), found[:, 9:].reshape(count, 2, 2)
+    rows = parts.T @ ROTATION
+    return rows[:, :9].reshape(count, 3, 3), rows[:, 9:].reshape(count, 2, 2)
 
 
 def crossing(vectors: Array) -> Array:
-    """Matrices (..., 3, 3) that make of a row its vector product, the vectors (..., 3) first."""
+    """Return matrices (..., 3, 3) that turn a row into its vector product, the vectors (..., 3)
+    first.
+    """
     return np.asarray((vectors @ CROSS).reshape(*vectors.shape, 3))
 
 
-def felt(arms: Array, forces: Array) -> Array:
-    """What movements as of ``twists`` do with forces f at points x: (n, 6, 4).
+def force_motions(arms: Array, forces: Array) -> Array:
+    """Return moments and work of forces f at points x under motions as of ``level_motions``: (n, 6,
+    4).
 
-    Of the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
-    are the sum of (movement of x) x f, the fourth is that of (movement of x) . f.
+    From the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
+    are the sum of (motion of x) x f, the fourth is that of (motion of x) . f.
     """
     both = np.concatenate([arms.reshape(-1, 9), forces], axis=1)
-    return np.asarray((both @ FELT).reshape(-1, 6, 4))
+    return np.asarray((both @ FORCE_MOTION).reshape(-1, 6, 4))
 
 
-def twists(at: Chain) -> Array:
-    """What a unit of each freedom does to all plates beyond its level: (n, 3, 6).
+def level_motions(at: Chain) -> Array:
+    """Return the motion of all plates beyond a level by a unit of each of its freedoms: (n, 3, 6).
 
     The first three turn, the others move: a point x of these plates moves by turn x x + move.
     """
-    found = np.zeros((len(at.rises), 3, 6))
-    found[:, 0, 3:] = at.rises
-    found[:, 1:, :3] = at.turns
-    np.matmul(at.turns, crossing(at.middles), out=found[:, 1:, 3:])
-    return found
+    motions = np.zeros((len(at.rises), 3, 6))
+    motions[:, 0, 3:] = at.rises
+    motions[:, 1:, :3] = at.turns
+    np.matmul(at.turns, crossing(at.middles), out=motions[:, 1:, 3:])
+    return motions
 
 
-# What the levels of a stack do on their own: energy of balloons and of rims that meet.
+# Springs of the levels: energy of balloons and of rims that meet.
 #
 # Arrays have a row a level, or a row a kind of balloon; lengths mm, energies uJ, volumes ul.
 
 
-RING = 6
-"""Points of each balloon at which its gap is looked at."""
-SHUT = 2e4
-"""mN/mm with which a flat balloon resists being flattened further: no film gives way visibly."""
+RING_POINTS = 6
+"""Points of each balloon at which its gap is evaluated."""
+RIM_STIFFNESS = 2e4
+"""Contact stiffness in mN/mm of a flat balloon, and of rims: no film gives way visibly."""
 
 
 class GapPlaces(NamedTuple):
-    """Where levels are looked at, whatever the pressures.
+    """Points at which the gaps of levels are evaluated, at any pressure.
 
-    ``begins`` (rows, chambers x points) is where the potential of each point begins in the table of
+    ``begins`` (rows, chambers x points) is the first row of each point's potential in the table of
     springs. ``ring`` (rows, chambers x points, 3) are the gaps there, in pieces of the spline, by
     rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, 3,
-    points) are the gaps at all that may be shut: the same, then the rims in mm; ``shut`` (rows,
-    points, 9) their products by how hard each resists.
+    points) are all gaps that may close: those of the rings, then the rims in mm; ``shut`` (rows,
+    points, 9) their products times the contact stiffness.
     """
 
     begins: NDArray[np.int_]
@@ -188,17 +194,17 @@ class GapPlaces(NamedTuple):
 
     @classmethod
     def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
-        """A row a kind of balloon, with gaps at its ring and round its rim, in mm."""
+        """Return a row a kind of balloon, with gaps at its ring and round its rim, in mm."""
         count = gaps.shape[1]
-        begins = np.arange(len(maps) * count // RING).reshape(len(maps), -1) * PIECES_IN_ALL
-        spans = np.array([[one.spans] for one in maps])
+        begins = np.arange(len(maps) * count // RING_POINTS).reshape(len(maps), -1) * PIECES_IN_ALL
+        spans = np.array([[kind.spans] for kind in maps])
         ring = gaps * spans[..., None]
-        stiff = np.full((len(maps), count + rims.shape[1]), SHUT / RING)
+        stiff = np.full((len(maps), count + rims.shape[1]), RIM_STIFFNESS / RING_POINTS)
         stiff[:, :count] /= spans * spans
         meet = np.concatenate([ring, rims], axis=1)
         squares = (meet[..., :, None] * meet[..., None, :]).reshape(*meet.shape[:2], 9)
         return cls(
-            np.repeat(begins, RING, axis=1),
+            np.repeat(begins, RING_POINTS, axis=1),
             ring,
             squares[:, :count],
             np.ascontiguousarray(meet.transpose(0, 2, 1)),
@@ -206,7 +212,7 @@ class GapPlaces(NamedTuple):
         )
 
     def at(self, levels: NDArray[np.int_]) -> GapPlaces:
-        """A row for each of these; one row for all where they are alike."""
+        """Return a row for each level; one row for all where they are equal."""
         if len(self.begins) == 1:
             return self
         begins, ring, squares, meet, shut = self
@@ -215,7 +221,7 @@ class GapPlaces(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """What levels do at given pressures, looked at in ``places``.
+    """Elastic response of levels at given pressures, evaluated in ``places``.
 
     ``table`` holds the ``derivatives`` of the potentials of all splines, then of their volumes.
     """
@@ -231,15 +237,15 @@ class Springs:
         places: GapPlaces,
         sucked: bool = False,
     ) -> Springs:
-        """Those of kinds of balloons at pressures, one a chamber, below 0 only where ``sucked``."""
-        found = np.stack([one.pressed(pressures, sucked) for one in maps])
+        """Return the springs of maps at pressures, one a chamber, below 0 only where ``sucked``."""
+        polynomials = np.stack([kind.pressed(pressures, sucked) for kind in maps])
         # Each point has its share of its balloon.
-        rows = found.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING
+        rows = polynomials.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING_POINTS
         return cls(derivatives(rows), places)
 
     def meeting(self, freedoms: Array, move: Array) -> tuple[Array, Array] | None:
-        """What rims would do, by gradient (rows, 3) and second derivatives (rows, 3, 3), if those
-        which a move closes were shut from where they are; None where it closes none.
+        """Return gradient (rows, 3) and second derivatives (rows, 3, 3) of the contact of those
+        rims that a move closes, as if shut from the start; None where it closes none.
         """
         first = self.places.begins.shape[1]
         rims = self.places.meet[:, :, first:]
@@ -253,12 +259,14 @@ class Springs:
         return (stiffer @ freedoms[..., None])[..., 0], stiffer
 
     def _shut(self, met: NDArray[np.bool_], first: int = 0) -> Array:
-        """Second derivatives (rows, 3, 3) of what resists where ``met`` (rows, points)."""
+        """Return the contact stiffness (rows, 3, 3) of the points ``met`` (rows, points)."""
         each = met.astype(float)[:, None] @ self.places.shut[:, first:]
         return np.asarray(each.reshape(-1, 3, 3))
 
     def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
-        """Energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows, 3, 3)."""
+        """Return the energy (rows) in uJ with its gradient (rows, 3) and second derivatives (rows,
+        3, 3).
+        """
         begins, ring, squares, meet, _ = self.places
         gaps = (freedoms[:, None] @ meet)[:, 0]
         value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
@@ -274,54 +282,55 @@ class Springs:
         return value, gradient, matrix
 
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
-        """Volume in ul of each balloon (rows, chambers), and the potential of each row."""
+        """Return the volume in ul of each balloon (rows, chambers), and the potential of each
+        row.
+        """
         begins, ring = self.places.begins, self.places.ring
         gaps = (ring @ freedoms[..., None])[..., 0]
         both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
-        stored, held = horner(self.table[:, 0], both, gaps)
-        return held.reshape(len(held), -1, RING).sum(-1), stored.sum(-1)
+        stored, volumes = horner(self.table[:, 0], both, gaps)
+        return volumes.reshape(len(volumes), -1, RING_POINTS).sum(-1), stored.sum(-1)
 
 
-# What acts on a stack from outside, and what the stack's energy then does.
+# External loads, and the energy of a stack under them.
 
 
-STIFF = 1e6
+WALL_STIFFNESS = 1e6
 """mN/mm of an outer plate."""
-TOUCHES = 12
+WALL_POINTS = 12
 """Points round the top's outline that may touch the outer plate."""
-TURN = np.arange(TOUCHES) * math.tau / TOUCHES
-RIM = np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], -1)
+WALL_TURNS = np.arange(WALL_POINTS) * math.tau / WALL_POINTS
+WALL_RIM = np.stack([np.cos(WALL_TURNS), np.sin(WALL_TURNS), 0 * WALL_TURNS], -1)
 
 
-def three(values: Sequence[float], what: str) -> Array:
-    """Three numbers (3,). Raises DesignError where they are not three, or not finite."""
+def vector_of(values: Sequence[float], quantity: str) -> Array:
+    """Return three numbers (3,). Raises DesignError where they are not three, or not finite."""
     try:
-        found = np.asarray(values, dtype=float)
+        vector = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        found = np.zeros(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
-        raise DesignError(f"{what} must be three finite numbers, such as (0, 0, -0.1)")
-    return found
+        vector = np.zeros(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise DesignError(f"{quantity} must be three finite numbers, such as (0, 0, -0.1)")
+    return vector
 
 
-def directed(values: Sequence[float], what: str) -> Array:
-    """The direction (3,) of three numbers. Raises DesignError where they have none."""
-    found = three(values, what)
-    length = float(np.linalg.norm(found))
+def direction_of(values: Sequence[float], quantity: str) -> Array:
+    """Return the direction (3,) of three numbers. Raises DesignError where they have none."""
+    vector = vector_of(values, quantity)
+    length = float(np.linalg.norm(vector))
     if not length:
-        raise DesignError(f"{what} has no direction; give three numbers that are not all 0")
-    return found / length
+        raise DesignError(f"{quantity} has no direction; give three numbers that are not all 0")
+    return vector / length
 
 
 class OuterPlate(NamedTuple):
-    """An outer plate: the line (``point`` and ``normal``) on which the tip meets it, whether it
-    ``sticks`` to that line, and how.
+    """An outer plate: the line (``point`` and ``normal``) on which the tip meets it; with
+    ``sticks`` friction holds the tip on that line.
 
-    Points fixed to the top are kept from going beyond: those round its rim, then, where it sticks,
-    its middle either way across the line. ``local`` (points, 3) are their places on the top in mm,
-    ``ways`` (points, 3) the directions in which they are kept, ``crosses`` (points, 3, 3) what
-    makes of a place its vector product with that; ``least`` (points) how deep in mm each is at
-    least when it is kept.
+    Points fixed to the top may not pass the plate: those round its rim, then, where it sticks, its
+    middle either way across the line. ``local`` (points, 3) are their places on the top in mm,
+    ``ways`` (points, 3) the constrained directions, ``crosses`` (points, 3, 3) the matrices of the
+    vector product with these; ``least`` (points) the least depth in mm at which each is in contact.
     """
 
     point: Array
@@ -334,8 +343,12 @@ class OuterPlate(NamedTuple):
 
     @classmethod
     def of(cls, point: Array, normal: Array, sticks: bool, outline: float) -> OuterPlate:
-        """That which a top meets whose rim has the radius ``outline`` in mm."""
-        local, ways, least = outline * RIM, np.tile(normal, (TOUCHES, 1)), np.zeros(TOUCHES)
+        """Return the plate for a top whose rim has the radius ``outline`` in mm."""
+        local, ways, least = (
+            outline * WALL_RIM,
+            np.tile(normal, (WALL_POINTS, 1)),
+            np.zeros(WALL_POINTS),
+        )
         if sticks:
             aside = np.eye(3)[np.argmin(np.abs(normal))]
             aside = aside - (normal @ aside) * normal
@@ -348,32 +361,32 @@ class OuterPlate(NamedTuple):
 
     @property
     def is_level(self) -> bool:
-        """Whether it lies level."""
+        """True if it lies level."""
         return float(self.normal[2]) > 0.999
 
 
 @lru_cache(maxsize=256)
 def outer_plate(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
-    """That on a line: a point in mm, then the normal."""
+    """Return the plate on a line: a point in mm, then the normal."""
     return OuterPlate.of(np.array(line[:3]), np.array(line[3:]), sticks, outline)
 
 
 class Load(NamedTuple):
-    """What acts from outside, in mN: force on the tip, weight of each level, and the outer plate
-    with its stiffness in mN/mm.
+    """External loads, in mN: force on the tip, weight of each level, and the outer plate with its
+    stiffness in mN/mm.
     """
 
     tip: Array
     weight: Array | None
     wall: OuterPlate | None
-    stiffness: float = STIFF
+    stiffness: float = WALL_STIFFNESS
 
 
 class PlateContact(NamedTuple):
-    """Where the top is against an outer plate: by how many mm its points are too ``deep``, and by
-    how many a unit of each turn and move of ``twists`` makes them deeper, ``lines`` (points, 6).
+    """Contact of the top with an outer plate: depth in mm of its points (``deep``), and their
+    increase by a unit of each turn and move of ``level_motions``, ``lines`` (points, 6).
 
-    ``stiff`` and ``least`` (points) say what resists; ``forces`` (points) in mN are those that act.
+    ``stiff`` and ``least`` (points) are their stiffness and least depth; ``forces`` (points) in mN.
     """
 
     deep: Array
@@ -385,16 +398,16 @@ class PlateContact(NamedTuple):
     @property
     def push(self) -> float:
         """Force in mN on the plate."""
-        return float(self.forces[:TOUCHES].sum())
+        return float(self.forces[:WALL_POINTS].sum())
 
     def resists(self, deep: Array) -> Array:
-        """Forces in mN at points so deep (mm)."""
+        """Return the forces in mN at points so deep (mm)."""
         return self.stiff * np.maximum(deep, self.least)
 
 
-class _Acting(NamedTuple):
-    """What acts on the plates: the sum of the forces f beyond each level (n, 3), that of x f over
-    the points x they act on (n, 3, 3), and their energy; n is 1 where all levels carry the same.
+class _ExternalForces(NamedTuple):
+    """External forces on the plates: the sum of the forces f beyond each level (n, 3), that of x f
+    over their points x (n, 3, 3), and their energy; n is 1 where all levels carry the same.
     """
 
     forces: Array
@@ -403,63 +416,70 @@ class _Acting(NamedTuple):
     touch: PlateContact | None = None
 
 
-def _acting(plates: Chain, load: Load, forces: Array | None) -> _Acting:
+def _external_forces(plates: Chain, load: Load, forces: Array | None) -> _ExternalForces:
     tip = plates.places[-1]
-    found = _Acting(load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip))
+    acting = _ExternalForces(
+        load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip)
+    )
     if load.wall is not None:
-        found = _pressed(found, plates, load.wall, load.stiffness, forces)
+        acting = _with_contact(acting, plates, load.wall, load.stiffness, forces)
     if load.weight is not None:
         beyond, number = _beyond(len(plates.rises))
         above = beyond @ plates.places
-        found = _Acting(
-            found.forces + number * load.weight,
-            found.arms + above[:, :, None] * load.weight,
-            found.energy - float(above[0] @ load.weight),
-            found.touch,
+        acting = _ExternalForces(
+            acting.forces + number * load.weight,
+            acting.arms + above[:, :, None] * load.weight,
+            acting.energy - float(above[0] @ load.weight),
+            acting.touch,
         )
-    return found
+    return acting
 
 
-def _pressed(
-    found: _Acting, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
-) -> _Acting:
-    """With what the outer plate does to the tip: ``forces``, or those of points so deep."""
+def _with_contact(
+    acting: _ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
+) -> _ExternalForces:
+    """Return the forces with those of the outer plate on the tip: ``forces``, or by its
+    stiffness.
+    """
     points = plates.places[-1] + wall.local @ plates.axes[-1].T
     deep = ((points - wall.point) * wall.ways).sum(-1)
     lines = np.concatenate([(points[:, None] @ wall.crosses)[:, 0], wall.ways], axis=1)
     stiff = np.full(len(deep), stiffness)
-    stiff[:TOUCHES] /= TOUCHES
+    stiff[:WALL_POINTS] /= WALL_POINTS
     resists = stiff * np.maximum(deep, wall.least)
     acts = resists if forces is None else forces
     each = acts[:, None] * wall.ways
-    return _Acting(
-        found.forces - acts @ wall.ways,
-        found.arms - points.T @ each,
-        found.energy + float(resists @ deep) / 2,
+    return _ExternalForces(
+        acting.forces - acts @ wall.ways,
+        acting.arms - points.T @ each,
+        acting.energy + float(resists @ deep) / 2,
         PlateContact(deep, lines, stiff, wall.least, acts),
     )
 
 
 @lru_cache(maxsize=16)
 def _beyond(count: int) -> tuple[Array, Array]:
-    """Which plates (count, count + 1) lie beyond each level, and their number (count, 1)."""
-    found = 1.0 - np.tri(count, count + 1)
-    return found, found.sum(axis=1, keepdims=True)
+    """Return a mask of the plates beyond each level (count, count + 1), and their number (count,
+    1).
+    """
+    mask = 1.0 - np.tri(count, count + 1)
+    return mask, mask.sum(axis=1, keepdims=True)
 
 
-class Loaded(NamedTuple):
+class LoadedEnergy(NamedTuple):
     """Energy of a stack under a load with its gradient (freedoms).
 
-    ``own`` (levels, 3) and ``blocks`` (levels, 3, 3) are first and second derivatives of the
-    springs; ``moved`` (levels, 3, 6) and ``works`` (levels, 3, 6, 4) what each freedom does to
-    the plates beyond it, and that with the forces on them; ``touch`` what an outer plate does.
+    ``spring_gradient`` (levels, 3) and ``blocks`` (levels, 3, 3) are first and second derivatives
+    of the springs; ``motions`` (levels, 3, 6) of the plates beyond each level by its freedoms,
+    ``works`` (levels, 3, 6, 4) those with the forces on them; ``touch`` the contact with an outer
+    plate.
     """
 
     value: float
     gradient: Array
-    own: Array
+    spring_gradient: Array
     blocks: Array
-    moved: Array
+    motions: Array
     works: Array
     touch: PlateContact | None
 
@@ -469,58 +489,62 @@ class Loaded(NamedTuple):
         return 0.0 if self.touch is None else self.touch.push
 
     def turned(self) -> Array:
-        """Second derivatives (freedoms, freedoms) by forces alone, without what gives way.
+        """Return the geometric stiffness (freedoms, freedoms), by the forces alone.
 
-        A level nearer the base turns all movements beyond it. What the tilts of one level do to
-        each other is taken at their mean: enough to descend by.
+        A level nearer the base turns all motions beyond it. The mutual effect of the two tilts of
+        one level is taken at its mean: enough for a descent.
         """
         size = self.gradient.size
-        half = self.moved.reshape(size, 6)[:, :3] @ self.works[..., :3].reshape(size, 3).T
-        half *= _nearer(size // 3)
+        half = self.motions.reshape(size, 6)[:, :3] @ self.works[..., :3].reshape(size, 3).T
+        half *= _base_side(size // 3)
         return -(half + half.T)
 
     def deeper(self, touch: PlateContact) -> Array:
-        """Mm by which a unit of each freedom makes the points of a touch deeper: (points,
+        """Return the increase in mm of a contact's depths by a unit of each freedom: (points,
         freedoms).
         """
-        return np.asarray(touch.lines @ self.moved.reshape(-1, 6).T)
+        return np.asarray(touch.lines @ self.motions.reshape(-1, 6).T)
 
     def rest(self) -> Array:
-        """Second derivatives (freedoms, freedoms) without those of the springs."""
-        found = self.turned()
+        """Return the tangent stiffness (freedoms, freedoms) without the springs."""
+        stiffness = self.turned()
         if self.touch is not None:
             lines = self.deeper(self.touch)
-            found += (lines.T * (self.touch.stiff * (self.touch.deep > self.touch.least))) @ lines
-        return found
+            stiffness += (
+                lines.T * (self.touch.stiff * (self.touch.deep > self.touch.least))
+            ) @ lines
+        return stiffness
 
 
-def with_blocks(rest: Array, blocks: Array) -> Array:
-    """A matrix (freedoms, freedoms) with blocks (levels, 3, 3) added on its diagonal."""
-    found = rest.copy()
+def with_diagonal_blocks(rest: Array, blocks: Array) -> Array:
+    """Return a matrix (freedoms, freedoms) with blocks (levels, 3, 3) added on its diagonal."""
+    whole = rest.copy()
     count = len(blocks)
-    diagonal = np.einsum("iaib->iab", found.reshape(count, 3, count, 3))
+    diagonal = np.einsum("iaib->iab", whole.reshape(count, 3, count, 3))
     diagonal += blocks
-    return found
+    return whole
 
 
-def loaded(
+def loaded_energy(
     springs: Springs, pitch: float, load: Load, at: Array, forces: Array | None = None
-) -> Loaded:
-    """What the energy of a stack under a load does, an outer plate by ``forces`` (mN) of its points
-    if they are given: the gradient is then what is missing from a balance with these.
+) -> LoadedEnergy:
+    """Return the energy of a stack under a load, with contact ``forces`` (mN) of an outer plate if
+    given: the gradient is then the residual against these.
     """
-    value, own, blocks = springs.energy(at)
-    plates = chain(at, pitch)
-    acting = _acting(plates, load, forces)
-    moved = twists(plates)
-    works = moved @ felt(acting.arms, acting.forces)
-    gradient = (own - works[..., 3]).ravel()
+    value, spring_gradient, blocks = springs.energy(at)
+    plates = plate_chain(at, pitch)
+    acting = _external_forces(plates, load, forces)
+    motions = level_motions(plates)
+    works = motions @ force_motions(acting.arms, acting.forces)
+    gradient = (spring_gradient - works[..., 3]).ravel()
     energy = float(value.sum()) + acting.energy
-    return Loaded(energy, gradient, own, blocks, moved, works, acting.touch)
+    return LoadedEnergy(energy, gradient, spring_gradient, blocks, motions, works, acting.touch)
 
 
 @lru_cache(maxsize=16)
-def _nearer(count: int) -> Array:
-    """1 where the row's level is nearer the base than the column's, half where it is the same."""
+def _base_side(count: int) -> Array:
+    """Return 1 where the row's level is nearer the base than the column's, half where both are one
+    level.
+    """
     level = np.repeat(np.arange(count), 3)
     return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.shapes import colours, linear, placed_surface
-from sbafab.assemblies.writing import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.cutting.sheets import SheetFile
-from sbafab.meshing.write_glb import Node, write_scene
+from sbafab.meshing.formats.glb import Node, write_scene
 from sbafab.output.artefacts import (
     FINDINGS,
     TRAVELLER,

@@ -1,4 +1,4 @@
-"""Several copies of one laminate: how many go into a press cycle, where they lie, how long."""
+"""Several copies of one laminate: their places in the press, its cycles, and the working days."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from sbafab.pressing.schedule import (
 )
 
 APART = 5.0
-"""mm between two copies in the press, ours: so far do films flow and hands need."""
+"""Gap in mm between two copies in the press, ours: films flow, and hands need room."""
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Runs:
-    """How ``copies`` are pressed: side by side at these ``places``, cycle after cycle.
+    """Press cycles of ``copies``, side by side at these ``places``.
 
-    A place is how far a laminate's frame is moved from that of the first one, which lies at the
+    A place is the offset of a laminate's frame from that of the first one, which lies at the
     lower left; rows fill from there. The last cycle may be smaller than the others.
     """
 
@@ -41,7 +41,7 @@ class Runs:
 
     @property
     def cycles(self) -> tuple[int, ...]:
-        """How many copies each cycle presses."""
+        """Copies in each cycle."""
         full, rest = divmod(self.copies, self.together)
         return (self.together,) * full + ((rest,) if rest else ())
 
@@ -57,7 +57,8 @@ def press_runs(
     margin: float = 0.0,
     most: int | None = None,
 ) -> Runs:
-    """As many copies at once as the heated area (mm) takes; ``bounds`` are those of one.
+    """Return runs with as many copies at once as the heated area (mm) takes; ``bounds`` are those
+    of one.
 
     ``margin`` mm of base plate lie round all of them; the plate lies on the platen either way.
     Where no cycle may take more than ``most``, cycles are as equal as can be: each place costs
@@ -86,7 +87,9 @@ def press_runs(
 def runs_of(
     laminate: Laminate, copies: int, platen: tuple[float, float], most: int | None = None
 ) -> Runs:
-    """The press runs of a laminate, on one base plate; registered sheets are one piece to it."""
+    """Return the press runs of a laminate, on one base plate; registered sheets count as one
+    piece.
+    """
     if laminate.panel is not None:
         return Runs(1, ((0.0, 0.0),))
     margin = PLATE_MARGIN if laminate.pins else 0.0
@@ -94,20 +97,23 @@ def runs_of(
 
 
 def design_runs(design: Design, laminate: Laminate, copies: int | None = None) -> Runs:
-    """The press runs of ``copies``, or of all that a design orders; none is longer than a shift."""
+    """Return the press runs of ``copies``, by default of the order; no cycle is longer than a
+    shift.
+    """
     press = design.press
     return runs_of(
         laminate,
         design.order.quantity if copies is None else copies,
         (press.platen_width, press.platen_length),
-        _a_shift(design, laminate),
+        _copies_a_shift(design, laminate),
     )
 
 
-def _a_shift(design: Design, laminate: Laminate) -> int:
-    """Return how many copies one person makes in a cycle of one working day, at least one.
+def _copies_a_shift(design: Design, laminate: Laminate) -> int:
+    """Return the number of copies that one person makes in a cycle of one working day, at least
+    one.
 
-    Minutes that nobody stated for the film count as none: the press may then take longer.
+    Minutes that are not stated for the film count as none: the press may then take longer.
     """
     press = design.press
     settings = PressSettings(
@@ -120,21 +126,21 @@ def _a_shift(design: Design, laminate: Laminate) -> int:
     pressing = 0.0
     if not films_without_minutes(laminate, settings):
         pressing = sum(settings.minutes(part.name) for part in assembly(laminate))
-    left = 60 * design.order.shift_hours - pressing
-    return max(1, math.floor(left / HANDLING_MINUTES + ROUNDING))
+    handling = 60 * design.order.shift_hours - pressing
+    return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))
 
 
 def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, int]:
-    """Columns and rows."""
+    """Return columns and rows."""
     columns, rows = (
-        max(0, math.floor((most + APART + ROUNDING) / (own + APART)))
-        for most, own in zip(room, size, strict=True)
+        max(0, math.floor((most + APART + ROUNDING) / (side + APART)))
+        for most, side in zip(room, size, strict=True)
     )
     return columns, rows
 
 
 def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
-    """Whether copies at these places keep APART, but for ``room`` mm."""
+    """Return True if copies at these places keep APART, within a tolerance ``room`` in mm."""
     wide = bounds[2] - bounds[0] + APART - room
     high = bounds[3] - bounds[1] + APART - room
     return all(
@@ -146,9 +152,7 @@ def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
 
 @dataclass(frozen=True)
 class BatchTimes:
-    """Minutes that a batch takes: in the press (None: not stated), by hand, and both after each
-    other.
-    """
+    """Minutes of a batch: in the press (None: not stated), by hand, and both in sequence."""
 
     press: float | None
     hands: float
@@ -159,7 +163,8 @@ class BatchTimes:
 
 
 def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
-    """The press closes once a cycle; every copy takes the same hands as one by itself.
+    """Return the times of a batch: the press closes once a cycle; every copy needs the full hand
+    work.
 
     Nothing is taken off for hands that work while the press is closed.
     """
@@ -172,7 +177,7 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
 def working_days(
     design: Design, laminate: Laminate, plan: Schedule, copies: int | None = None
 ) -> tuple[Entry, ...]:
-    """Return all work on ``copies``, or on all that a design orders, by working day.
+    """Return all work on ``copies``, by default on the order, by working day.
 
     Empty where the minutes in the press are not stated.
     """
@@ -184,27 +189,28 @@ def working_days(
 
 
 def a_day(plan: Schedule, together: int, minutes: float) -> int | None:
-    """Return how many actuators one person makes in a shift with one press, ``together`` at once.
+    """Return the number of actuators that one person makes in a shift with one press, ``together``
+    at once.
 
     None where the minutes in the press are not stated.
     """
     if plan.total_press_minutes is None:
         return None
-    made = 0
+    copies = 0
     while True:
-        cycles = math.ceil((made + 1) / together)
-        if (made + 1) * plan.hands_minutes + cycles * plan.total_press_minutes > minutes:
-            return made
-        made += 1
+        cycles = math.ceil((copies + 1) / together)
+        if (copies + 1) * plan.hands_minutes + cycles * plan.total_press_minutes > minutes:
+            return copies
+        copies += 1
 
 
 def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
-    """As many copies as one cycle could press."""
+    """Return the largest number of copies in one cycle."""
     return runs_of(laminate, 10_000, platen).together
 
 
 def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, Any]:
-    """What ``press.json`` says of a batch of several copies."""
+    """Return the entry of ``press.json`` for a batch of several copies."""
     runs, shift = design_runs(design, laminate), 60 * design.order.shift_hours
     times = batch_times(runs, plan)
     most = most_together(laminate, plan.steps[0].platen_mm)
@@ -243,9 +249,9 @@ def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, 
     }
 
 
-# A batch spread over working days: what is done when, and where the work may pause.
+# A batch spread over working days: its tasks, and the places where the work may pause.
 #
-# The paper leaves an hour for all that hands do to one actuator and does not divide it: the shares
+# The paper leaves an hour for all hand work on one actuator and does not divide it: the shares
 # below are ours. Warming and cooling of the base plate, which is ours too, are not in it.
 
 
@@ -278,7 +284,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Entry(Task):
-    """A task, or the part of one, on its ``day`` (from 1), ``start`` minutes after the shift's."""
+    """A task, or a part of one, on its ``day`` (from 1), ``start`` minutes into the shift."""
 
     day: int = 1
     start: float = 0.0
@@ -291,20 +297,20 @@ def tasks(laminate: Laminate, plan: Schedule, cycles: Sequence[int], hands: floa
     """
     parts = [_parts_laid(laminate, part) for part in assembly(laminate)]
     laying = hands * (1 - CUT_SHARE - FINISH_SHARE)
-    found = [Task("cut", (1, sum(cycles)), sum(cycles) * hands * CUT_SHARE)]
+    work = [Task("cut", (1, sum(cycles)), sum(cycles) * hands * CUT_SHARE)]
     last = 0
     for cycle, size in enumerate(cycles, 1):
         copies = last + 1, last + size
         for step, laid in zip(plan.steps, parts, strict=True):
             minutes = size * laying * laid / sum(parts) + (step.minutes or 0.0)
-            found.append(Task("press", copies, minutes, cycle, step.step))
-        found.append(Task("finish", copies, size * hands * FINISH_SHARE, cycle))
+            work.append(Task("press", copies, minutes, cycle, step.step))
+        work.append(Task("finish", copies, size * hands * FINISH_SHARE, cycle))
         last += size
-    return found
+    return work
 
 
 def _parts_laid(laminate: Laminate, part: AssemblyStep) -> int:
-    """Number of pieces and bonded stacks that a step lays down."""
+    """Return the number of pieces and bonded stacks that a step lays down."""
     pieces = sum(len(laminate.layer(index).profile.pieces) for index in part.adds)
     return pieces + sum(set(stack).isdisjoint(part.adds) for stack in part.stacks if stack)
 
@@ -331,8 +337,8 @@ def _entries(work: Sequence[Task], shift: float) -> Iterator[Entry]:
             continue
         first, each = task.copies[0], task.minutes / task.count
         while first <= task.copies[1]:
-            left = task.copies[1] - first + 1
-            count = max(0, min(left, math.floor((shift - start + HOUR_ROUNDING) / each)))
+            remaining = task.copies[1] - first + 1
+            count = max(0, min(remaining, math.floor((shift - start + HOUR_ROUNDING) / each)))
             if not count and start:
                 day, start = day + 1, 0.0
                 continue

@@ -1,4 +1,6 @@
-"""Layers and lists in words."""
+"""The heat-press schedule: steps, their layers, pins, pressures and minutes, how the plate warms,
+the tacking of registered sheets, and the warnings for the technician.
+"""
 
 from __future__ import annotations
 
@@ -46,12 +48,12 @@ from sbafab.pressing.dowels import (
 
 
 def listed(words: Sequence[str]) -> str:
-    """One, two and three."""
+    """Return words as a list: one, two and three."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def named(layers: Sequence[int]) -> str:
-    """Layer indices in words; never 2-3, which a spreadsheet takes for a date."""
+    """Return layer indices in words; never 2-3, which a spreadsheet takes for a date."""
     runs: list[list[int]] = []
     for index in layers:
         if runs and index == runs[-1][1] + 1:
@@ -70,21 +72,20 @@ def named(layers: Sequence[int]) -> str:
     return f"layer{'s' if len(layers) > 1 else ''} {listed(words)}"
 
 
-# How a cold plate warms between hot platens: a time-temperature line, first order.
+# Warming of a cold plate between hot platens: a time-temperature line, first order.
 #
 # The paper states minutes at 135 C (Sec. 2); it does not say when its clock starts, nor what lay
 # between platens and films. Ours: the plate goes in cold, its edge follows T(t) = platen - (platen
 # - start) exp(-t / tau), and the clock starts when the edge reads 5 C less than the platens, or
-# the melting point where that is higher. tau is the bench's own, measured once. Temperatures are
-# C.
+# the melting point where that is higher. tau is the bench's own, measured once.
 
 
 ROOM = 20.0
-"""C at which plate and films are when the press closes: ours."""
-WARM = 5.0
-"""C by which the plate's edge may be colder than the platens when the clock starts: ours."""
+"""Temperature of plate and films when the press closes, C: ours."""
+CLOCK_SHORTFALL = 5.0
+"""Largest shortfall of the plate's edge behind the platens when the clock starts, C: ours."""
 PATIENCE = 5.0
-"""Time constants after which a first-order plate is within 1 C of where it ends: ours."""
+"""Time constants after which a first-order plate is within 1 C of its final temperature: ours."""
 MELTING, START, END = "melting point", "clock starts", "clock ends"
 
 
@@ -102,8 +103,8 @@ class HeatPoint:
 
 @dataclass(frozen=True)
 class Heating:
-    """What the line is drawn with. ``melting_c`` is the highest melting point of the structural
-    films, ``time_constant_minutes`` the bench's; None where they are not known.
+    """Parameters of the time-temperature line. ``melting_c`` is the highest melting point of the
+    structural films, ``time_constant_minutes`` the bench's; None where they are not known.
     """
 
     start_c: float
@@ -151,14 +152,16 @@ class Heating:
 
 
 def heating(laminate: Laminate, press: PressSettings) -> Heating:
-    """Return how the plate under a laminate warms; the press must be hotter than its films melt."""
+    """Return the warming of the plate under a laminate; the press must be hotter than its films
+    melt.
+    """
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     melting = [film.softens_above for film in films if film.softens_above is not None]
     is_known = bool(melting) and not any(
         film.softens_above is None and not film.stays_solid for film in films
     )
     hottest = max(melting) if is_known else None
-    clock = max(press.temperature_c - WARM, hottest or 0.0)
+    clock = max(press.temperature_c - CLOCK_SHORTFALL, hottest or 0.0)
     return Heating(
         start_c=ROOM,
         platen_c=press.temperature_c,
@@ -176,7 +179,7 @@ def heating(laminate: Laminate, press: PressSettings) -> Heating:
 
 
 def unstated_minutes(films: list[Film], press: PressSettings) -> str:
-    """Return the warning that the minutes are nobody's for these films; empty for none."""
+    """Return the warning that no minutes are stated for these films; empty for none."""
     if not films:
         return ""
     names = [f'"{film.said}"' for film in films]
@@ -190,11 +193,11 @@ def unstated_minutes(films: list[Film], press: PressSettings) -> str:
 
 
 def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
-    """Return the structural films of a laminate that the minutes were not stated for."""
+    """Return the structural films of a laminate for which no minutes are stated."""
     return unstated((layer.film for layer in laminate.layers), press.minutes_for)
 
 
-# The heat-press schedule: which layers are pressed together, in what order (paper Sec. 2).
+# The steps: layers pressed together, in their order (paper Sec. 2).
 #
 # Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
 
@@ -227,7 +230,7 @@ HANDLING_MINUTES = 60.0
 
 @dataclass(frozen=True)
 class PressSettings:
-    """What the press is set to; the defaults are the paper's (Sec. 2)."""
+    """Settings of the press; the defaults are the paper's (Sec. 2)."""
 
     temperature_c: float = 135.0
     pressure_kpa: float = 110.0
@@ -259,7 +262,9 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """How long the press stays closed in a step; tacking is a flash bond."""
+        """Return the minutes for which the press stays closed in a step; tacking is a flash
+        bond.
+        """
         return {
             "flash_bottom": self.flash_bottom,
             "tack_bottom": self.flash_bottom,
@@ -321,10 +326,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All steps, the time they take, and what the technician should know beforehand.
+    """All steps, their time, and the warnings for the technician.
 
     The two totals are None where the minutes of a step are; warming up is not in them.
-    ``hands_minutes`` are what the estimate has beside those in the press.
+    ``hands_minutes`` are the estimate's minutes beside those in the press.
     """
 
     steps: tuple[Step, ...]
@@ -338,21 +343,21 @@ class Schedule:
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
-    """The press steps of a laminate, bottom balloon first.
+    """Return the press steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
     paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
-    that would not bond the films or that one of them or the pad does not stand, and where pad, pins
+    that would not bond the films or is too high for one of them or the pad, and where pad, pins
     or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
     once, one number for each size of cycle, the largest first: they share the force.
     """
     refuse_temperature(laminate, press)
     parts = assembly(laminate)
-    under, *others = (
+    under, *smaller = (
         [build_up.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
     )
-    stacks = [*under, *chain.from_iterable(others)]
+    stacks = [*under, *chain.from_iterable(smaller)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
     pins = pins_by_step(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
@@ -367,14 +372,14 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
                 pad,
                 plate,
                 stack,
-                own,
-                _under(laminate, part, press),
+                step_pins,
+                _underlay(laminate, part, press),
                 warming,
                 press.minutes(part.name) if has_minutes else None,
             ),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
-        for part, stack, own in zip(parts, under, pins, strict=True)
+        for part, stack, step_pins in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
     tacking = None
@@ -406,7 +411,10 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
         heights = [max(heights)] * len(heights)
     return settings_by_step(
         [
-            (round(height + _under(laminate, part, press) + press.release_thickness, 6), part.pins)
+            (
+                round(height + _underlay(laminate, part, press) + press.release_thickness, 6),
+                part.pins,
+            )
             for height, part in zip(heights, parts, strict=True)
         ],
         press.pin_standard,
@@ -430,8 +438,8 @@ def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
     return pin_holes([*pins_by_step(laminate, press), *tacks])
 
 
-def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
-    """Thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
+def _underlay(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
+    """Return the thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
@@ -445,8 +453,8 @@ def _tacked(tacking: Tacking | None) -> str:
 
 
 class _Setting(NamedTuple):
-    """Thickness of pad, plate and underlay, mm, what one step's stack and pins are like, how the
-    plate warms and how long it is pressed.
+    """Set-up of one step: thickness of pad, plate and underlay, mm, its stack and pins, the warming
+    of the plate, and the minutes.
     """
 
     pad: float
@@ -459,10 +467,12 @@ class _Setting(NamedTuple):
 
 
 def _step(
-    laminate: Laminate, part: AssemblyStep, press: PressSettings, own: _Setting, after: str
+    laminate: Laminate, part: AssemblyStep, press: PressSettings, setting: _Setting, after: str
 ) -> Step:
     count = stack_count(laminate, part.layers)
-    found = build_up.pressures(press.pressure_kpa, press.platen, press.pad, own.pad, own.under)
+    estimate = build_up.pressures(
+        press.pressure_kpa, press.platen, press.pad, setting.pad, setting.under
+    )
     title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
     words = _instructions(part, count) + after
     if laminate.panel is not None:
@@ -478,23 +488,25 @@ def _step(
         pressure_kpa=press.pressure_kpa,
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
-        minutes=own.minutes,
-        film_kpa=found.film,
-        edge_kpa=found.edge,
-        bond_kpa=found.bond,
-        plate_kpa=found.plate,
-        pressure_basis=build_up.said(press.pressure_kpa, press.pad, own.pad, own.under, found)
-        + _round_pins(press, own),
-        build_up=tuple(_items(press, own, _size(laminate, part))),
-        pin_settings=own.pins,
+        minutes=setting.minutes,
+        film_kpa=estimate.film,
+        edge_kpa=estimate.edge,
+        bond_kpa=estimate.bond,
+        plate_kpa=estimate.plate,
+        pressure_basis=build_up.pressure_basis(
+            press.pressure_kpa, press.pad, setting.pad, setting.under, estimate
+        )
+        + _round_pins(press, setting),
+        build_up=tuple(_items(press, setting, _size(laminate, part))),
+        pin_settings=setting.pins,
         instructions=words,
-        time_temperature=own.heating.line(own.minutes),
+        time_temperature=setting.heating.line(setting.minutes),
     )
 
 
 def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
-    """Extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears included,
-    or of the registered sheets that they are part of.
+    """Return the extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears
+    included, or of the registered sheets that they are part of.
     """
     profiles = [layer.profile for layer in distinct_layers(laminate, part.layers)]
     if laminate.panel is not None:
@@ -503,30 +515,32 @@ def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
     return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
 
-def _round_pins(press: PressSettings, own: _Setting) -> str:
-    beneath = own.under.height + press.release_thickness + own.underlay
-    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in own.pins), default=0.0)
+def _round_pins(press: PressSettings, setting: _Setting) -> str:
+    beneath = setting.under.height + press.release_thickness + setting.underlay
+    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in setting.pins), default=0.0)
     if not out:
         return ""
     free = build_up.unpressed(press.pressure_kpa, press.pad, out)
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(press: PressSettings, own: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
-    """From the lower platen up; ``size`` in mm is that of the films."""
+def _items(
+    press: PressSettings, setting: _Setting, size: tuple[float, float]
+) -> Iterator[BuildUpPart]:
+    """Yield the build-up from the lower platen up; ``size`` in mm is that of the films."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
-    yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
-    if own.underlay:
-        yield BuildUpPart(UNDERLAY, "plain paper, printed", own.underlay, press.platen)
+    yield BuildUpPart(BASE_PLATE, press.plate_material, setting.plate, press.platen)
+    if setting.underlay:
+        yield BuildUpPart(UNDERLAY, "plain paper, printed", setting.underlay, press.platen)
     yield release
-    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), size)
+    yield BuildUpPart(LAMINATE, "films of this step", round(setting.under.height, 6), size)
     yield release
-    yield BuildUpPart(PAD, pad, own.pad, press.platen)
+    yield BuildUpPart(PAD, pad, setting.pad, press.platen)
 
 
 def _instructions(part: AssemblyStep, count: int) -> str:
-    """What to do in a step that makes ``count`` stacks beside each other."""
+    """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {listed(pins)}"
@@ -540,11 +554,11 @@ def _instructions(part: AssemblyStep, count: int) -> str:
         )
     by = on_pins if pins else "by hand"
     after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
-    own = "a stack" if count == 1 else f"{count} stacks"
-    return f"Lay {stacks} on each other {by}, lowest first, as {own} of their own. {after}"
+    nouns = "a stack" if count == 1 else f"{count} stacks"
+    return f"Lay {stacks} on each other {by}, lowest first, as {nouns} of their own. {after}"
 
 
-# What a press schedule cannot do, and what the technician should know beforehand.
+# Refusals, and warnings for the technician.
 
 
 PINS_OUT = (
@@ -663,7 +677,7 @@ def warnings(
 
 
 def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
-    """What the schedule does not know of its films."""
+    """Yield warnings of films without stated minutes or melting point."""
     if words := unstated_minutes(films_without_minutes(laminate, press), press):
         yield words
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
@@ -675,15 +689,17 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
 
 
 def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
-    """Layers that join in a step, or lie in a bonded stack, that none of its pins holds."""
-    held = {
+    """Return the layers that join in a step, or lie in a bonded stack, that none of its pins
+    holds.
+    """
+    pinned = {
         layer.pattern
         for layer in distinct_layers(laminate, part.layers)
         if not set(part.pins).isdisjoint(laminate.pins_holding(layer))
     }
     bodies: list[tuple[int, ...]] = [(index,) for index in part.adds]
     bodies += [stack for stack in part.stacks if set(stack).isdisjoint(part.adds)]
-    loose = [b for b in bodies if held.isdisjoint(laminate.layer(i).pattern for i in b)]
+    loose = [b for b in bodies if pinned.isdisjoint(laminate.layer(i).pattern for i in b)]
     return sorted(index for body in loose for index in body)
 
 
@@ -692,7 +708,7 @@ def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     return listed([f"the {count} {role}s" for role, count in counts.items()])
 
 
-# What the press schedule says of registered sheets; no bench has tried it.
+# Registered sheets and their tacking; no bench has tried it.
 
 
 UNTRIED = (
@@ -706,12 +722,12 @@ CUT_FREE = (
 
 
 def title_of_sheets(part: AssemblyStep) -> str:
-    """The name of a step in which whole sheets are pressed."""
+    """Return the title of a step in which whole sheets are pressed."""
     return "All sheets but the cap's" if part.bond == "flash" else "The whole stack of sheets"
 
 
 def instructions(part: AssemblyStep) -> str:
-    """What to do with the sheets in a step."""
+    """Return the instructions for the sheets in a step."""
     if part.bond == "full":
         return (
             f"Lay the sheet of layer {part.adds[-1]} on its pins over the stack. Press to the full "
@@ -725,9 +741,9 @@ def instructions(part: AssemblyStep) -> str:
 
 
 TOUCH = 40.0
-"""C of a plate that can be touched."""
+"""Temperature of a plate that can be touched, C."""
 STEEL = 3.8e6
-"""J/(m3 K): heat of a base plate; 7,850 kg/m3 of steel with 490 J/(kg K)."""
+"""Heat capacity of a base plate, J/(m3 K): 7,850 kg/m3 of steel with 490 J/(kg K)."""
 CONTACT, AIR = 500.0, 10.0
 """W/(m2 K): from a platen into a plate that lies dry on it, and from each face of a plate into
 still air. Handbook orders, ours: neither was measured in a press."""
@@ -735,7 +751,7 @@ still air. Handbook orders, ours: neither was measured in a press."""
 
 @dataclass(frozen=True)
 class Tacking:
-    """How masks are tacked to their films: so many sheets, each by itself, on a plate that goes in
+    """Tacking of masks to their films: so many sheets, each by itself, on a plate that goes in
     cold and is cooled again. Minutes are those of one sheet; ``pins`` are the corner pins' then.
     """
 
@@ -759,7 +775,9 @@ class Tacking:
 
 
 def tack_stack(laminate: Laminate) -> float:
-    """Height of the highest film with its mask, mm; the transfer film stops short of the pins."""
+    """Return the height of the highest film with its mask, mm; the transfer film stops short of the
+    pins.
+    """
     masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
     films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
     return round(max(films) + max(masks), 6)
@@ -768,12 +786,12 @@ def tack_stack(laminate: Laminate) -> float:
 def tacking_of(
     laminate: Laminate, minutes: float, platen_c: float, plate: float, pins: tuple[PinSetting, ...]
 ) -> Tacking:
-    """Return how the masks of registered sheets are tacked, on a base plate ``plate`` mm thick.
+    """Return the tacking of the masks of registered sheets, on a base plate ``plate`` mm thick.
 
     First order: a plate that heat reaches through one face, and leaves through both.
     """
     heat = STEEL * plate / 1000
-    warm = heat / CONTACT * math.log((platen_c - ROOM) / WARM) / 60
+    warm = heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60
     cool = heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60
     return Tacking(
         sheets=sum(layer.is_mask for layer in laminate.layers),
@@ -783,7 +801,7 @@ def tacking_of(
         stack_mm=tack_stack(laminate),
         pins=pins,
         basis=(
-            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to {WARM:g} C "
+            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to {CLOCK_SHORTFALL:g} C "
             f"short of the platen with {CONTACT:g} W/(m2 K), and in still air down to {TOUCH:g} C "
             f"with {AIR:g} W/(m2 K) from each face; not measured"
         ),

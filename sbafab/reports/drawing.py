@@ -10,8 +10,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour, Region, coord, section
+from sbafab.geometry.region import Region, coord, section
 from sbafab.laminate.films import MASKS, Film, Ink, ink
 from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.markup import escape

@@ -18,8 +18,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.design.records import Slots
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region, disc, section, strip
+from sbafab.geometry.region import Region, disc, section, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
@@ -148,7 +147,7 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
 
 def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
     found = inflate(balloon, p, gap, tied=True)
-    part = slice(balloon.held, balloon.edge + 1)
+    part = slice(balloon.neck_edge, balloon.edge + 1)
     shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
     drawn = balloon.pocket - found.r[:, balloon.edge]
     return [

@@ -258,7 +258,7 @@ def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
 
 def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
     from sbafab.assemblies.shapes import linear
-    from sbafab.meshing.write_glb import Node, write_scene
+    from sbafab.meshing.formats.glb import Node, write_scene
 
     most = max(pose.pressures)
     write_scene(
@@ -289,8 +289,8 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
         told = replace(laminate, notes=(WHY,))
         path.write_bytes(solid_png(told, width, height))
     elif ending == ".glb":
+        from sbafab.meshing.formats.glb import write_glb
         from sbafab.meshing.solid import solid
-        from sbafab.meshing.write_glb import write_glb
 
         write_glb(solid(laminate), path, laminate.bonded_materials)
     else:

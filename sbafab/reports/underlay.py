@@ -13,8 +13,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
-from sbafab.geometry.region import Contour, Region, coord, disc
+from sbafab.geometry.region import Region, coord, disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.pressing.schedule import listed

@@ -10,13 +10,13 @@ import numpy as np
 from sbafab.actuators import build, load_design
 from sbafab.models import paper, parabola, printed
 from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import pose_bent_by, time_to_fill
 from sbafab.models.figures import Asked, Factors, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.rippled import risen
 from sbafab.models.stack import Stack, stack
-from sbafab.models.stacked import bent, filled
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 
@@ -370,7 +370,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
         f"the chambers films take in half as much again; {AVERAGED}",
     )
     for length in LENGTHS:
-        time, poses = filled(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
+        time, poses = time_to_fill(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
         pressure = poses.pressures[0]
         yield Row(
             "time to 10 kPa, water, 35 ml/min",
@@ -448,7 +448,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
         yield Row("largest bend", paper.LARGEST_BEND, pose.bend, model, why.format(WORKSPACE))
     empty = whole.pose((0.0, 0.0, 0.0)).volumes[0]
     for time, angle in paper.BENDING:
-        pose_at = bent(whole, 1, angle.value)
+        pose_at = pose_bent_by(whole, 1, angle.value)
         assert pose_at is not None
         put_in = float(pose_at.volumes[0] - empty)
         yield Row(
@@ -563,8 +563,10 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
     pressure.
     """
     full = paper.FULL_KPA
-    time, pose = filled(three, paper.WATER_FLOW, full, length=1e-3)
-    with_tubes = [filled(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)]
+    time, pose = time_to_fill(three, paper.WATER_FLOW, full, length=1e-3)
+    with_tubes = [
+        time_to_fill(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)
+    ]
     yield Row(
         f"height of the 3-DoF of 15 balloons ({HELD_OUT})",
         paper.FULL_HEIGHT,

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.files import load
-from sbafab.assemblies.writing import assembly_sha256
+from sbafab.assemblies.files import assembly_sha256, load
 from sbafab.cutting.calibration import table_text
 from sbafab.design.files import Change, design_sha256
 from sbafab.design.records import Design

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.writing import assembled_sha256, assembly_sha256, assembly_toml
+from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_toml
 from sbafab.design.files import actuator_sha256, design_sha256, design_toml
 from sbafab.design.kits import kit_of
 from sbafab.design.records import Design

@@ -1,6 +1,7 @@
 """sealing: every inlet feeds the pockets of its own chamber, all of them, and nothing else.
 
-Nor may a balloon lie loose on what is below it.
+Also, no balloon lies loose on the film below it. The voids of the laminate form a graph, which is
+searched from each inlet.
 """
 
 from __future__ import annotations
@@ -10,31 +11,33 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
-from sbafab.geometry.boolean import alone, in_reading_order, tidy, turned_round
+from sbafab.geometry.boolean import alone, turned_round
 from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import in_reading_order, tidy
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import Chamber, Inlet, Interface, Laminate
 from sbafab.rules.boundary import beside, edges_along
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at
-from sbafab.rules.measures import distinct_interfaces
+from sbafab.rules.limits import TOLERANCE, at
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "sealing"
 
 
 class _Offence(NamedTuple):
-    """What is wrong with one void."""
+    """A fault of one void."""
 
     message: str
     interface: int | None
     at: Point | None
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """How many pockets leak, reach a foreign one, are cut off or missing, and films lie loose."""
-    del limits
+def check(measures: Measures) -> list[Finding]:
+    """The number of pockets that leak, reach another, are cut off or missing, and loose films."""
+    laminate = measures.laminate
     graph = void_graph(laminate)
     owners = _owners(laminate, graph)
     offences = [
@@ -58,41 +61,54 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)]
 
 
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every pocket is reached from its own chamber's inlet and from nowhere else",
+        "A pocket that opens elsewhere leaks; one that is cut off never inflates.",
+        "Look at the place named: an opening too near another, or a mask that crosses a bond.",
+        ("bore.diameter", "lumen.diameter", "inlet.width"),
+    ),
+    at_most=True,
+)
+
+
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
-    """The chambers whose centres each pocket holds; equal pockets are looked at once."""
-    known: dict[int, frozenset[str]] = {}
+    """The chambers whose centres each pocket holds; equal pockets are examined once."""
+    names_by_id: dict[int, frozenset[str]] = {}
     owners = {}
     for void, piece in graph.pieces.items():
         if void.kind == "pocket":
             # Equal interfaces have the very same pieces.
-            if id(piece) not in known:
-                known[id(piece)] = frozenset(
+            if id(piece) not in names_by_id:
+                names_by_id[id(piece)] = frozenset(
                     chamber.name
                     for chamber in laminate.chambers
                     if any(_holds(piece, centre) for centre in chamber.centres)
                 )
-            owners[void] = known[id(piece)]
+            owners[void] = names_by_id[id(piece)]
     return owners
 
 
 def _holds(piece: Region, p: Point) -> bool:
-    """Whether ``p`` lies in the piece with its holes filled."""
+    """Return True if ``p`` lies in the piece with its holes filled."""
     return any(outer.winding(p) != 0 for outer in piece.outers)
 
 
 def _missing_pockets(
     laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]]
 ) -> list[_Offence]:
-    """Centres of a chamber over which a balloon has no pocket."""
-    held: dict[tuple[int, str], list[Region]] = {}
+    """Centres of a chamber without a pocket in a balloon."""
+    pockets: dict[tuple[int, str], list[Region]] = {}
     for void, names in owners.items():
         for name in names:
-            held.setdefault((void.level, name), []).append(graph.pieces[void])
+            pockets.setdefault((void.level, name), []).append(graph.pieces[void])
     offences = []
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     for interface in levels:
         for chamber in laminate.chambers:
-            pieces = held.get((interface.index, chamber.name), [])
+            pieces = pockets.get((interface.index, chamber.name), [])
             for centre in chamber.centres:
                 if not any(_holds(piece, centre) for piece in pieces):
                     message = (
@@ -122,8 +138,8 @@ def _wrong_reaches(
                 if owners[void] != {inlet.chamber} and void not in offences:
                     offences[void] = _foreign(void, inlet.chamber, owners[void], graph, came)
     for chamber in laminate.chambers:
-        own = [void for void, names in owners.items() if names == {chamber.name}]
-        came = graph.reached(void for void in own if void in fed)
+        voids = [void for void, names in owners.items() if names == {chamber.name}]
+        came = graph.reached(void for void in voids if void in fed)
         if OUTSIDE in came:
             leak = _leak(chamber, graph, came)
             offences.setdefault(leak[0], leak[1])
@@ -158,12 +174,12 @@ def _foreign(
 def _loose_films(laminate: Laminate) -> list[_Offence]:
     """Pieces of film that nothing bonds to the balloon or sheet below."""
     offences = []
-    for alike in distinct_interfaces(laminate):
-        gap = alike.interface
+    for distinct in distinct_interfaces(laminate):
+        gap = distinct.interface
         pieces = gap.above.profile.pieces if gap.kind == "separator" else ()
         for piece in pieces:
-            held = gap.bond if len(pieces) == 1 else gap.bond & piece
-            if held.is_empty:
+            bond = gap.bond if len(pieces) == 1 else gap.bond & piece
+            if bond.is_empty:
                 p = _somewhere(piece)
                 message = (
                     f"the film of layer {gap.above.index} ({gap.above.name}) at {at(p)} is bonded "
@@ -176,7 +192,7 @@ def _loose_films(laminate: Laminate) -> list[_Offence]:
 def _leak(
     chamber: Chamber, graph: VoidGraph, came: dict[Void, Void | None]
 ) -> tuple[Void, _Offence]:
-    """The pocket from which the way out starts, and where that way leaves the chamber."""
+    """Pocket at which the path to the outside starts, and the fault where it leaves."""
     path = [OUTSIDE]
     while (before := came[path[-1]]) is not None:
         path.append(before)
@@ -189,11 +205,11 @@ def _leak(
     interface = last.level if last.kind == "gap" else pocket.level
     where = f"layer {last.level}" if last.kind == "opening" else f"interface {interface}"
     if foreign.kind == "separator":
-        what = f"into the slit between two balloons at interface {foreign.level}"
+        outlet = f"into the slit between two balloons at interface {foreign.level}"
     else:
-        what = f"to the outside at {where}"
+        outlet = f"to the outside at {where}"
     message = (
-        f"{chamber.name} leaks {what} ({at(p)}), from its pocket at chamber interface "
+        f"{chamber.name} leaks {outlet} ({at(p)}), from its pocket at chamber interface "
         f"{pocket.level}; close the opening or bond round it"
     )
     return pocket, _Offence(message, interface, p)
@@ -215,7 +231,7 @@ def _somewhere(piece: Region) -> Point:
     return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
-# The voids of a laminate as a graph: where air would go from one to the next.
+# Voids of a laminate as a graph of the paths that air takes.
 #
 # Nodes are the connected pieces of unbonded film in each interface, the places in each interface
 # where one of the films is missing, the openings of each film, and the outside. The masks seal
@@ -239,7 +255,7 @@ OUTSIDE = Void("outside")
 
 @dataclass
 class VoidGraph:
-    """Voids, the places where they join, and where inlets open into them."""
+    """Voids, the points at which they join, and the voids that inlets open into."""
 
     pieces: dict[Void, Region] = field(default_factory=dict)
     joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
@@ -251,7 +267,7 @@ class VoidGraph:
         self.joins.setdefault(b, {}).setdefault(a, p)
 
     def reached(self, starts: Iterable[Void]) -> dict[Void, Void | None]:
-        """Every void joined to ``starts`` with the one it was reached from, nearest first.
+        """Return every void joined to ``starts`` with its predecessor, nearest first.
 
         The outside is entered but not passed through.
         """
@@ -269,7 +285,7 @@ class VoidGraph:
 
 
 class _Gap(NamedTuple):
-    """What an interface contributes, by its pattern: pieces by number, joins between them."""
+    """Contribution of an interface, by its pattern: pieces by number, joins between them."""
 
     unbonded: tuple[Region, ...]
     missing: tuple[Region, ...]
@@ -333,7 +349,7 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
             number = _bounded(pieces, p)
         touching.append((number, home, p))
         before = edge
-    touching.sort(key=lambda one: one[0])
+    touching.sort(key=lambda entry: entry[0])
     outside = _outside(missing, frame)
     # Inlets open to the outside; of any other two voids it counts that they join, and first where.
     joins: dict[tuple[int, int, Point | None], tuple[int, int, Point]] = {}
@@ -343,12 +359,12 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
 
 
 def _touches_itself(region: Region) -> bool:
-    """Whether contours meet at a point."""
+    """Return True if contours meet at a point."""
     return len({edge.start for edge in region.edges}) < len(region.edges)
 
 
 def _follows(before: Edge | None, edge: Edge) -> bool:
-    """Whether an arc begins where the one before it, of the same circle, ends."""
+    """Return True if an arc continues the arc before it, on the same circle."""
     return (
         isinstance(before, Arc)
         and isinstance(edge, Arc)
@@ -374,7 +390,7 @@ def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
 
 
 def _around(region: Region, frame: Region) -> Region:
-    """What is left of a frame that lies well outside the region: the contours, turned round."""
+    """The rest of a frame well outside the region: the contours, turned round."""
     if _touches_itself(region):
         # Where contours touch at a point, what they leave may hang together otherwise.
         return frame - region
@@ -435,7 +451,7 @@ def _outside(pieces: tuple[Region, ...], frame: Region) -> int:
 
 
 def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
-    """Which piece of a gap an opening lies over: just one, as film is missing all over it."""
+    """The piece of a gap that an opening lies over: just one, as film is missing all over it."""
     edge = max(opening.edges, key=lambda edge: edge.length)
     return _holding(missing, beside(edge, INSET)), _middle(opening.bounds)
 

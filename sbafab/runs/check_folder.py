@@ -28,8 +28,7 @@ from sbafab.as_built.cut_files import sound_digest
 from sbafab.as_built.expected import drawn_settings
 from sbafab.as_built.records import DESIGNED, Problem, is_job, is_joined
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load_assembly
-from sbafab.assemblies.writing import DESIGN_FILE
+from sbafab.assemblies.files import DESIGN_FILE, load_assembly
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.lightburn import ENDING
 from sbafab.cutting.properties import FOLDER as LAYERS

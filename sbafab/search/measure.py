@@ -33,7 +33,7 @@ there; ``sha256``, ``keys``, ``rules``, ``figures`` where the design could be me
 def measured(
     tables: Mapping[str, Any], folder: str, values: Mapping[str, Any], pressures: Sequence[float]
 ) -> SweepRow:
-    """The row of the design that ``tables`` say, with ``values`` set; never raises a SbafabError.
+    """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
 
     ``folder`` is where relative paths start, ``pressures`` kPa are those of forces and strokes.
     """
@@ -51,21 +51,21 @@ def measured(
 @lru_cache(maxsize=4)
 def _base(tables: str, folder: str) -> Design:
     data = json.loads(tables)
-    known = records()
-    return checked_record(known[data["family"]], data, known).placed(Path(folder))
+    families = records()
+    return checked_record(families[data["family"]], data, families).placed(Path(folder))
 
 
 def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
     checked = check(design)
-    found = margins(checked.findings)
+    worst = margins(checked.findings)
     row["rules"] = {
-        name: [one.verdict, one.margin, one.measured, one.limit, one.unit]
-        for name, one in found.items()
+        name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
+        for name, rule in worst.items()
     }
     prediction = predict(design, Asked(tuple(pressures)), checked.laminate)
     row["figures"] = named_figures(prediction.figures)
     if checked.failed:
-        failed = [rule for rule in found.values() if rule.verdict == "fail"]
+        failed = [rule for rule in worst.values() if rule.verdict == "fail"]
         row["outcome"] = "fails"
         row["reason"] = " | ".join(f"{rule.rule}: {rule.message}" for rule in failed)
         return
@@ -83,7 +83,7 @@ def named_figures(figures: Sequence[Figure]) -> dict[str, float]:
     }
 
 
-# How far each rule is from failing: its findings as one verdict and one margin.
+# The margin of each rule: its findings as one verdict and one margin.
 
 
 ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
@@ -122,11 +122,11 @@ def margin_of(finding: Finding) -> float | None:
 
 def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
     """The worst of each rule, in the deck's order; what a rule waives by itself counts for none."""
-    found: dict[str, RuleMargin] = {}
+    worst: dict[str, RuleMargin] = {}
     for finding in findings:
         if finding.verdict == "waived" and not finding.by_user:
             continue
-        own = RuleMargin(
+        margin = RuleMargin(
             finding.rule,
             finding.verdict,
             margin_of(finding),
@@ -136,19 +136,19 @@ def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
             finding.where,
             finding.message,
         )
-        before = found.get(finding.rule)
-        if before is None or _badness(own) < _badness(before):
-            found[finding.rule] = own
-    return found
+        before = worst.get(finding.rule)
+        if before is None or _severity(margin) < _severity(before):
+            worst[finding.rule] = margin
+    return worst
 
 
-def _badness(one: RuleMargin) -> tuple[int, float]:
-    """The worse, the smaller."""
-    share = one.share
-    return ORDER.index(one.verdict), share if share is not None else 0.0
+def _severity(margin: RuleMargin) -> tuple[int, float]:
+    """Sort key of a margin: the worse, the smaller."""
+    share = margin.share
+    return ORDER.index(margin.verdict), share if share is not None else 0.0
 
 
-# Which program this is, to the last line: rows of another one are not mixed with its own.
+# The version of the program to the last line: rows of different versions are never mixed.
 
 
 @cache

@@ -63,9 +63,9 @@ def dask_pool(address: str) -> Iterator[Pool]:
     try:
         client: Any = untyped(address, timeout=CONNECT)
     except (OSError, ValueError) as error:
-        said = " ".join(str(error).split())
+        message = " ".join(str(error).split())
         raise OutputError(
-            f"no Dask scheduler answers at {address} ({said}); start one with `dask scheduler`, "
+            f"no Dask scheduler answers at {address} ({message}); start one with `dask scheduler`, "
             "or name its address, such as tcp://127.0.0.1:8786"
         ) from None
     try:
@@ -82,17 +82,17 @@ def run_jobs(
     done: Callable[[str, SweepRow], None],
     waiting: Callable[[], None],
 ) -> None:
-    """Has every job done once and tells its key and row as soon as it is; in no order.
+    """Run every job once and pass its key and row to ``done`` as soon as it ends; in no order.
 
     Few jobs are in the works at any time, so that memory does not grow with their number.
-    ``waiting`` is called every second in which none is done.
+    ``waiting`` is called every second in which none ends.
     """
-    left = iter(jobs)
+    remaining = iter(jobs)
     running: dict[Future[SweepRow], str] = {}
     room = AHEAD * pool.size
     try:
         while True:
-            for key, job in _first(left, room - len(running)):
+            for key, job in _first(remaining, room - len(running)):
                 running[pool.executor.submit(guarded, job, seconds)] = key
             if not running:
                 return
@@ -119,19 +119,19 @@ def _row(future: Future[SweepRow]) -> SweepRow:
         row = future.result()
     except Exception as error:
         # A cluster gives up a job whose workers died under it several times.
-        said = " ".join(str(error).split())[:300]
-        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {said}", "seconds": 0.0}
+        message = " ".join(str(error).split())[:300]
+        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}", "seconds": 0.0}
     if row["outcome"] == "unlike":
         from sbafab.search.measure import fingerprint
 
         raise OutputError(
             f"a worker runs sbafab {row['reason']} and this is {fingerprint()}; install the same "
-            "one there"
+            "version there"
         )
     return row
 
 
-# Jobs handed to a process of their own each thread has, which is killed where it takes too long.
+# Each thread hands its jobs to its own process, which is killed after the time limit.
 #
 # The same function runs in the threads of this process and in those of a Dask worker.
 
@@ -146,7 +146,7 @@ COMMAND = (sys.executable, "-m", "sbafab.search.child")
 MeasureJob = dict[str, Any]
 """The keyword arguments of ``measured``, and ``program``, which has to do it."""
 
-_own = threading.local()
+_thread = threading.local()
 
 
 class _Started:
@@ -201,7 +201,11 @@ class Child:
         if late.is_set():
             reason = f"stopped after {seconds:g} s; --timeout gives it longer"
             return {"outcome": "too long", "reason": reason, "seconds": seconds}
-        return {"outcome": "crashed", "reason": _how(self._process.returncode), "seconds": 0.0}
+        return {
+            "outcome": "crashed",
+            "reason": _exit_reason(self._process.returncode),
+            "seconds": 0.0,
+        }
 
     def _exchange(self, job: str) -> str:
         """The answer to a line, cut short where the process died."""
@@ -232,11 +236,11 @@ def guarded(job: MeasureJob, seconds: float) -> SweepRow:
     """The row of a job, measured in this thread's own process; dead ones are replaced."""
     row: SweepRow = {}
     for _ in range(ATTEMPTS):
-        child = getattr(_own, "child", None)
+        child = getattr(_thread, "child", None)
         if child is None or not child.is_alive:
             if child is not None:
                 child.close()
-            child = _own.child = Child()
+            child = _thread.child = Child()
         row = child.answer(job, seconds)
         # What Python could still say of a crash is said the same way again.
         if row["outcome"] != "crashed" or child.is_alive:
@@ -259,7 +263,7 @@ def close_all() -> None:
         child.close()
 
 
-def _how(code: int | None) -> str:
+def _exit_reason(code: int | None) -> str:
     if code is None or code >= 0:
         return f"its process ended with exit code {code}"
     with suppress(ValueError):

@@ -24,8 +24,8 @@ from sbafab.search.page import sweep_html
 from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
 from sbafab.search.table import (
     Table,
-    no_longer_asked,
     refuse_foreign,
+    stale_designs,
     write_csv,
     write_parquet,
     write_times,
@@ -40,7 +40,7 @@ MEASURED = "measuring designs"
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What is swept and how: ``samples`` drawn by Latin hypercube, or the whole grid.
+    """Designs and settings of a sweep: ``samples`` drawn by Latin hypercube, or the whole grid.
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
     ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule
@@ -60,7 +60,7 @@ class SweepRequest:
 
 @dataclass(frozen=True)
 class SweptDesigns:
-    """What a sweep made: its folder, how many designs of each outcome, how many measured now.
+    """Result of a sweep: its folder, number of designs by outcome, number measured in this run.
 
     ``no_longer_asked`` designs of an earlier sweep stood in the tables that it has replaced.
     """
@@ -82,9 +82,9 @@ class SweepStopped(KeyboardInterrupt):
         self.designs = designs
 
 
-def trials(request: SweepRequest) -> list[Values]:
+def designs_of(request: SweepRequest) -> list[Values]:
     """The values of every design, in the tables' order. Raises DesignError."""
-    varied = [_from_here(one) for one in request.varied]
+    varied = [_from_here(varied_key) for varied_key in request.varied]
     refuse_unknown(request.design, varied)
     if request.samples is None:
         return list(grid(varied))
@@ -97,9 +97,9 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
     What an earlier run measured there counts, as long as design, values and program are the same.
     Raises DesignError for bad input, OutputError where nothing can be written or no worker answers.
     """
-    values = trials(request)
+    values = designs_of(request)
     folder = out / f"{request.design.name}-sweep"
-    with _held(folder):
+    with _locked(folder):
         refuse_foreign(folder / CSV)
         journal = Journal(folder / JOURNAL, request.seconds)
         try:
@@ -115,7 +115,7 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
         table = Table(
             lambda: journal.rows(iter(keys)), values, request.pressures_kpa, request.all_columns
         )
-        gone = no_longer_asked(folder / CSV, table)
+        gone = stale_designs(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
     return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, gone)
@@ -157,9 +157,10 @@ def _measure(
 
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
     """A hash of each design and of what is asked of it, by this program."""
-    asked = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
+    question = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
     return [
-        hashlib.sha256(json.dumps([*asked, _contents(one)]).encode()).hexdigest() for one in values
+        hashlib.sha256(json.dumps([*question, _contents(design_values)]).encode()).hexdigest()
+        for design_values in values
     ]
 
 
@@ -178,8 +179,8 @@ def _from_here(varied: Varied) -> Varied:
     if varied.key not in (OUTLINE, KIT):
         return varied
     paths = tuple(
-        one if varied.key == KIT and one in kit_names() else str(Path(str(one)).absolute())
-        for one in varied.values
+        path if varied.key == KIT and path in kit_names() else str(Path(str(path)).absolute())
+        for path in varied.values
     )
     return Varied(varied.key, paths)
 
@@ -197,8 +198,8 @@ def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]
 
 
 @contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """The folder, there and ours alone. Raises OutputError."""
+def _locked(folder: Path) -> Iterator[None]:
+    """Create and lock the folder. Raises OutputError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / MANIFEST).exists():
@@ -220,11 +221,11 @@ def _held(folder: Path) -> Iterator[None]:
         ) from None
 
 
-# What has been measured so far, a line a design, only ever added to: runs that end go on in it.
+# The journal: a line a measured design, only appended, from which a sweep resumes.
 
 
 class Journal:
-    """The rows in a file, by the hash of what was asked; the file is read where it is needed.
+    """Rows of measured designs in a file, by the hash of design and request; read where needed.
 
     A line that a killed run left unfinished is passed over, and its design measured again; so is
     one that took too long in less than ``seconds``. Raises OutputError where the file cannot be

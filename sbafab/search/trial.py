@@ -1,4 +1,4 @@
-"""What is required of a design, and by how much one keeps it."""
+"""Requirements, the search space of a design's free keys, and candidates evaluated once each."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ CLOSE = 1e-9
 
 @dataclass(frozen=True)
 class Requirement:
-    """A quantity that must be at least, or at most, so much."""
+    """A quantity with its lower or upper limit."""
 
     quantity: AskedQuantity
     limit: float
     at_least: bool
 
     def margin(self, value: float) -> float:
-        """By what share of the limit a value keeps it; below 0 it does not."""
+        """Return by what share of the limit a value keeps it; below 0 it does not."""
         more = value - self.limit if self.at_least else self.limit - value
         return more / (abs(self.limit) or 1.0)
 
@@ -58,7 +58,7 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Goal:
-    """The quantity to be best in: as much of it as can be, or as little."""
+    """The quantity to maximise (``more``) or minimise."""
 
     quantity: AskedQuantity
     more: bool
@@ -85,10 +85,10 @@ def read_all(
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
-    found = tuple(_read(text, at_least, kpa) for text, at_least in pairs)
-    _refuse_contradictions(found, [text for text, _ in pairs])
+    requirements = tuple(_read(text, at_least, kpa) for text, at_least in pairs)
+    _refuse_contradictions(requirements, [text for text, _ in pairs])
     quantity = read_quantity(best, kpa)
-    return found, Goal(quantity, quantity.name in GOOD_IF_MORE)
+    return requirements, Goal(quantity, quantity.name in GOOD_IF_MORE)
 
 
 def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
@@ -107,159 +107,37 @@ def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
     return Requirement(quantity, limit, at_least)
 
 
-def _refuse_contradictions(found: Sequence[Requirement], texts: Sequence[str]) -> None:
+def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
     """Raises DesignError where one quantity must be more than it may be."""
-    for least, said in zip(found, texts, strict=True):
-        for most, other in zip(found, texts, strict=True):
+    for least, least_text in zip(requirements, texts, strict=True):
+        for most, most_text in zip(requirements, texts, strict=True):
             if not least.at_least or most.at_least or least.limit <= most.limit:
                 continue
             # The inflated diameter that must reach is never more than the one that must not touch.
             if least.quantity == safer(most.quantity, at_least=True):
                 raise DesignError(
-                    f"--min {shown(said)} and --max {shown(other)} contradict each other; no "
-                    "design can meet both, so change one"
+                    f"--min {shown(least_text)} and --max {shown(most_text)} contradict each "
+                    "other; no design can meet both, so change one"
                 )
 
 
-# The designs that a search may try: steps of the free keys, each tried once.
-
-
-TRYING = "trying designs"
-
-
-def numbers_of(value: Any) -> list[float]:
-    """The numbers of a key that lists some, such as one diameter a balloon; else none."""
-    return list(map(float, value)) if isinstance(value, list | tuple) and value else []
-
-
-class SearchSpace:
-    """The designs that were tried, each once, by the steps of their free keys.
-
-    ``lows`` and ``highs`` are the least and the largest step of each key. No more than ``tries``
-    designs are tried; ``limit`` is where the stage that runs now has to end.
-    """
-
-    def __init__(self, wanted: Wanted, free: tuple[Free, ...], tries: int, tell: Progress) -> None:
-        self.wanted = wanted
-        self.free = free
-        self.tries = self.limit = tries
-        self.lows = [0] * len(free)
-        self.highs = [int(round((one.high - one.low) / one.step, 6)) for one in free]
-        self.trials: dict[Steps, Trial] = {}
-        self._tell = tell
-        self._keys: dict[str, Any] = {key: value for key, value, _ in keys_of(wanted.design)}
-
-    @property
-    def is_over(self) -> bool:
-        return len(self.trials) >= min(self.limit, self.size)
-
-    @property
-    def size(self) -> int:
-        """How many designs there are."""
-        return math.prod(self.counts) if self.counts else 0
-
-    @property
-    def counts(self) -> list[int]:
-        """How many values each key takes."""
-        return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
-
-    def number(self, axis: int, place: Steps) -> float:
-        """The value of a key at a place; of a list its largest number."""
-        return round(self.free[axis].low + place[axis] * self.free[axis].step, 6)
-
-    def values(self, place: Steps) -> Mapping[str, Any]:
-        """The keys' values at a place, whole numbers where low and step are.
-
-        A list, such as the diameters of a tapered stack, is scaled as a whole.
-        """
-        found: dict[str, Any] = {}
-        for axis, free in enumerate(self.free):
-            value = self.number(axis, place)
-            is_whole = free.low == int(free.low) and free.step == int(free.step)
-            known = numbers_of(self._keys.get(free.key))
-            if known:
-                found[free.key] = [round(value * one / max(known), 2) for one in known]
-            else:
-                found[free.key] = int(value) if is_whole else value
-        return found
-
-    def nearest(self) -> Steps:
-        """Where the design itself stands, or as near as the free keys come to it."""
-        found = []
-        for free in self.free:
-            value: Any = self._keys.get(free.key)
-            known = numbers_of(value)
-            at = max(known) if known else value
-            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
-            found.append(round((at - free.low) / free.step))
-        return self.inside(found)
-
-    def inside(self, place: list[int]) -> Steps:
-        """The place, or the nearest to it within the keys' ranges."""
-        return tuple(
-            min(max(at, low), high)
-            for at, low, high in zip(place, self.lows, self.highs, strict=True)
-        )
-
-    def trial(self, place: Steps, asks: bool = True) -> Trial:
-        """What is found there; a design that would be the best so far is asked for its rules.
-
-        Not where nothing hangs on it yet (``asks``): rules take most of the time.
-        """
-        if place not in self.trials:
-            self._tell(TRYING, len(self.trials), self.tries)
-            found = tried(self.wanted, self.values(place))
-            so_far = min((one.rank for one in self.trials.values() if one.rules), default=None)
-            if asks and not found.refused and (so_far is None or found.rank < so_far):
-                found = self.with_rules(found)
-            self.trials[place] = found
-        return self.trials[place]
-
-    def looked_at(self, place: Steps) -> Trial:
-        """What is found there, also out of range; it counts for none of the tries."""
-        return self.trials.get(place) or tried(self.wanted, self.values(place))
-
-    def is_asked(self, axis: int, place: Steps) -> bool:
-        """Whether a requirement itself keeps the key from its value at the place."""
-        key = self.free[axis].key
-        at = self.number(axis, place)
-        return any(
-            one.quantity.key == key and not one.holds(at) for one in self.wanted.requirements
-        )
-
-    def with_rules(self, trial: Trial) -> Trial:
-        """The trial with its rules asked, unless they are known or there is no such design."""
-        if trial.rules is not None or trial.refused:
-            return trial
-        return tried(self.wanted, trial.values, with_rules=True)
-
-    def best(self) -> tuple[Steps, Trial]:
-        """The best with its rules; where they change the order, the next best is asked."""
-        while True:
-            place = min(self.trials, key=lambda one: self.trials[one].rank)
-            trial = self.trials[place]
-            if trial.rules is not None or trial.refused:
-                return place, trial
-            self.trials[place] = self.with_rules(trial)
-
-
-# One design tried: its figures against the requirements, its rules by their margins.
+# One candidate: its figures against the requirements, its rules by their margins.
 
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
 """By how much a design that cannot be made misses: by more than any that can."""
-Steps = tuple[int, ...]
+GridPoint = tuple[int, ...]
 """A design by the step at which each free key stands."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A design with what was found of it. ``rules`` is None where they were not asked.
+    """An evaluated candidate. ``rules`` is None where they were not checked.
 
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of what is best, is the less the better; ``mass`` is in g. ``refused``
+    ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
     says why no such design can be made.
     """
 
@@ -274,12 +152,12 @@ class Trial:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is missed and it can be made."""
+        """True if nothing is missed and the design can be made."""
         return self.missed == 0.0 and not self.refused
 
     @property
     def rank(self) -> tuple[float, float, float]:
-        """What is missed as a share, then the cost, of equals the mass; the less, the better."""
+        """Sort key, best first: share missed, then cost, then mass."""
         return self.missed, self.cost, self.mass
 
     def value(self, requirement: Requirement | Goal) -> float:
@@ -288,44 +166,45 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """All that is asked: requirements, the goal, and the design whose keys change."""
+class SearchProblem:
+    """Requirements, the goal, and the design whose keys change."""
 
     design: Design
     requirements: tuple[Requirement, ...]
     goal: Goal
 
     @property
-    def asks_for_yield(self) -> bool:
+    def needs_yield(self) -> bool:
         return any(quantity.name == "yield" for quantity in self.quantities)
 
     @property
     def quantities(self) -> list[AskedQuantity]:
-        """All that figures are asked of: requirements first, then the goal."""
-        return [*(one.quantity for one in self.requirements), self.goal.quantity]
+        """The quantities to evaluate: those of the requirements first, then the goal's."""
+        return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
 
-def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
-    """The trial of a design; without rules only requirements count, which is much quicker."""
+def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    """Return the candidate with these values; without rules, only requirements count: quicker."""
     try:
-        design = wanted.design.with_(dict(values))
+        design = problem.design.with_(dict(values))
         laminate = build(design)
         rules = None
-        if with_rules or wanted.asks_for_yield:
+        if with_rules or problem.needs_yield:
             findings = run_deck(laminate, limits(design))
             rules = margins(findings)
             checked = Checked(design, laminate, findings)
             if not checked.failed:
                 refuse_undoable([checked])
-        figures = _figures(wanted, Subject(design, laminate), rules)
+        figures = _figures(problem, Subject(design, laminate), rules)
     except (DesignError, GeometryError) as error:
-        said = " ".join(str(error).split())
-        return Trial(values, missed=IMPOSSIBLE, refused=said)
+        message = " ".join(str(error).split())
+        return Trial(values, missed=IMPOSSIBLE, refused=message)
     missed = sum(
-        -min(0.0, one.margin(figures[one.quantity.said]) + CLOSE) for one in wanted.requirements
+        -min(0.0, requirement.margin(figures[requirement.quantity.said]) + CLOSE)
+        for requirement in problem.requirements
     )
-    missed += sum(_short(one) for one in (rules or {}).values())
-    cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
+    missed += sum(_short(requirement) for requirement in (rules or {}).values())
+    cost = problem.goal.cost(figures[problem.goal.quantity.said])
     return Trial(values, figures, rules, missed, cost, _mass(laminate), laminate=laminate)
 
 
@@ -338,34 +217,36 @@ def _mass(laminate: Laminate) -> float:
 
 
 def _short(rule: RuleMargin) -> float:
-    """By what share a rule that fails misses its limit."""
+    """Return by what share a failing rule misses its limit."""
     if rule.verdict != "fail":
         return 0.0
     return max(1e-3, -(rule.share or 0.0))
 
 
 def _figures(
-    wanted: Wanted, subject: Subject, rules: Mapping[str, RuleMargin] | None
+    problem: SearchProblem, subject: Subject, rules: Mapping[str, RuleMargin] | None
 ) -> dict[str, float]:
     def share_of_good() -> float:
-        found = (rules or {}).get(YIELD)
-        if found is None or found.measured is None:
-            raise DesignError(f"no yield of {subject.design.name} can be counted")
-        return found.measured
+        yield_margin = (rules or {}).get(YIELD)
+        if yield_margin is None or yield_margin.measured is None:
+            raise DesignError(f"the yield of {subject.design.name} cannot be computed")
+        return yield_margin.measured
 
-    return {quantity.said: subject.value(quantity, share_of_good) for quantity in wanted.quantities}
+    return {
+        quantity.said: subject.value(quantity, share_of_good) for quantity in problem.quantities
+    }
 
 
-def misses(wanted: Wanted, trial: Trial) -> list[str]:
-    """What a design breaks, a sentence each: requirements, then rules."""
+def misses(problem: SearchProblem, trial: Trial) -> list[str]:
+    """Return what a candidate breaks, a sentence each: requirements, then rules."""
     if trial.refused:
         return [trial.refused]
-    said = [
-        f"{one.quantity.said} {shown_value(one.quantity, trial.value(one))}, not {one.bound}"
-        for one in wanted.requirements
-        if not one.holds(trial.value(one))
+    broken = [
+        f"{row.quantity.said} {shown_value(row.quantity, trial.value(row))}, not {row.bound}"
+        for row in problem.requirements
+        if not row.holds(trial.value(row))
     ]
-    return [*said, *broken_rules(trial)]
+    return [*broken, *broken_rules(trial)]
 
 
 def value_said(value: Any) -> str:
@@ -379,6 +260,137 @@ def keys_said(values: Mapping[str, Any]) -> str:
 
 
 def broken_rules(trial: Trial) -> list[str]:
-    """The rules that a design breaks, a sentence each."""
-    failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]
-    return [f"{one.rule}: {one.message}" for one in failed]
+    """Return the rules that a candidate breaks, a sentence each."""
+    failed = [margin for margin in (trial.rules or {}).values() if margin.verdict == "fail"]
+    return [f"{margin.rule}: {margin.message}" for margin in failed]
+
+
+# The search space: steps of the free keys, each evaluated once.
+
+
+PROGRESS_LABEL = "trying designs"
+
+
+def numbers_of(value: Any) -> list[float]:
+    """The numbers of a key that lists some, such as one diameter a balloon; else none."""
+    return list(map(float, value)) if isinstance(value, list | tuple) and value else []
+
+
+class SearchSpace:
+    """The candidates evaluated so far, each once, by the steps of their free keys.
+
+    ``lows`` and ``highs`` are the least and the largest step of each key. No more than ``tries``
+    candidates are evaluated; ``limit`` is where the stage that runs now has to end.
+    """
+
+    def __init__(
+        self, problem: SearchProblem, free: tuple[Free, ...], tries: int, tell: Progress
+    ) -> None:
+        self.wanted = problem
+        self.free = free
+        self.tries = self.limit = tries
+        self.lows = [0] * len(free)
+        self.highs = [int(round((axis.high - axis.low) / axis.step, 6)) for axis in free]
+        self.trials: dict[GridPoint, Trial] = {}
+        self._tell = tell
+        self._keys: dict[str, Any] = {key: value for key, value, _ in keys_of(problem.design)}
+
+    @property
+    def is_over(self) -> bool:
+        return len(self.trials) >= min(self.limit, self.size)
+
+    @property
+    def size(self) -> int:
+        """Number of designs in the space."""
+        return math.prod(self.counts) if self.counts else 0
+
+    @property
+    def counts(self) -> list[int]:
+        """Number of values of each key."""
+        return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
+
+    def number(self, axis: int, point: GridPoint) -> float:
+        """The value of a key at a place; of a list its largest number."""
+        return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
+
+    def values(self, point: GridPoint) -> Mapping[str, Any]:
+        """The keys' values at a place, whole numbers where low and step are.
+
+        A list, such as the diameters of a tapered stack, is scaled as a whole.
+        """
+        values: dict[str, Any] = {}
+        for axis, free in enumerate(self.free):
+            value = self.number(axis, point)
+            is_whole = free.low == int(free.low) and free.step == int(free.step)
+            listed = numbers_of(self._keys.get(free.key))
+            if listed:
+                values[free.key] = [round(value * number / max(listed), 2) for number in listed]
+            else:
+                values[free.key] = int(value) if is_whole else value
+        return values
+
+    def nearest(self) -> GridPoint:
+        """Return the point of the starting design, or the nearest to it in the space."""
+        steps = []
+        for free in self.free:
+            value: Any = self._keys.get(free.key)
+            listed = numbers_of(value)
+            at = max(listed) if listed else value
+            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
+            steps.append(round((at - free.low) / free.step))
+        return self.inside(steps)
+
+    def inside(self, steps: list[int]) -> GridPoint:
+        """Return the point, or the nearest to it within the keys' ranges."""
+        return tuple(
+            min(max(at, low), high)
+            for at, low, high in zip(steps, self.lows, self.highs, strict=True)
+        )
+
+    def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
+        """Return the candidate at a point; one that would be the best so far has its rules checked.
+
+        Without ``checks_rules`` it has not: rules take most of the time.
+        """
+        if point not in self.trials:
+            self._tell(PROGRESS_LABEL, len(self.trials), self.tries)
+            candidate = evaluated(self.wanted, self.values(point))
+            so_far = min(
+                (trial.rank for trial in self.trials.values() if trial.rules), default=None
+            )
+            if (
+                checks_rules
+                and not candidate.refused
+                and (so_far is None or candidate.rank < so_far)
+            ):
+                candidate = self.with_rules(candidate)
+            self.trials[point] = candidate
+        return self.trials[point]
+
+    def peek(self, point: GridPoint) -> Trial:
+        """Return the candidate at a point, also out of range; it does not count as a try."""
+        return self.trials.get(point) or evaluated(self.wanted, self.values(point))
+
+    def is_excluded(self, axis: int, point: GridPoint) -> bool:
+        """Return True if a requirement on the key itself excludes its value at the point."""
+        key = self.free[axis].key
+        at = self.number(axis, point)
+        return any(
+            requirement.quantity.key == key and not requirement.holds(at)
+            for requirement in self.wanted.requirements
+        )
+
+    def with_rules(self, trial: Trial) -> Trial:
+        """Return the candidate with its rules checked, unless they are known or it was refused."""
+        if trial.rules is not None or trial.refused:
+            return trial
+        return evaluated(self.wanted, trial.values, with_rules=True)
+
+    def best(self) -> tuple[GridPoint, Trial]:
+        """Return the best candidate, rules checked; where they make it worse, the next is tried."""
+        while True:
+            best = min(self.trials, key=lambda point: self.trials[point].rank)
+            trial = self.trials[best]
+            if trial.rules is not None or trial.refused:
+                return best, trial
+            self.trials[best] = self.with_rules(trial)

@@ -1,4 +1,4 @@
-"""Who may ask the studio, and what its pages may load.
+"""The studio's web server: guard, routes, links with designs, and its start.
 
 It listens on this machine only. A page of another site cannot read its answers: Host must be this
 machine by number or name (so a name that is rebound to it is refused), Origin must be its own, and
@@ -36,7 +36,7 @@ from sbafab import api
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
 from sbafab.process import processors
 from sbafab.studio import forms, places
-from sbafab.studio.places import Made, zipped
+from sbafab.studio.places import RunFolder, zipped
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
 HERE = ("127.0.0.1", "localhost", "[::1]")
@@ -133,7 +133,7 @@ def _bounded(receive: Receive) -> Receive:
 
 
 def _with_headers(send: Send, policy: str) -> Send:
-    own = (
+    security = (
         (b"content-security-policy", policy.encode()),
         (b"x-content-type-options", b"nosniff"),
         (b"referrer-policy", b"no-referrer"),
@@ -144,13 +144,13 @@ def _with_headers(send: Send, policy: str) -> Send:
 
     async def with_headers(message: Message) -> None:
         if message["type"] == "http.response.start":
-            message = {**message, "headers": [*message["headers"], *own]}
+            message = {**message, "headers": [*message["headers"], *security]}
         await send(message)
 
     return with_headers
 
 
-# Links that hold a design: its text, packed into what follows the #.
+# Links with a design: its text, packed into the fragment.
 
 
 MOST = 1_000_000
@@ -173,7 +173,7 @@ def design_in(link: str) -> str:
 
 
 def packed(text: str) -> str:
-    """What stands after ``design=`` in a link."""
+    """Return the text as it follows ``design=`` in a link."""
     squeezer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
     raw = squeezer.compress(text.encode("utf-8")) + squeezer.flush()
     return base64.urlsafe_b64encode(raw).decode("ascii").rstrip("=")
@@ -192,7 +192,7 @@ MOST_MADE = 6
 
 @dataclass
 class Studio:
-    """What the routes share: the chosen folder, the workers and the folders that runs wrote."""
+    """State that the routes share: the chosen folder, the workers and the folders of runs."""
 
     folder: Path
     token: str
@@ -208,7 +208,7 @@ class Studio:
     maker: WorkerPool = field(
         default_factory=lambda: WorkerPool(MAKE_SECONDS, _processes(), False, MAKE_SECONDS)
     )
-    made: dict[str, Made] = field(default_factory=dict)
+    made: dict[str, RunFolder] = field(default_factory=dict)
     scratch: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="sbafab-studio-")))
 
     @contextlib.asynccontextmanager
@@ -243,14 +243,14 @@ def app(studio: Studio) -> Starlette:
         Route("/made/{key}/{path:path}", made_file),
         Mount("/", StaticFiles(directory=STATIC, html=True)),
     ]
-    made = Starlette(
+    application = Starlette(
         routes=routes,
         middleware=[Middleware(Guard, token=studio.token)],
         exception_handlers={SbafabError: _refused, BusyError: _busy, TooLongError: _too_long},
         lifespan=studio.lifespan,
     )
-    made.state.studio = studio
-    return made
+    application.state.studio = studio
+    return application
 
 
 def _studio(request: Request) -> Studio:
@@ -286,10 +286,10 @@ async def opened_file(request: Request) -> Response:
 
 
 async def save(request: Request) -> Response:
-    asked = await _asked(request)
-    path = places.design_file(_studio(request).folder, str(asked.get("name", "")))
-    seen = asked.get("seen")
-    sha = places.save(path, str(asked.get("text", "")), None if seen is None else str(seen))
+    table = await _request_table(request)
+    path = places.design_file(_studio(request).folder, str(table.get("name", "")))
+    expected = table.get("seen")
+    sha = places.save(path, str(table.get("text", "")), None if expected is None else str(expected))
     return JSONResponse({"sha": sha})
 
 
@@ -309,39 +309,39 @@ async def watch(request: Request) -> Response:
 
 
 async def live(request: Request) -> Response:
-    return await _worked(request, _studio(request).live, "live")
+    return await _answered(request, _studio(request).live, "live")
 
 
 async def elastic(request: Request) -> Response:
-    return await _worked(request, _studio(request).mover, "elastic")
+    return await _answered(request, _studio(request).mover, "elastic")
 
 
 async def motion(request: Request) -> Response:
-    return await _worked(request, _studio(request).mover, "motion")
+    return await _answered(request, _studio(request).mover, "motion")
 
 
 async def generate(request: Request) -> Response:
     """Runs generate, into the chosen folder's ``out`` or into a folder of the studio's own."""
-    studio, asked = _studio(request), await _asked(request)
+    studio, table = _studio(request), await _request_table(request)
     key = secrets.token_urlsafe(16)
-    out = studio.folder / "out" if asked.get("keep") else studio.scratch / key
-    job = {**forms.job(studio.folder, asked), "do": "generate", "out": str(out)}
-    wish = studio.maker.ask((job["tab"], "generate"), job)
+    out = studio.folder / "out" if table.get("keep") else studio.scratch / key
+    job = {**forms.job(studio.folder, table), "do": "generate", "out": str(out)}
+    waiting = studio.maker.ask((job["tab"], "generate"), job)
 
-    async def told() -> AsyncIterator[bytes]:
-        async for line in wish.lines():
+    async def lines() -> AsyncIterator[bytes]:
+        async for line in waiting.lines():
             answer = json.loads(line)
             if answer["kind"] == "made":
-                _keep(studio, key, Made(out / answer["name"], answer["name"]))
+                _remember(studio, key, RunFolder(out / answer["name"], answer["name"]))
                 yield json.dumps({**answer, "key": key}).encode() + b"\n"
             else:
                 yield line + b"\n"
 
-    return _Lines(told(), studio.maker, wish)
+    return _Lines(lines(), studio.maker, waiting)
 
 
-def _keep(studio: Studio, key: str, made: Made) -> None:
-    studio.made[key] = made
+def _remember(studio: Studio, key: str, run: RunFolder) -> None:
+    studio.made[key] = run
     while len(studio.made) > MOST_MADE:
         oldest = next(iter(studio.made))
         folder = studio.made.pop(oldest).folder
@@ -350,30 +350,30 @@ def _keep(studio: Studio, key: str, made: Made) -> None:
 
 
 async def made_file(request: Request) -> Response:
-    made = _studio(request).made.get(request.path_params["key"])
-    path = made.file(request.path_params["path"]) if made else None
+    run = _studio(request).made.get(request.path_params["key"])
+    path = run.file(request.path_params["path"]) if run else None
     return FileResponse(path) if path else Response(status_code=404)
 
 
 async def made_zip(request: Request) -> Response:
-    made = _studio(request).made.get(request.path_params["key"])
-    if made is None:
+    run = _studio(request).made.get(request.path_params["key"])
+    if run is None:
         return Response(status_code=404)
-    content = await asyncio.to_thread(zipped, made)
-    headers = {"content-disposition": f'attachment; filename="{made.name}.zip"'}
+    content = await asyncio.to_thread(zipped, run)
+    headers = {"content-disposition": f'attachment; filename="{run.name}.zip"'}
     return Response(content, media_type="application/zip", headers=headers)
 
 
-async def _worked(request: Request, pool: WorkerPool, do: str) -> Response:
-    studio, asked = _studio(request), await _asked(request)
-    job = {**forms.job(studio.folder, asked), "do": do}
-    wish = pool.ask((job["tab"], do), job)
+async def _answered(request: Request, pool: WorkerPool, do: str) -> Response:
+    studio, table = _studio(request), await _request_table(request)
+    job = {**forms.job(studio.folder, table), "do": do}
+    waiting = pool.ask((job["tab"], do), job)
 
     async def lines() -> AsyncIterator[bytes]:
-        async for answer in wish.lines():
+        async for answer in waiting.lines():
             yield answer + b"\n"
 
-    return _Lines(lines(), pool, wish)
+    return _Lines(lines(), pool, waiting)
 
 
 class _Lines(StreamingResponse):
@@ -385,25 +385,25 @@ class _Lines(StreamingResponse):
         self,
         content: AsyncIterator[bytes],
         pool: WorkerPool | None = None,
-        wish: WaitingJob | None = None,
+        job: WaitingJob | None = None,
     ) -> None:
         super().__init__(content)
-        self.pool, self.wish = pool, wish
+        self.pool, self.job = pool, job
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
         finally:
             # Also where the reader was gone before the first line was asked for.
-            if self.pool is not None and self.wish is not None:
-                self.pool.forget(self.wish)
+            if self.pool is not None and self.job is not None:
+                self.pool.forget(self.job)
 
 
-async def _asked(request: Request) -> dict[str, Any]:
+async def _request_table(request: Request) -> dict[str, Any]:
     return forms.table(await request.body())
 
 
-# Starting the studio: what is opened, the port, the link.
+# Start of the studio: design, port and link.
 
 
 ADDRESS = "127.0.0.1"
@@ -423,10 +423,10 @@ class StudioStart(NamedTuple):
 
 
 def opened(source: str | None) -> StudioStart:
-    """Return what the studio shall open.
+    """Return the folder and design that the studio opens.
 
     ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
-    folder one stands in. Raises DesignError.
+    current folder. Raises DesignError.
     """
     if source is None:
         return StudioStart(Path.cwd())
@@ -439,7 +439,7 @@ def opened(source: str | None) -> StudioStart:
         return StudioStart(path.resolve())
     if not path.is_file():
         raise DesignError(
-            f"{source} is no design file, folder, template or link; the templates are "
+            f"{source} is not a design file, folder, template or link; the templates are "
             f"{', '.join(api.templates())}"
         )
     folder = path.resolve().parent

@@ -1,4 +1,4 @@
-"""The form of a family from the JSON schema: one flat list of fields, in the file's order."""
+"""The form of each family from the JSON schema, and the requests of the page."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ UNITS = (
 
 def families(schema: JsonSchema) -> dict[str, list[Field]]:
     """The fields of every family of single designs."""
-    found = {}
+    fields_of = {}
     for record in schema["oneOf"]:
         table = _named(record["$ref"], schema)
         name = (
@@ -57,14 +57,14 @@ def families(schema: JsonSchema) -> dict[str, list[Field]]:
         )
         if name != "assembly":
             fields = list(_fields(table, schema, ""))
-            found[name] = sorted(fields, key=_rank)
-    return found
+            fields_of[name] = sorted(fields, key=_rank)
+    return fields_of
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
     """The fields of an assembly, and by kind those of a part, whose keys start at its table."""
     table = _named("Assembly", schema)
-    own = sorted(_fields(table, schema, ""), key=_rank)
+    assembly_fields = sorted(_fields(table, schema, ""), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
     kinds = {}
     for kind, reference in parts["discriminator"]["mapping"].items():
@@ -76,12 +76,12 @@ def assembly(schema: JsonSchema) -> dict[str, Any]:
             "fields": sorted(fields, key=lambda field: field["key"] in PLACING),
             "needs": [field["key"] for field in fields if field["key"] in needed],
         }
-    return {"fields": own, "kinds": kinds}
+    return {"fields": assembly_fields, "kinds": kinds}
 
 
 def keys(schema: JsonSchema) -> set[str]:
     """Every dotted key of any family, and those of an assembly itself."""
-    fields = [field for own in families(schema).values() for field in own]
+    fields = [field for group in families(schema).values() for field in group]
     return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
 
@@ -93,28 +93,28 @@ def _rank(field: Field) -> int:
 
 
 def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Field]:
-    for name, own in table["properties"].items():
-        reference = own.get("$ref") or _single(own) or _optional(own)
+    for name, rule in table["properties"].items():
+        reference = rule.get("$ref") or _single(rule) or _optional(rule)
         if reference is not None:
             inner = _named(reference, schema)
             if "properties" in inner:
                 yield from _fields(inner, schema, f"{prefix}{name}.")
             continue
         key = prefix + name
-        if key != "family" and own.get("type") != "object":
-            yield _field(key, own)
+        if key != "family" and rule.get("type") != "object":
+            yield _field(key, rule)
 
 
-def _field(key: str, own: JsonSchema) -> Field:
-    ways = own.get("anyOf", [own])
+def _field(key: str, rule: JsonSchema) -> Field:
+    ways = rule.get("anyOf", [rule])
     kinds = [way.get("type") for way in ways]
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
     is_length = number is not None and any("pattern" in way for way in ways)
     choices = next((way["enum"] for way in ways if "enum" in way), None)
     field: Field = {
         "key": key,
-        "meaning": " ".join(own.get("description", "").split()),
-        "default": own.get("default"),
+        "meaning": " ".join(rule.get("description", "").split()),
+        "default": rule.get("default"),
         "unit": "mm" if is_length else _unit(key),
         "kind": _kind(kinds, choices),
         "list": "array" in kinds,
@@ -122,8 +122,8 @@ def _field(key: str, own: JsonSchema) -> Field:
     }
     if choices:
         field["choices"] = choices
-    if "items" in own and "enum" in own["items"]:
-        field["choices"], field["kind"] = own["items"]["enum"], "set"
+    if "items" in rule and "enum" in rule["items"]:
+        field["choices"], field["kind"] = rule["items"]["enum"], "set"
     if number is not None:
         field["least"] = number.get("minimum", number.get("exclusiveMinimum"))
         field["most"] = number.get("maximum", number.get("exclusiveMaximum"))
@@ -148,24 +148,24 @@ def _unit(key: str) -> str:
     return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
 
 
-def _single(own: JsonSchema) -> str | None:
+def _single(rule: JsonSchema) -> str | None:
     """The reference of a key that is one table, whatever stands beside it."""
-    ways = own.get("allOf") or []
+    ways = rule.get("allOf") or []
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
-def _optional(own: JsonSchema) -> str | None:
+def _optional(rule: JsonSchema) -> str | None:
     """The reference of a table that may be left out whole."""
-    ways = [way for way in own.get("anyOf") or [] if way.get("type") != "null"]
+    ways = [way for way in rule.get("anyOf") or [] if way.get("type") != "null"]
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
 def _named(reference: str, schema: JsonSchema) -> JsonSchema:
-    found: JsonSchema = schema["$defs"][reference.rpartition("/")[2]]
-    return found
+    definition: JsonSchema = schema["$defs"][reference.rpartition("/")[2]]
+    return definition
 
 
-# What the page asks for and is told first, whether a server answers or Python in the page.
+# Requests of the page, answered by a server or by Python in the page.
 
 
 SURROGATE = re.compile("[\ud800-\udfff]")
@@ -178,7 +178,7 @@ def started(
     text: str | None = None,
     template: str | None = None,
 ) -> Any:
-    """What the page begins with; no ``folder`` where it has no disk to read from.
+    """Return the first answer to the page; without ``folder`` there is no disk to read from.
 
     ``opened`` names a file of the folder, ``text`` is a link's design, ``template`` a template.
     """
@@ -199,17 +199,17 @@ def started(
 def table(body: bytes | str) -> dict[str, Any]:
     """The table that a request holds. Raises SbafabError where it is none."""
     try:
-        asked = json.loads(body)
+        parsed = json.loads(body)
     except (ValueError, RecursionError):
-        asked = None
-    if not isinstance(asked, dict):
+        parsed = None
+    if not isinstance(parsed, dict):
         raise SbafabError("the request is not a table in JSON")
-    _refuse_surrogates(asked)
-    return asked
+    _refuse_surrogates(parsed)
+    return parsed
 
 
-def _refuse_surrogates(asked: dict[str, Any]) -> None:
-    text = asked.get("text")
+def _refuse_surrogates(parsed: dict[str, Any]) -> None:
+    text = parsed.get("text")
     half = SURROGATE.search(text) if isinstance(text, str) else None
     if half is not None:
         line = half.string.count("\n", 0, half.start()) + 1
@@ -218,7 +218,7 @@ def _refuse_surrogates(asked: dict[str, Any]) -> None:
             "can; delete it and type it again"
         )
     try:
-        json.dumps(asked, ensure_ascii=False).encode("utf-8")
+        json.dumps(parsed, ensure_ascii=False).encode("utf-8")
     except UnicodeEncodeError as error:
         raise SbafabError(
             f"the request holds half a character (U+{ord(error.object[error.start]):04X}), which "
@@ -226,12 +226,12 @@ def _refuse_surrogates(asked: dict[str, Any]) -> None:
         ) from None
 
 
-def job(folder: Path, asked: dict[str, Any]) -> dict[str, Any]:
-    """What a job may be told: texts of the design, edits, and places that the page cannot choose.
+def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """Return the job of a request: design text, edits, and places that the page cannot choose.
 
     Raises SbafabError.
     """
-    edits = asked.get("edits") or []
+    edits = request.get("edits") or []
     good = isinstance(edits, list) and all(
         isinstance(edit, list)
         and len(edit) == 2
@@ -239,17 +239,17 @@ def job(folder: Path, asked: dict[str, Any]) -> dict[str, Any]:
         and (edit[1] is None or isinstance(edit[1], str))
         for edit in edits
     )
-    if not good or not isinstance(asked.get("text"), str):
+    if not good or not isinstance(request.get("text"), str):
         raise SbafabError("a request holds a text, and edits as [key, value]")
-    name = asked.get("name")
+    name = request.get("name")
     path = name if isinstance(name, str) and name.endswith(".toml") and "/" not in name else None
-    has = asked.get("has") or []
+    has = request.get("has") or []
     return {
-        "tab": str(asked.get("tab", ""))[:40],
-        "text": asked["text"],
+        "tab": str(request.get("tab", ""))[:40],
+        "text": request["text"],
         "edits": [(key, value) for key, value in edits],
         "has": [key for key in has if isinstance(key, str)] if isinstance(has, list) else [],
         "folder": str(folder),
         "path": path or "design.toml",
-        "pose": asked.get("pose"),
+        "pose": request.get("pose"),
     }

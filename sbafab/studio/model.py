@@ -1,4 +1,4 @@
-"""What the page draws of a laminate: numbers and words, no pictures.
+"""Laminates, findings and assemblies as the page draws them: numbers and words, no pictures.
 
 A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
 shape is sent under its key once, and not again to a page that says it has it.
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from sbafab.meshing.surface import Surface
     from sbafab.rules.finding import Finding
 
-Beat = Callable[[], None]
-"""Called between steps of work; raises where nobody waits for it any more."""
+CancelCheck = Callable[[], None]
+"""Called between steps of work; raises where the answer is no longer needed."""
 
 
 @dataclass
@@ -51,7 +51,9 @@ def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
     """Layers, patterns and what lies at which place; plan, section and solid are drawn from it."""
     shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
-    patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
+    patterns = {
+        name: _pattern(laminate, group, shapes) for name, group in laminate.patterns.items()
+    }
     return {
         "kind": "laminate",
         "name": laminate.name,
@@ -102,7 +104,7 @@ def finding_model(finding: Finding) -> dict[str, Any]:
     return {**finding.as_dict(), "by_user": finding.by_user}
 
 
-# What the page draws of an assembly: each part's surface once, and where it stands.
+# Assemblies: the surface of each part once, and its place.
 #
 # A surface is sent under its key once, in the part's own frame, and not again to a page that says
 # it has it: a part that is moved costs nothing but its place.
@@ -125,13 +127,13 @@ def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
 
 
 def _part(placed: PlacedPart) -> dict[str, Any]:
-    part, made = placed.part, placed.made
+    part, actuator = placed.part, placed.made
     design = None
-    if made is not None:
+    if actuator is not None:
         design = {
-            "name": made.design.name,
-            "family": made.design.family,
-            "values": api.resolved(made.design),
+            "name": actuator.design.name,
+            "family": actuator.design.family,
+            "values": api.resolved(actuator.design),
         }
     return {
         "name": placed.name,
@@ -146,22 +148,24 @@ def _part(placed: PlacedPart) -> dict[str, Any]:
 
 def _key(placed: PlacedPart) -> str:
     """Names a surface by all that decides it."""
-    own: list[Any] = [placed.turn, placed.radius]
+    decisive: list[Any] = [placed.turn, placed.radius]
     if placed.made is None:
-        own.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))
+        decisive.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))
     else:
         layers = placed.made.laminate.layers
-        own += [(one.profile.key, one.z, one.film.thickness, one.is_mask) for one in layers]
-    return hashlib.sha256(repr(own).encode()).hexdigest()[:24]
+        decisive += [
+            (layer.profile.key, layer.z, layer.film.thickness, layer.is_mask) for layer in layers
+        ]
+    return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
 
 
 def _surface(placed: PlacedPart, key: str) -> dict[str, str]:
-    found = _KNOWN.get(key)
-    if found is None:
-        found = _KNOWN[key] = packed(api.solid(placed))
-        while len(_KNOWN) > MOST_KNOWN:
-            del _KNOWN[next(iter(_KNOWN))]
-    return found
+    surface = _SURFACES.get(key)
+    if surface is None:
+        surface = _SURFACES[key] = packed(api.solid(placed))
+        while len(_SURFACES) > MOST_SURFACES:
+            del _SURFACES[next(iter(_SURFACES))]
+    return surface
 
 
 def packed(surface: Surface) -> dict[str, str]:
@@ -173,6 +177,6 @@ def _words(numbers: Any, kind: str) -> str:
     return base64.b64encode(numbers.astype(kind).tobytes()).decode("ascii")
 
 
-_KNOWN: dict[str, dict[str, str]] = {}
-MOST_KNOWN = 24
+_SURFACES: dict[str, dict[str, str]] = {}
+MOST_SURFACES = 24
 """Surfaces that a worker keeps, so that a page that lost one is answered at once."""

@@ -1,4 +1,4 @@
-"""Files the page may name: design files in the chosen folder, and what designs refer to there."""
+"""Design files in the chosen folder with the files they name, and folders of runs."""
 
 from __future__ import annotations
 
@@ -81,14 +81,14 @@ def state(path: Path) -> str:
         return ""
 
 
-def save(path: Path, text: str, seen: str | None) -> str:
+def save(path: Path, text: str, expected: str | None) -> str:
     """Writes the file whole and returns its hash.
 
     ``seen``: the hash of what the page has read; where another lies there now, raises OutputError.
     """
     if path.exists() and not path.is_file():
         raise OutputError(f"{path.name} is not a regular file; save under another name")
-    if seen is not None and state(path) != seen:
+    if expected is not None and state(path) != expected:
         raise OutputError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
     content = text.encode("utf-8")
     try:
@@ -162,7 +162,7 @@ DAY_ONE = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
-class Made:
+class RunFolder:
     """The folder of a run and the name that it goes by."""
 
     folder: Path
@@ -171,18 +171,18 @@ class Made:
     def file(self, path: str) -> Path | None:
         """A file of the run, None for any other place."""
         try:
-            found = (self.folder / path).resolve()
-            inside = found.is_relative_to(self.folder.resolve())
-            return found if inside and found.is_file() else None
+            resolved = (self.folder / path).resolve()
+            inside = resolved.is_relative_to(self.folder.resolve())
+            return resolved if inside and resolved.is_file() else None
         except (OSError, ValueError):  # a name too long for any file, or one with a NUL
             return None
 
 
-def zipped(made: Made) -> bytes:
+def zipped(run: RunFolder) -> bytes:
     """The run's folder as a zip, its files byte for byte, in the order of their names."""
-    paths = sorted(path for path in made.folder.rglob("*") if path.is_file())
+    paths = sorted(path for path in run.folder.rglob("*") if path.is_file())
     return packed(
-        (f"{made.name}/{path.relative_to(made.folder).as_posix()}", path.read_bytes())
+        (f"{run.name}/{path.relative_to(run.folder).as_posix()}", path.read_bytes())
         for path in paths
     )
 

@@ -18,6 +18,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 
@@ -59,7 +60,7 @@ def assert_held(laminate: Laminate) -> None:
             for piece in layers[0].profile.pieces:
                 tools = [p for p in laminate.pins_in(piece) if p.centre not in bores]
                 assert len(tools) >= 2, layers[0].name
-    assert [f.verdict for f in pin_holes.check(laminate, Limits())] == ["pass"]
+    assert [f.verdict for f in pin_holes.check(Measures(laminate, Limits()))] == ["pass"]
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -20,6 +20,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import strip
 from sbafab.rules import bridges
+from sbafab.rules.measures import Measures
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
@@ -158,7 +159,7 @@ def test_a_copy_that_is_cut_otherwise_stands_for_its_layer(whole: Path, tmp_path
     assert clean.layer(7).profile.area - cap.area == pytest.approx(
         1.12 * (3.25 - 2.84) - 0.04, abs=0.03
     )
-    (found,) = bridges.check(built.laminate, built.limits)
+    (found,) = bridges.check(Measures(built.laminate, built.limits))
     assert found.verdict == "fail"
 
 

@@ -22,15 +22,15 @@ from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.models.figures import Asked, Factors
 from sbafab.models.prediction import predict
-from sbafab.nesting.bottom_left import bottom_left
+from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
 from sbafab.output import artefacts
 from sbafab.output.artefacts import write_cut_files
 from sbafab.output.checked import DesignPlan
 from sbafab.output.manifest import file_hashes
 from sbafab.process import Progress
-from sbafab.rules.deck import Rule
 from sbafab.rules.finding import Finding, Place
+from sbafab.rules.rule import Explanation, Rule
 from sbafab.runs import run
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
@@ -88,7 +88,7 @@ def test_rules_are_not_run_twice_on_what_is_as_designed(tmp_path: Path) -> None:
     def never(*_: object) -> list[object]:
         raise AssertionError
 
-    rules = (Rule("never", never),)  # type: ignore[arg-type]
+    rules = (Rule("never", never, Explanation("", "", "")),)  # type: ignore[arg-type]
     with patch.object(as_built, "RULES", rules):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
 
@@ -104,7 +104,7 @@ def test_a_mistake_of_the_program_is_no_finding(clean_column: Path) -> None:
     def mistaken(*_: object) -> list[object]:
         raise AttributeError("no attribute of this name")
 
-    rules = (Rule("mistaken", mistaken),)  # type: ignore[arg-type]
+    rules = (Rule("mistaken", mistaken, Explanation("", "", "")),)  # type: ignore[arg-type]
     with patch.object(as_built, "RULES", rules), pytest.raises(AttributeError):
         check_folder(clean_column)
 
@@ -161,7 +161,7 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
 
     with (
-        patch("sbafab.nesting.bottom_left.bottom_left", moved),
+        patch("sbafab.nesting.engines.bottom_left", moved),
         pytest.raises(DefectError, match=said),
     ):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))

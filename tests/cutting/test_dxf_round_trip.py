@@ -13,8 +13,9 @@ from sbafab.cutting.dxf_write import Surroundings, dxf_text, number
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, Point
-from sbafab.geometry.region import Contour, Region, disc
+from sbafab.geometry.region import Region, disc
 
 NAMES = ["disc", "ring", "discs", "stadium", "tab", "plate", "island"]
 

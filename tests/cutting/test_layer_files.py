@@ -158,7 +158,7 @@ from sbafab.cutting.kerf import compensate
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, file_properties
 from sbafab.cutting.dxf_write import skeleton_text
-from sbafab.geometry.boolean import union
+from sbafab.geometry.region import union
 from sbafab.geometry.region import disc
 axes = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.0, 2.1, 4.2)]
 plate = union([disc(axis, 3.25) for axis in axes]) | disc((0, 0), 1.75)

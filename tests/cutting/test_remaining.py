@@ -10,8 +10,9 @@ import pytest
 
 from sbafab.cutting import order
 from sbafab.cutting.order import PointsLeft
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region, circle, disc
+from sbafab.geometry.region import Region, disc
 
 
 def scattered(seed: int) -> list[Point]:

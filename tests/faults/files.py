@@ -11,9 +11,9 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.edges import Line
-from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.region import Contour, Region, disc
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Line, meeting_points
+from sbafab.geometry.region import Region, disc
 from tests.faults.holes import bore
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Pick, Specimen, mask, separator, tabbed_wall, wall

@@ -7,10 +7,11 @@ import random
 
 import pytest
 
-from sbafab.geometry.boolean import FAR, alone, chains_of, divided, grouped, union, wound
+from sbafab.geometry.boolean import FAR, alone, chains_of, grouped
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Contour, Region, circle, disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, stadium, union, wound
 
 
 def laid_over(above: int, *regions: Region) -> Region:

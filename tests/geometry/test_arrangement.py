@@ -9,9 +9,8 @@ import pytest
 from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry import arrangement
 from sbafab.geometry.arrangement import Arrangement, Overlay, Piece, by_owner, overlaid, split_edges
-from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import EPSILON, Arc, Line, Point, distance_to, left_normal
-from sbafab.geometry.region import Region, disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle, union, wound
 
 
 def arranged(*regions: Region) -> Arrangement:

@@ -15,8 +15,8 @@ from sbafab.geometry.arcs import (
     elliptical_arc,
     fit_arcs,
 )
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, distance_to
-from sbafab.geometry.region import Contour
 
 FULL = (0.0, math.tau)
 CURVES = {

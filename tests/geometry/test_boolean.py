@@ -7,9 +7,8 @@ import random
 
 import pytest
 
-from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union, wound
 
 
 def lens(r: float, s: float, gap: float) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from sbafab.geometry.region import Copies, disc, polygon, stadium
+from sbafab.geometry.contour import Copies
+from sbafab.geometry.region import disc, polygon, stadium
 
 
 def test_moved_contours_are_copies_and_others_are_not() -> None:

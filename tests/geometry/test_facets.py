@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from sbafab.geometry.arcs import facets
-from sbafab.geometry.region import Contour, circle, disc, rectangle, stadium
+from sbafab.geometry.contour import Contour, circle, facets
+from sbafab.geometry.region import disc, rectangle, stadium
 
 
 def shoelace(points: list[tuple[float, float]]) -> float:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from sbafab.geometry.facing_places import facing_places
+from sbafab.geometry.facing_places import facing_places_of
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.geometry.width import Width, least_width
 
@@ -15,8 +15,8 @@ FRAME = rectangle((0.0, 0.0), (10.0, 6.0)) - rectangle((1.0, 1.5), (9.0, 4.0))
 
 
 def facing_pairs(region: Region, slack: float) -> list[Width]:
-    found = facing_places(region, slack)
-    ends = zip(found.start.T.tolist(), found.end.T.tolist(), found.value.tolist(), strict=True)
+    (places,) = facing_places_of([(region, slack, 90.0, None)])
+    ends = zip(places.start.T.tolist(), places.end.T.tolist(), places.value.tolist(), strict=True)
     return [Width(value, tuple(start), tuple(end)) for start, end, value in ends]
 
 

@@ -8,9 +8,10 @@ from random import Random
 
 import pytest
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region, disc
+from sbafab.geometry.region import Region, disc
 from tests.hunt import oracle
 from tests.hunt.__main__ import CHUNK, hunted
 

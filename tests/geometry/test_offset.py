@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Point
 from sbafab.geometry.offset import beam_path, fillet, grow, shrink
-from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 
 CONVEX = [
     disc((1, 2), 3.25),

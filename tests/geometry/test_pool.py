@@ -8,9 +8,8 @@ from random import Random
 import pytest
 
 from sbafab.geometry.arrangement import PointPool
-from sbafab.geometry.boolean import difference, intersection, union
 from sbafab.geometry.edges import SAME, Point
-from sbafab.geometry.region import Region, disc, rectangle, stadium
+from sbafab.geometry.region import Region, difference, disc, intersection, rectangle, stadium, union
 
 STEPS = [(0.95 * SAME * i, 0.0) for i in range(5)]
 

@@ -15,10 +15,10 @@ from random import Random
 import pytest
 
 from sbafab.geometry.arcs import ellipse, fit_arcs
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, edge_from_bulge
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Contour, Region, disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle, union
 from tests.hunt.oracle import OPERATIONS, complaint, offset_complaint
 
 QUARTER = math.tan(math.pi / 8)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from sbafab.geometry.boolean import difference
 from sbafab.geometry.cache import MOST, cached
-from sbafab.geometry.region import Region, disc, rectangle
+from sbafab.geometry.region import Region, difference, disc, rectangle
 
 
 def test_what_differs_by_a_hair_is_asked_for_again_and_few_answers_are_kept() -> None:

@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.geometry.boolean import tidy
+from sbafab.geometry.contour import Contour, circle, tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, runs, same_support, unit
-from sbafab.geometry.region import Contour, circle
 
 
 def closed(points: list[Point]) -> tuple[Edge, ...]:

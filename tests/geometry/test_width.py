@@ -8,9 +8,9 @@ import random
 import pytest
 import shapely
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc
-from sbafab.geometry.region import Contour, Region, disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import (
     Boundary,
     Gathered,

@@ -8,8 +8,7 @@ import random
 import pytest
 
 from sbafab.geometry import width
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region, disc, polygon, rectangle
+from sbafab.geometry.region import Region, disc, polygon, rectangle, union
 from sbafab.geometry.width import least_gap, least_width, may_be_narrower, widest_least
 
 AXIS = (0.0, 0.0)

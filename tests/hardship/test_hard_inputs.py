@@ -11,8 +11,8 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.errors import GeometryError, SbafabError
-from sbafab.geometry.boolean import wound
 from sbafab.geometry.edges import Line
+from sbafab.geometry.region import wound
 from sbafab.output import checked
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load
-from sbafab.assemblies.writing import assembly_toml
+from sbafab.assemblies.files import assembly_toml, load
 from sbafab.design.files import design_toml, template_names, templates_folder
 from sbafab.design.records import Design
 from sbafab.errors import SbafabError

@@ -17,10 +17,10 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from sbafab.errors import GeometryError
-from sbafab.geometry.boolean import LEAST_AREA, difference, intersection, union
+from sbafab.geometry.contour import LEAST_AREA
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, left_normal
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, difference, intersection, union
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.intp]

@@ -14,8 +14,7 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region, disc, strip
+from sbafab.geometry.region import Region, disc, strip, union
 
 AXES = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.5, 2.6, 4.7)]
 PROFILES: list[DxfProfile] = ["bulges", "arcs", "chords"]

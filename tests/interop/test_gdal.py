@@ -15,9 +15,8 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import DxfProfile
-from sbafab.geometry.boolean import union
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region, disc, stadium, strip
+from sbafab.geometry.region import Region, disc, stadium, strip, union
 
 
 @pytest.fixture(autouse=True)

@@ -13,11 +13,10 @@ from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
 from sbafab.meshing.conforming.crossing import check_apart, crossing
 from sbafab.meshing.conforming.element_mesh import skin
-from sbafab.meshing.conforming.elements import FACES
 from sbafab.meshing.conforming.fill import filled
 from sbafab.meshing.conforming.layup import MeshSettings, flat, layup
+from sbafab.meshing.conforming.mesh import FACES, Mesh
 from sbafab.meshing.conforming.meshes import conforming_meshes
-from sbafab.meshing.conforming.model import Mesh
 
 SETTINGS = MeshSettings(h=0.75)
 

@@ -106,7 +106,7 @@ def judged(balloon: Balloon, most: float = 110.0) -> None:
     assert (np.diff(volume, axis=0) >= -1e-3 * volume[1:] - 1e-4 * area).all()
     assert (np.diff(force, axis=1) <= 1e-5 * (p * area + np.abs(force[:, 1:]))).all()
     # Taut films whose neck, pocket and rim stay: none stretches up to a tenth of its length.
-    gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.rigid
+    gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.membrane_stiffness
     assert (volume[gentle] < 1.1**3 * mylar(balloon.pocket + 0.1)).all()
     # Between plates far below its free height it holds what a balloon computed there does.
     at = np.geomspace(0.1, most, 8)

@@ -12,13 +12,13 @@ from sbafab.models.balloon import (
     RIM_ELEMENTS,
     Balloon,
     BalloonLoad,
-    amplitude,
     coordinates,
+    initial_shape,
     rim_ripples,
-    start,
-    total,
+    squared_tilt,
+    total_energy,
 )
-from sbafab.models.least_energy import Descent, NoBalance, settled
+from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
 
 INNER = Balloon(neck=1.25, bore=0.5)
 DRAW = np.random.default_rng(3)
@@ -59,7 +59,7 @@ def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -
     pick[1] = pick[3]
     small = np.linalg.solve(pick.T @ whole @ pick, (pick.T @ wanted).T[..., None])[..., 0]
     free = np.delete(np.arange(12), [1, 7])
-    least_energy.join(band, 1, 3)
+    least_energy.tie(band, 1, 3)
     wanted[3] += wanted[1]
     own = least_energy.solve(
         least_energy.packed(band, least_energy.packing(free, 12, 4)), wanted[free]
@@ -85,16 +85,16 @@ def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
         tied=True,
         ripple=ripple,
     )
-    x = coordinates(*start(one, load))
+    x = coordinates(*initial_shape(one, load))
     x += DRAW.normal(0, 0.003, x.shape)
     x[2 * one.edge :: 2] *= 0.96
-    assert (amplitude(one.film, one.edge, ripple, x[::2].T) > 0).all()
-    found, step = total(one, load, x), 1e-6
+    assert (squared_tilt(one.film, one.edge, ripple, x[::2].T) > 0).all()
+    found, step = total_energy(one, load, x), 1e-6
     slopes, curves = [], []
     for i in range(len(x)):
         moved = np.zeros_like(x)
         moved[i] = step
-        more, less = total(one, load, x + moved), total(one, load, x - moved)
+        more, less = total_energy(one, load, x + moved), total_energy(one, load, x - moved)
         slopes.append((more.energy - less.energy) / (2 * step))
         curves.append((more.gradient - less.gradient) / (2 * step))
     assert found.gradient == pytest.approx(np.array(slopes), rel=1e-5, abs=1e-3)
@@ -112,7 +112,7 @@ class Well:
     def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
         return Descent((x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None])
 
-    def ahead(self, state: Descent, damping: np.ndarray) -> np.ndarray:
+    def newton_step(self, state: Descent, damping: np.ndarray) -> np.ndarray:
         band = state.matrix + damping * np.abs(state.matrix)
         return least_energy.solve(band, -state.gradient)
 
@@ -121,7 +121,7 @@ class Well:
 
 
 def test_the_least_energy_is_found_from_where_it_bends_downward() -> None:
-    found = settled(Well(), np.array([[0.01, -0.3]]))
+    found = equilibrium(Well(), np.array([[0.01, -0.3]]))
     assert found == pytest.approx(np.array([[0.5**0.5, -(0.5**0.5)]]))
 
 
@@ -133,5 +133,5 @@ class Slope(Well):
 
 
 def test_an_energy_without_a_least_one_is_given_up() -> None:
-    with pytest.raises(NoBalance):
-        settled(Slope(), np.zeros((1, 2)))
+    with pytest.raises(NoEquilibrium):
+        equilibrium(Slope(), np.zeros((1, 2)))

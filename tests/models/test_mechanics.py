@@ -109,7 +109,7 @@ def test_second_moments_of_disc_rectangle_and_what_is_moved_or_turned() -> None:
     low, high = second_moments(disc((3.0, -2.0), 3.25))
     assert low == pytest.approx(math.pi * 3.25**4 / 4, rel=2e-4)
     assert high == pytest.approx(low, rel=1e-6)
-    bar = rectangle((-1.0, -3.0), (1.0, 3.0)).turned(30.0).moved(7.0, 1.0)
+    bar = rectangle((-1.0, -3.0), (1.0, 3.0)).turned(30.0).motions(7.0, 1.0)
     assert second_moments(bar) == pytest.approx((6 * 8 / 12, 2 * 216 / 12))
 
 

@@ -46,8 +46,8 @@ def test_a_sound_nest_passes() -> None:
         (nest_of((45, 30, 0), (45, 45, 0)), r"pin at x 50, y 50 overlap"),
         (nest_of((37.5, 45, 0)), r"pin at x 50, y 50 are 0\.5000 mm apart"),
         (nest_of((5, 5, 0), count=2), r"not nested 2 times"),
-        (nest_of((5, 5, 1)), r"sheets too many"),
-        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"sheets too many"),
+        (nest_of((5, 5, 1)), r"too many parts or sheets"),
+        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"too many parts or sheets"),
     ],
 )
 def test_a_faulty_nest_is_refused(faulty: Nest, told: str) -> None:
@@ -58,7 +58,7 @@ def test_a_faulty_nest_is_refused(faulty: Nest, told: str) -> None:
 def test_a_part_on_no_known_index_is_refused() -> None:
     sound = nest_of((5, 5, 0))
     stray = replace(sound, placements=(*sound.placements, Placement(3, 0, 0, (30.0, 30.0))))
-    with pytest.raises(OutputError, match="parts or sheets too many"):
+    with pytest.raises(OutputError, match="too many parts or sheets"):
         check_nest(stray)
 
 

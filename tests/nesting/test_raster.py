@@ -10,7 +10,7 @@ import pytest
 from shapely.geometry import Polygon, box
 
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
-from sbafab.nesting.bottom_left import aligned, grid_of, meetings, quarter_turned, raster
+from sbafab.nesting.engines import aligned, grid_of, meetings, quarter_turned, raster
 from sbafab.nesting.records import TURNS
 
 SHAPES = {

@@ -10,9 +10,9 @@ from shapely.geometry import Polygon
 from sbafab.errors import DesignError, SbafabError
 from sbafab.geometry.region import Region, disc, rectangle, stadium
 from sbafab.nesting.check import check_nest
+from sbafab.nesting.engines import SAGITTA, _outline
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Stock
-from sbafab.nesting.strip import SAGITTA, _outline
 
 
 def part(region: Region, count: int, pattern: str = "P01") -> NestPart:

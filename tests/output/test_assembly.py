@@ -13,8 +13,7 @@ import trimesh
 from lxml import html as lxml_html
 
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load_assembly
-from sbafab.assemblies.writing import assembly_sha256
+from sbafab.assemblies.files import assembly_sha256, load_assembly
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.output.manifest import file_hashes
 from sbafab.runs.check_folder import check_folder

@@ -8,7 +8,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region, disc
-from sbafab.reports.traveller.step_pictures import over_tab
+from sbafab.reports.traveller.lay_up import over_tab
 from sbafab.rules.finding import Finding
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate

@@ -8,9 +8,8 @@ import pytest
 
 import sbafab
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.files import load
+from sbafab.assemblies.files import assembly_sha256, assembly_toml, load
 from sbafab.assemblies.records import Assembly
-from sbafab.assemblies.writing import assembly_sha256, assembly_toml
 from sbafab.design.files import design_toml
 from sbafab.errors import DesignError
 from sbafab.reports.traveller.page import record_text

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Contour, Region, disc, polygon, rectangle, strip
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.rules import boundary, freedoms, margins, registration_yield, sealing, tube_fit
 from sbafab.rules.boundary import facing_films, outward_reach
@@ -25,11 +25,11 @@ from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import (
     CutContour,
     DrawnBuilds,
-    ErrorsAsked,
+    ErrorsQuery,
     MarginRows,
     RandomBuilds,
     RowKind,
-    RowsAsked,
+    RowsQuery,
     numbers,
     rows_by_error,
     rows_of,
@@ -78,7 +78,7 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     batch = DrawnBuilds(5, 0, 2 * count, BUILDS)
     drawn = batch.numbers
     every = [
-        RowsAsked(kind, [count * interface + first[error] for error in errors])
+        RowsQuery(kind, [count * interface + first[error] for error in errors])
         for kind in (0, 1)
         for interface in (0, 1)
     ]
@@ -108,7 +108,7 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
 
 def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = np.random.default_rng(7).random(60)
-    monkeypatch.setattr(registration_yield, "KEPT", 30)
+    monkeypatch.setattr(registration_yield, "STREAM_LENGTH", 30)
     registration_yield._stream.cache_clear()
     for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
         found = numbers(7, first, rows, builds)
@@ -201,17 +201,17 @@ def test_builds_found_for_another_laminate_serve_this_one(
     ]
     found = []
     for own in limits:
-        registration_yield._kept.cache_clear()
+        registration_yield._latest.cache_clear()
         found.append(simulate(laminate, own))
     assert len({one.whole.good for one in found}) == 5
     for most, slack in (
-        (registration_yield.MOST_KEPT, registration_yield.SLACK),
+        (registration_yield.MOST_CACHED, registration_yield.SLACK),
         (0, 0.02),
         (300, 0.5),
     ):
-        monkeypatch.setattr(registration_yield, "MOST_KEPT", most)
+        monkeypatch.setattr(registration_yield, "MOST_CACHED", most)
         monkeypatch.setattr(registration_yield, "SLACK", slack)
-        registration_yield._kept.cache_clear()
+        registration_yield._latest.cache_clear()
         assert [simulate(laminate, own) for own in limits] == found
 
 
@@ -219,7 +219,7 @@ def test_builds_found_for_another_laminate_serve_this_one(
 def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
     batch = DrawnBuilds(3, 40, 8, 200)
     first = np.array([[0, 1], [1, 0], [2, 4], [4, 2], [6, 7]])
-    errors = ErrorsAsked(
+    errors = ErrorsQuery(
         first,
         signs=np.array([[1.0, -1.0], [1.0, 1.0]]),
         shift=np.array([[0.2, 0.1], [0.0, 0.3], [0.0, 0.0]]),
@@ -228,9 +228,9 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
         cutting=0.1,
     )
     drawn = batch.numbers
-    likely = registration_yield._found(batch, errors, np.full(2, need))
-    told = zip(likely.asked.tolist(), likely.build.tolist(), strict=True)
-    found = dict(zip(told, likely.left, strict=True))
+    likely = registration_yield._builds_below(batch, errors, np.full(2, need))
+    told = zip(likely.query.tolist(), likely.build.tolist(), strict=True)
+    found = dict(zip(told, likely.remaining, strict=True))
     places = {one: place for place, one in enumerate(found)}
     for asked in (0, 1):
         for build in range(200):

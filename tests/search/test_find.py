@@ -19,13 +19,13 @@ from sbafab.search import trial as module
 from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.quantities import read_quantity
 from sbafab.search.quantity_names import QUANTITIES
-from sbafab.search.trial import Trial, Wanted, read_all
+from sbafab.search.trial import SearchProblem, Trial, read_all
 from sbafab.search.vary import read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 
 
-def _made_up(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+def _made_up(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Stroke 0.4 d n, mass d^2 n and a force that falls with stroke; small pockets cannot be."""
     d, n = values["chamber.diameter"], values["stack.balloons"]
     if d < 3.4:
@@ -42,12 +42,12 @@ def _made_up(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False
 def test_it_finds_what_trying_every_design_finds(
     stroke: float, force: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(
         [f"stroke@50kPa={stroke}", f"force@5mm@50kPa={force}"], ["width=12"], "mass"
     )
     request = FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE)
-    wanted = Wanted(request.design, requirements, goal)
+    wanted = SearchProblem(request.design, requirements, goal)
     every = [
         _made_up(wanted, {"chamber.diameter": 3 + step / 10, "stack.balloons": n})
         for step, n in itertools.product(range(91), range(2, 21))
@@ -90,7 +90,7 @@ def test_a_range_of_the_family_widens_where_the_best_lies_beyond(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With 20 balloons, 0.4 d n = 200 takes d = 25, beyond 16."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=200"], [], "mass")
     own = tuple(sbafab.load("1dof-5mm").free[:2])
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, own))
@@ -106,7 +106,7 @@ def test_a_range_of_the_family_widens_where_the_best_lies_beyond(
 
 
 def test_no_more_designs_are_tried_than_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
     told: list[tuple[int, int]] = []
     found = find(
@@ -120,7 +120,7 @@ def test_no_more_designs_are_tried_than_asked_for(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_front_is_shown_from_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=10"], [], "mass")
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
     assert len(found.front) == 8 < found.on_front
@@ -266,13 +266,13 @@ def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Pat
 def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every design has the same width; more balloons weigh more, and give more stroke."""
 
-    def flat(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def flat(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
         n = values["stack.balloons"]
         figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
         missed = max(0.0, 4 - n)
         return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
 
-    monkeypatch.setattr(module, "tried", flat)
+    monkeypatch.setattr(module, "evaluated", flat)
     requirements, goal = read_all(["stroke@10kPa=4"], [], "width")
     free = (Free("stack.balloons", 2, 9, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
@@ -289,7 +289,7 @@ def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
 
 def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all([], ["width=4"], "mass")
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
     assert not found.holds
@@ -303,7 +303,7 @@ def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     design = sbafab.load("1dof-5mm")
     for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
         free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
@@ -342,12 +342,14 @@ def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None
     """All nine are tried, each better than the one before: only the best is asked for its rules."""
     asked: list[int] = []
 
-    def counted(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def counted(
+        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
+    ) -> Trial:
         if with_rules:
             asked.append(values["stack.balloons"])
         return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
 
-    monkeypatch.setattr(module, "tried", counted)
+    monkeypatch.setattr(module, "evaluated", counted)
     requirements, goal = read_all([], [], "stroke@50kPa")
     free = (Free("stack.balloons", 2, 10, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
@@ -388,7 +390,7 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
     for free, fixed, said in (
         (["inlet.tab_length=3:5"], [], "LOW:HIGH:STEP"),
         (["inlet.tab=3:5:1"], [], "inlet.tab_length"),
-        ([], ["order.copies"], "changes only"),
+        ([], ["order.copies"], "by default"),
     ):
         with pytest.raises(DesignError, match=said):
             read_free(design, free, fixed)
@@ -411,17 +413,19 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     )
     seen: list[Mapping[str, Any]] = []
 
-    def stopping(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def stopping(
+        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
+    ) -> Trial:
         seen.append(values)
         if len(seen) == 8:
             raise KeyboardInterrupt
         return _made_up(wanted, values, with_rules)
 
-    monkeypatch.setattr(module, "tried", stopping)
+    monkeypatch.setattr(module, "evaluated", stopping)
     with pytest.raises(KeyboardInterrupt):
         find(request)
     assert "Traceback" not in capfd.readouterr().err
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     find(request)
     import optuna
 

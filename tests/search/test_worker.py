@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import OutputError
-from sbafab.search import pool
+from sbafab.search import pool as pool_module
 from sbafab.search.pool import MeasureJob, close_all, guarded, local_pool, open_all, run_jobs
 
 PUPPET = """
@@ -33,8 +33,8 @@ for line in sys.stdin:
 @pytest.fixture(autouse=True)
 def puppet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A process that does what its job says, in place of the one that measures."""
-    monkeypatch.setattr(pool, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
-    monkeypatch.setattr(pool, "_own", threading.local())
+    monkeypatch.setattr(pool_module, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
+    monkeypatch.setattr(pool_module, "_thread", threading.local())
     open_all()
     yield
     close_all()
@@ -76,7 +76,7 @@ def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> Non
         )
     assert sorted(key for key, _ in found) == sorted(jobs)
     assert [outcome for key, outcome in found if key == "7"] == ["crashed"]
-    assert not pool._started.children
+    assert not pool_module._started.children
 
 
 def test_stopped_half_way_it_leaves_no_process() -> None:
@@ -89,7 +89,7 @@ def test_stopped_half_way_it_leaves_no_process() -> None:
     ]
     with pytest.raises(KeyboardInterrupt), local_pool(2) as pool:
         run_jobs(pool, jobs, 60, stop, lambda: None)
-    assert not pool._started.children
+    assert not pool_module._started.children
 
 
 def test_another_program_is_told_apart() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
 from sbafab.simulators.calculix.run import deck_mesh
 

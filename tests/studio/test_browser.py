@@ -26,7 +26,7 @@ from tests.studio.browsing import (
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 
 

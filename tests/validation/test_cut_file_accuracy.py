@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pyogrio
 import pytest
 import shapely
 
 from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.runs.run import RunRequest, generate
+
+pyogrio = pytest.importorskip("pyogrio", reason="pyogrio is not installed")
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 

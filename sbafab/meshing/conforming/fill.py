@@ -1,4 +1,11 @@
-"""The lift of a film by air: Poisson's equation on the triangles of a pocket."""
+"""Films lifted by the air of their balloons, and balloons set on each other.
+
+The lift is vertical in the frame of each balloon, so no element changes its volume; balloons are
+then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
+refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in
+the paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver
+that takes one.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +19,18 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
 from sbafab.laminate.laminate import Interface
-from sbafab.meshing.conforming.crossing import crossing, said
-from sbafab.meshing.conforming.elements import integrals
+from sbafab.meshing.conforming.crossing import crossing, crossing_clause
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
+from sbafab.meshing.conforming.mesh import integrals
 from sbafab.meshing.conforming.plane import MISSING, Plane
 from sbafab.models.lens import fullest as fullest_slot
 from sbafab.models.parabola import fullest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+# The lift of one film: Poisson's equation on the triangles of a pocket.
 
 
 class Lift(NamedTuple):
@@ -39,10 +49,10 @@ class Lift(NamedTuple):
 def lift(
     plane: Plane,
     pocket: NDArray[np.bool_],
-    held: NDArray[np.int64],
+    fixed: NDArray[np.int64],
     discs: list[tuple[NDArray[np.int64], tuple[float, float]]],
 ) -> Lift:
-    """How far the film over a pocket rises: -lap w = 1, w = 0 at the ``held`` nodes.
+    """Return the rise of the film over a pocket: -lap w = 1, w = 0 at the ``fixed`` nodes.
 
     ``discs`` are the nodes of each neck and its middle: they rise as one. For a round pocket
     without a neck this is the paraboloid of the paper's Eq. 1.
@@ -64,7 +74,7 @@ def lift(
     unknown = np.full(count, -1)
     active = np.unique(triangles)
     unknown[active] = 0
-    unknown[held] = -1
+    unknown[fixed] = -1
     for nodes, _ in discs:
         unknown[nodes] = -1
     free = np.flatnonzero(unknown == 0)
@@ -89,7 +99,7 @@ def lift(
     return Lift(shapes, plateaus, shapes @ weights)
 
 
-# The pockets of a laminate as the fill needs them.
+# The pockets of a laminate.
 
 
 NEAR = 1e-3
@@ -127,8 +137,8 @@ class Pocket:
                 f"{self.layer} can hold with a film of constant length: "
                 f"ask for {math.floor(self.largest_ul * 100) / 100:.2f} ul at most"
             )
-        wanted = ul * len(self.centres) * self.share
-        if 0 < wanted < self.flat_ul:
+        target = ul * len(self.centres) * self.share
+        if 0 < target < self.flat_ul:
             raise DesignError(
                 f"fill of {self.chamber} = {ul:g} ul is less than the gaps between flat films "
                 f"hold; ask for {self.flat_ul / len(self.centres) / self.share:.2f} ul or more"
@@ -137,15 +147,15 @@ class Pocket:
             return 0.0
         even = self.lower.volumes[0] + self.upper.volumes[0]
         leaning = lean[0] @ self.lower.volumes[1:] + lean[1] @ self.upper.volumes[1:]
-        return float((wanted - self.flat_ul - leaning) / even)
+        return float((target - self.flat_ul - leaning) / even)
 
 
 def pockets(stack: Layup) -> list[Pocket]:
     """The pockets of every chamber, bottom to top; equal ones are worked out once."""
-    known: dict[tuple[bytes, ...], Lift] = {}
+    lifts: dict[tuple[bytes, ...], Lift] = {}
     limits: dict[tuple[bytes, bytes], float] = {}
     return [
-        _pocket(stack, chamber, ply, known, limits)
+        _pocket(stack, chamber, ply, lifts, limits)
         for ply, interface in enumerate(stack.laminate.interfaces, start=1)
         if interface.kind == "chamber"
         for chamber, void in stack.voids.items()
@@ -157,31 +167,31 @@ def _pocket(
     stack: Layup,
     chamber: str,
     ply: int,
-    known: dict[tuple[bytes, ...], Lift],
+    lifts: dict[tuple[bytes, ...], Lift],
     limits: dict[tuple[bytes, bytes], float],
 ) -> Pocket:
     plane, plies = stack.plane, stack.plies
     cells = stack.voids[chamber].under[ply]
     inner = np.unique(plane.triangles[cells])
-    held = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
+    fixed = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
     centres = tuple(i for i, owner in enumerate(stack.centre_chambers) if owner == chamber)
     places = [stack.centres[i] for i in centres]
 
     def lift_of(necks: NDArray[np.bool_]) -> Lift:
-        key = cells.tobytes(), held.tobytes(), necks.tobytes()
-        if key not in known:
-            discs = list(_discs(stack, necks, held, places))
-            known[key] = lift(plane, cells, held, discs)
-        return known[key]
+        key = cells.tobytes(), fixed.tobytes(), necks.tobytes()
+        if key not in lifts:
+            discs = list(_discs(stack, necks, fixed, places))
+            lifts[key] = lift(plane, cells, fixed, discs)
+        return lifts[key]
 
     above = plies[ply + 1].bonded if ply + 1 < len(plies) else cells & False
     lower = lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells))
     upper = lift_of(cells & (above | ~plies[ply].cells))
     share = stack.shares[chamber]
-    key = cells.tobytes(), held.tobytes()
+    key = cells.tobytes(), fixed.tobytes()
     if key not in limits:
         interface = stack.laminate.interfaces[ply - 1]
-        limits[key] = _largest(stack, interface, lift_of(cells & False), held, places, share)
+        limits[key] = _largest(stack, interface, lift_of(cells & False), fixed, places, share)
     return Pocket(
         chamber,
         ply,
@@ -196,10 +206,10 @@ def _pocket(
 
 
 def _discs(
-    stack: Layup, necks: NDArray[np.bool_], held: NDArray[np.int64], places: list[Point]
+    stack: Layup, necks: NDArray[np.bool_], fixed: NDArray[np.int64], places: list[Point]
 ) -> Iterator[tuple[NDArray[np.int64], Point]]:
     """The nodes of each neck disc, and the axis it is on."""
-    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), held)
+    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), fixed)
     offsets = stack.plane.points[nodes][:, None] - np.array(places)
     nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
     for number, place in enumerate(places):
@@ -211,7 +221,7 @@ def _largest(
     stack: Layup,
     interface: Interface,
     even: Lift,
-    held: NDArray[np.int64],
+    fixed: NDArray[np.int64],
     places: list[Point],
     share: float,
 ) -> float:
@@ -227,7 +237,7 @@ def _largest(
     if len(ends) == 2:
         (first, radius), (last, _) = ends
         return fullest_slot(2 * radius, math.dist(first, last)).volume
-    offsets = stack.plane.points[held][:, None] - np.array(places)
+    offsets = stack.plane.points[fixed][:, None] - np.array(places)
     half = float(np.linalg.norm(offsets, axis=2).min())
     disc = math.pi * half**2 / 2
     wider = float(even.volumes[0] / even.shapes[0].max()) / disc
@@ -248,15 +258,15 @@ def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]
                 x, y = edge.centre
                 place = (round(x, 5), round(y, 5)), round(edge.radius, 5)
                 turns[place] = turns.get(place, 0.0) + abs(edge.sweep)
-    found = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
-    on_centre = [one for one in found if math.dist(one[0], centre) < NEAR and turns[one] > math.pi]
+    ends = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
+    on_centre = [end for end in ends if math.dist(end[0], centre) < NEAR and turns[end] > math.pi]
     if on_centre:
         return on_centre[:1]
-    for number, (first, radius) in enumerate(found):
-        for last, other in found[number + 1 :]:
+    for number, (first, radius) in enumerate(ends):
+        for last, last_radius in ends[number + 1 :]:
             middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
-            if abs(other - radius) < NEAR and math.dist(middle, centre) < NEAR:
-                return [(first, radius), (last, other)]
+            if abs(last_radius - radius) < NEAR and math.dist(middle, centre) < NEAR:
+                return [(first, radius), (last, last_radius)]
     return []
 
 
@@ -326,13 +336,7 @@ def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-# Fill: films lifted off each other by the air of their balloons.
-#
-# The lift is vertical in the frame of each balloon, so no element changes its volume; balloons are
-# then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
-# refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in
-# the paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver
-# that takes one.
+# The fill of a whole actuator.
 
 
 ROUNDS = 4
@@ -365,24 +369,24 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
     through each other.
     """
     fill = _fill(stack, fill_ul)
-    held = pockets(stack)
-    forms = formed(stack, fill, held)
+    all_pockets = pockets(stack)
+    forms = formed(stack, fill, all_pockets)
     if fill.is_even:
         return fill, forms
-    found = crossing(stack, forms)
-    if found is not None:
-        least = _least(stack, fill, held)
+    worst = crossing(stack, forms)
+    if worst is not None:
+        least = _least(stack, fill, all_pockets)
         names = [name for name, ul in fill.ul.items() if ul < least.ul[name]]
-        asked = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
-        wanted = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
+        amounts = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
+        minima = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
         raise DesignError(
-            f"with fill {asked} {said(stack, found)}, for balloons lean by what their chambers "
-            f"differ; ask for at least {wanted}, or for less in the others"
+            f"with fill {amounts} {crossing_clause(stack, worst)}, for balloons lean by what "
+            f"their chambers differ; ask for at least {minima}, or for less in the others"
         )
     return fill, forms
 
 
-def _least(stack: Layup, fill: Fill, held: list[Pocket]) -> Fill:
+def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
     """The fill that is raised least towards an even one, in steps of 0.1 ul, for films to clear."""
 
     def raised(share: float) -> Fill:
@@ -401,35 +405,35 @@ def _least(stack: Layup, fill: Fill, held: list[Pocket]) -> Fill:
     for _ in range(HALVINGS):
         share = (low + high) / 2
         tried = raised(share)
-        crosses = crossing(stack, formed(stack, tried, held)) is not None
+        crosses = crossing(stack, formed(stack, tried, all_pockets)) is not None
         low, high = (share, high) if crosses else (low, share)
     return raised(high)
 
 
-def formed(stack: Layup, fill: Fill, held: list[Pocket]) -> list[FormedFilm]:
+def formed(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> list[FormedFilm]:
     """Every film where the air of these pockets has moved it to, films that cross included."""
     body_of_node, body_of_centre = bodies(stack)
     forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
     for body in np.unique(body_of_centre).tolist():
         nodes = np.flatnonzero(body_of_node == body)
         centres = np.flatnonzero(body_of_centre == body)
-        own = [pocket for pocket in held if pocket.centres[0] in centres]
-        for k, form in _raised(stack, own, centres, fill).items():
+        of_body = [pocket for pocket in all_pockets if pocket.centres[0] in centres]
+        for k, form in _raised(stack, of_body, centres, fill).items():
             forms[k].base[nodes] = form.base[nodes]
             forms[k].up[nodes] = form.up[nodes]
     return forms
 
 
 def _raised(
-    stack: Layup, own: list[Pocket], centres: NDArray[np.int64], fill: Fill
+    stack: Layup, of_body: list[Pocket], centres: NDArray[np.int64], fill: Fill
 ) -> dict[int, FormedFilm]:
     """The films of one body, by ply; sheets stay as they are."""
     lifts = np.zeros((len(stack.plies), len(stack.plane.points)))
     # Height of each stack's neck disc on each film, above the film itself.
     necks = np.zeros((len(stack.plies), len(stack.centres)))
     places = np.array(stack.centres)[centres]
-    for k in sorted({pocket.ply for pocket in own}):
-        there = [pocket for pocket in own if pocket.ply == k]
+    for k in sorted({pocket.ply for pocket in of_body}):
+        there = [pocket for pocket in of_body if pocket.ply == k]
         _lift(there, fill, centres, places, lifts, necks)
     poses = _poses(stack, places, necks[:, centres])
     forms = {}
@@ -444,7 +448,7 @@ def _raised(
 def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
     if not isinstance(fill_ul, Mapping):
-        asked = dict.fromkeys(names, float(fill_ul))
+        amounts = dict.fromkeys(names, float(fill_ul))
     else:
         unknown = [name for name in fill_ul if name not in names]
         if unknown:
@@ -452,16 +456,16 @@ def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
                 f"fill names chamber {unknown[0]}, which is not there; "
                 f"the chambers are {', '.join(names)}"
             )
-        asked = {name: float(fill_ul.get(name, 0.0)) for name in names}
-        if stack.sector is not None and len(set(asked.values())) > 1:
+        amounts = {name: float(fill_ul.get(name, 0.0)) for name in names}
+        if stack.sector is not None and len(set(amounts.values())) > 1:
             raise DesignError(
                 "a mesh of a part by symmetry has the same fill in every chamber; "
                 "ask for symmetry full"
             )
-    for name, value in asked.items():
+    for name, value in amounts.items():
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
-    return Fill(asked)
+    return Fill(amounts)
 
 
 def _lift(

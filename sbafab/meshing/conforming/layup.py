@@ -1,4 +1,4 @@
-"""What a conforming mesh is asked to be."""
+"""Layup that volume and shell mesh share: settings, symmetry, films, voids, film positions."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ Symmetry = Literal["full", "half", "quarter", "sector"]
 
 @dataclass(frozen=True)
 class MeshSettings:
-    """How the meshes are made.
+    """Settings of the conforming meshes.
 
     ``h`` is the side of the triangles in mm. ``symmetry``: half of the actuator, the quarter of a
     1-DoF one that lies away from its inlet, or one lobe's sector. ``fill_ul`` is the air in every
     balloon's pocket in ul, or in those of each chamber by name; None is the flat shape.
     ``gaps`` keeps the films as far apart as the masks hold them, with bonds between them that
     are as thick; without it films lie on each other, and the height is the sum of the TPE films.
-    ``wrapped``: what is made for a tube lies round it, its axis z; else it lies flat.
+    ``wrapped``: a laminate made for a tube lies round it, its axis z; else it lies flat.
     """
 
     h: float = 0.35
@@ -54,7 +54,7 @@ NEAR = 0.01
 
 
 class Sector(NamedTuple):
-    """What is kept, and its symmetry planes by name, each along a direction from the axis.
+    """Meshed part of the plane, and its symmetry planes by name: directions from the axis.
 
     ``copies`` of it make up the whole.
     """
@@ -64,7 +64,7 @@ class Sector(NamedTuple):
     copies: int
 
     def on_planes(self, points: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-        """Which of the points (n, 2) lie on each plane."""
+        """Yield each plane's name and a mask of the points (n, 2) on it."""
         import numpy as np
 
         for name, (x, y) in self.planes:
@@ -108,7 +108,7 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
 
 
 def _is_on_axis(laminate: Laminate) -> bool:
-    """Whether there is one stack, on the axis: a quarter of it then is a quarter of its chamber."""
+    """Return True if there is one stack, on the axis: its quarter is a quarter of its chamber."""
     return [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
 
 
@@ -130,12 +130,12 @@ def _flipped_y(region: Region) -> Region:
     return region.mirrored().turned(180.0)
 
 
-def _covers(region: Region, other: Region) -> bool:
-    return region == other or (other - region).area < SLACK
+def _covers(region: Region, image: Region) -> bool:
+    return region == image or (image - region).area < SLACK
 
 
 def _is_quarter(laminate: Laminate, region: Region) -> bool:
-    """Whether the side away from the inlet is symmetric, and its image too but for the inlet."""
+    """Return True if, but for the inlet, all four quarters are images of each other."""
     far = 10 * max(map(abs, laminate.bounds)) + 10
     away = region & polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
     if not _covers(_flipped_y(away), away):
@@ -162,14 +162,16 @@ def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
     if symmetry != "half":
         return {name: name if name in meshed else meshed[0] for name in chambers}
     _, (x, y) = part.planes[0]
-    found = {}
+    meshed_for = {}
     for name, centres in chambers.items():
         a, b = centres[0]
         along = a * x + b * y
         image = 2 * along * x - a, 2 * along * y - b
-        others = {other: math.dist(image, chambers[other][0]) for other in meshed}
-        found[name] = name if name in meshed else min(others, key=lambda other: others[other])
-    return found
+        distances = {twin: math.dist(image, chambers[twin][0]) for twin in meshed}
+        meshed_for[name] = (
+            name if name in meshed else min(distances, key=lambda twin: distances[twin])
+        )
+    return meshed_for
 
 
 # The layup: every TPE film over one triangulation of the plane, and the voids between them.
@@ -205,8 +207,9 @@ class Ply:
 
 @dataclass(frozen=True)
 class MeshedVoid:
-    """What the air of a chamber fills: triangles by ply that are open in that film, and by ply
-    that are open under it. ``volume`` is the exact volume in mm3 when flat.
+    """Air of a chamber as triangles by ply: open in that film (``in_films``), or ``under`` it.
+
+    ``volume`` is the exact volume in mm3 when flat.
     """
 
     in_films: Mapping[int, NDArray[np.bool_]]
@@ -215,7 +218,7 @@ class MeshedVoid:
 
     @property
     def is_open(self) -> bool:
-        """Whether any of it lies in what is meshed."""
+        """True if any of it lies in the meshed part."""
         return any(bool(cells.any()) for cells in self.under.values())
 
 
@@ -280,7 +283,7 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     ]
     seat_regions = [clip(seat) for _, seat in whole_seats]
     used = [*films, *bonds, *seat_regions]
-    used += [clip(region) for found in slabs.values() for _, _, region in found]
+    used += [clip(region) for chamber_slabs in slabs.values() for _, _, region in chamber_slabs]
     regions = [region for region in dict.fromkeys(used) if not region.is_empty]
     plane = triangulation(regions, settings.h)
     row = {region: index for index, region in enumerate(regions)}
@@ -302,8 +305,10 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     for ply in plies:
         _check_apart(plane, ply)
     voids = {
-        name: _void([(place, under, clip(region)) for place, under, region in found], plies, cells)
-        for name, found in slabs.items()
+        name: _void(
+            [(place, under, clip(region)) for place, under, region in chamber_slabs], plies, cells
+        )
+        for name, chamber_slabs in slabs.items()
     }
     seats = nothing.copy()
     for seat in seat_regions:
@@ -344,35 +349,35 @@ def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
 
 
 def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """Width of each bonded ring along x and y, and what it is called."""
+    """Yield the width of each bonded ring along x and y, and its name."""
     for interface in laminate.interfaces:
         ring = "the neck ring" if interface.kind == "separator" else "the bond round the pocket"
         layers = f"between layers {interface.below.index} and {interface.above.index}"
         for piece in interface.bond.pieces:
             (low_x, low_y, high_x, high_y) = piece.outers[0].bounds
             for hole in piece.holes:
-                left, low, right, high = hole.bounds
-                width = min(left - low_x, low - low_y, high_x - right, high_y - high)
+                hole_x, hole_y, right, high = hole.bounds
+                width = min(hole_x - low_x, hole_y - low_y, high_x - right, high_y - high)
                 yield width, f"{ring} {layers}"
 
 
 def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """What is left of the films beside each pocket, on the side where that is least.
+    """Yield the narrowest width of the bond beside each pocket, and its name.
 
     No ring is closed where a lone balloon's inlet leaves it.
     """
     for interface in laminate.interfaces:
         low_x, low_y, high_x, high_y = interface.contact.bounds
         for outer in interface.unbonded.outers:
-            left, low, right, high = outer.bounds
-            sides = (left - low_x, low - low_y, high_x - right, high_y - high)
+            pocket_x, pocket_y, right, high = outer.bounds
+            sides = (pocket_x - low_x, pocket_y - low_y, high_x - right, high_y - high)
             layers = f"between layers {interface.below.index} and {interface.above.index}"
             # The inlet's strip runs to the edge of the films.
             yield from ((s, f"the bond beside the pocket {layers}") for s in sides if s > EDGE)
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:
-    """What is bonded when ears are snipped off: between balloons, the neck rings alone."""
+    """Return the bond without snipped-off ears: between balloons, the neck rings alone."""
     if interface.kind != "separator":
         return interface.bond
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
@@ -434,9 +439,9 @@ def _void(
     under: dict[int, NDArray[np.bool_]] = {}
     volume = 0.0
     for place, is_under, region in slabs:
-        held = under if is_under else in_films
+        open_cells = under if is_under else in_films
         covered = cells(region)
-        held[place] = held[place] | covered if place in held else covered
+        open_cells[place] = open_cells[place] | covered if place in open_cells else covered
         ply = plies[place]
         volume += region.area * (ply.gap if is_under else ply.thickness)
     return MeshedVoid(in_films, under, volume)
@@ -460,7 +465,7 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
         )
 
 
-# Where the films stand: flat, or lifted off each other by air.
+# The positions of the films: flat, or lifted off each other by air.
 
 
 class FormedFilm(NamedTuple):
@@ -493,11 +498,11 @@ def level(layup: Layup, z: float) -> FormedFilm:
     return FormedFilm(np.column_stack([plane, np.full(len(plane), z)]), up)
 
 
-# Bodies: what hangs together above the sheet, such as each oblong balloon stack on it.
-
-
 def bodies(stack: Layup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The body of each node of the plane, and of each stack's centre."""
+    """Return the body of each node of the plane, and of each stack's centre.
+
+    A body is what hangs together above the sheet, such as each oblong balloon stack on it.
+    """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""What to say where a package is missing that only conforming meshes need."""
+"""One triangulation of the plane for all layers: edges of regions, arcs as arcs, and sizes."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from sbafab.geometry.arrangement import Arrangement, by_owner
 from sbafab.geometry.boolean import arranged
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
-from sbafab.meshing.conforming.elements import scaled_jacobians, volumes
+from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-MISSING = 'conforming meshes need {}; install it with: pip install "sbafab[mesh]"'
-
-
 # The plane cut up by the edges of several regions, arcs as arcs.
 
+
+MISSING = 'conforming meshes need {}; install it with: pip install "sbafab[mesh]"'
 
 Label = tuple[bool, ...]
 """For each region, whether it covers a cell of the plane."""
@@ -38,7 +37,7 @@ COARSE = 0.35
 
 @dataclass(frozen=True)
 class Border:
-    """An edge between two cells: what covers the plane to the left and to the right of it."""
+    """An edge between two cells, and the regions that cover each side of it."""
 
     edge: Edge
     left: Label
@@ -55,11 +54,11 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
     are one until they are a small part of ``h`` mm apart, so that no cell ends in a cusp.
     """
 
-    def labelled(found: Arrangement) -> list[Border]:
-        sides = [_label(turns, len(regions)) for turns in found.left]
+    def labelled(plan: Arrangement) -> list[Border]:
+        sides = [_label(turns, len(regions)) for turns in plan.left]
         return [
             Border(piece.edge, left, right)
-            for piece, left, right in zip(found.pieces, sides[::2], sides[1::2], strict=True)
+            for piece, left, right in zip(plan.pieces, sides[::2], sides[1::2], strict=True)
             if left != right
         ]
 
@@ -77,22 +76,22 @@ def _without_cusps(borders: list[Border], h: float) -> list[Border]:
     for number, border in enumerate(borders):
         leaving[border.edge.start].append(number)
         leaving[border.edge.end].append(number)
-    kept: list[Border | None] = list(borders)
+    shortened: list[Border | None] = list(borders)
     added: list[Border] = []
     for corner, numbers in leaving.items():
         for i, first in enumerate(numbers):
             for second in numbers[i + 1 :]:
-                a, b = kept[first], kept[second]
+                a, b = shortened[first], shortened[second]
                 if a is None or b is None or first == second:
                     continue
                 if not (_ends_at(a, corner) and _ends_at(b, corner)):
                     continue  # cut short by another cusp at this corner
                 joined = _joined(_from(a, corner), _from(b, corner), h)
                 if joined is not None:
-                    common, kept[first], bent, kept[second] = joined
+                    common, shortened[first], bent, shortened[second] = joined
                     added += [common] if common.left != common.right else []
                     added.append(bent)
-    return [border for border in kept if border is not None] + added
+    return [border for border in shortened if border is not None] + added
 
 
 def _ends_at(border: Border, corner: Point) -> bool:
@@ -150,7 +149,7 @@ def _parting(a: Edge, b: Edge, near: float) -> tuple[Point, Point] | None:
     return None
 
 
-# How small the triangles along each edge must be, for the narrow places beside it.
+# The size of triangles along each edge, smaller beside narrow places.
 
 
 ACROSS = 2.0
@@ -216,9 +215,9 @@ def _chords(
 def _end_numbers(borders: Sequence[Border]) -> NDArray[np.int64]:
     import numpy as np
 
-    known: dict[tuple[float, float], int] = {}
+    numbers: dict[tuple[float, float], int] = {}
     rows = [
-        [known.setdefault(end, len(known)) for end in (border.edge.start, border.edge.end)]
+        [numbers.setdefault(end, len(numbers)) for end in (border.edge.start, border.edge.end)]
         for border in borders
     ]
     return np.array(rows, dtype=np.int64)
@@ -342,14 +341,14 @@ def _netgen(
         ) from None
     # A copy: Netgen frees its own with the mesh.
     points = np.array(mesh.Coordinates(), dtype=np.float64)
-    found = mesh.Elements2D().NumPy()
+    elements = mesh.Elements2D().NumPy()
     sides = mesh.Elements1D().NumPy()
-    triangles = found["nodes"][:, :3].astype(np.int64) - 1
+    triangles = elements["nodes"][:, :3].astype(np.int64) - 1
     return (
         list(domains),
         points,
         triangles,
-        found["index"].astype(np.int64) - 1,
+        elements["index"].astype(np.int64) - 1,
         np.column_stack([sides["nodes"][:, :2].astype(np.int64) - 1, sides["index"] - 1]),
     )
 
@@ -388,11 +387,11 @@ def _crossings_halved(
                 corners.append([middle if node == old else node for node in triangle])
                 owners.append(owners[number])
             corners[number] = None
-    kept = [number for number, triangle in enumerate(corners) if triangle is not None]
+    remaining = [number for number, triangle in enumerate(corners) if triangle is not None]
     return (
         np.vstack([points, *added]),
-        np.array([corners[number] for number in kept], dtype=np.int64),
-        np.array(owners, dtype=np.int64)[kept],
+        np.array([corners[number] for number in remaining], dtype=np.int64),
+        np.array(owners, dtype=np.int64)[remaining],
     )
 
 
@@ -403,19 +402,19 @@ def _sharp_corners(
     import numpy as np
 
     size = len(points)
-    known = np.sort(sides[:, :2])
-    keys = known[:, 0] * size + known[:, 1]
-    found: set[tuple[int, int]] = set()
+    border_edges = np.sort(sides[:, :2])
+    keys = border_edges[:, 0] * size + border_edges[:, 1]
+    opposite: set[tuple[int, int]] = set()
     for turn in range(3):
         c, a, b = np.roll(triangles, turn, axis=1).T
         u, v = points[a] - points[c], points[b] - points[c]
         cosine = np.sum(u * v, axis=1) / (np.hypot(*u.T) * np.hypot(*v.T))
         sharp = cosine > math.cos(SHARP)
-        for other in (a, b):
-            sharp &= np.isin(np.minimum(c, other) * size + np.maximum(c, other), keys)
+        for end in (a, b):
+            sharp &= np.isin(np.minimum(c, end) * size + np.maximum(c, end), keys)
         across = np.sort(np.column_stack([a, b])[sharp])
-        found |= {(i, j) for i, j in across.tolist()}
-    return found
+        opposite |= {(i, j) for i, j in across.tolist()}
+    return opposite
 
 
 def _tangents_meet(arc: Arc) -> Point:

@@ -1,4 +1,4 @@
-"""traveller.html of an assembly: cut once, make each design, put them together."""
+"""traveller.html of an assembly: cut once, make each design, join the parts."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from sbafab.laminate.films import Film
 from sbafab.models.formulas import inflated_diameter, reached_diameter
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import listed
-from sbafab.reports.traveller import base_plate, bench, bill, times
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import base_plate, bench, bill, units
+from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import Item
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.page import (
-    before_the_day,
     cautions,
     code_svg,
     context,
@@ -33,7 +32,6 @@ from sbafab.reports.traveller.page import (
     frame,
     record_text,
     sheet_rows,
-    tools,
 )
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
@@ -82,7 +80,7 @@ class AssemblyJob:
 
 
 def assembly_html(job: AssemblyJob) -> str:
-    """The whole page."""
+    """Return the whole page."""
     name = job.assembled.assembly.name
     text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
@@ -98,7 +96,7 @@ def assembly_html(job: AssemblyJob) -> str:
             code_text=text,
             picture=b64encode(job.picture).decode("ascii"),
             parts=_parts(job),
-            tested=[name for made in job.assembled.designs for name in made.parts],
+            tested=[name for build in job.assembled.designs for name in build.parts],
             cautions=_cautions(job),
             bill=_bill(job),
             before_the_day=before_the_day(works),
@@ -106,8 +104,8 @@ def assembly_html(job: AssemblyJob) -> str:
             before_cutting=bench.before_cutting(works),
             after_cutting=bench.after_cutting(works),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
-            laser_minutes=times.laser_minutes(works[0]),
-            laser_basis=times.laser_basis(works[0]),
+            laser_minutes=bill.laser_minutes(works[0]),
+            laser_basis=bill.laser_basis(works[0]),
             press_plan=[_press_words(one) for one in job.works],
             not_together=_not_together(job),
             marks=_marks(job),
@@ -124,19 +122,19 @@ def assembly_html(job: AssemblyJob) -> str:
     )
 
 
-def _chapter(one: DesignWork, number: int, mark: str) -> str:
-    """The making of one design, with ids that no other chapter has."""
-    said: dict[str, Any] = context(one.work)
-    said["shapes"] = definitions(pattern_regions(one.work.laminate))
+def _chapter(design: DesignWork, number: int, mark: str) -> str:
+    """Return the chapter on one design, with ids that no other chapter has."""
+    page: dict[str, Any] = context(design.work)
+    page["shapes"] = definitions(pattern_regions(design.work.laminate))
     # The sheet goes round its tube when the assembly is put together.
-    said["wrapping"] = []
+    page["wrapping"] = []
     html = (
         environment()
         .get_template(CHAPTER)
         .render(
-            **said | _again(one, number),
-            runs=one.runs,
-            press_words=_press_words(one),
+            **page | _again(design, number),
+            runs=design.runs,
+            press_words=_press_words(design),
             number=number,
             mark=mark,
         )
@@ -144,105 +142,113 @@ def _chapter(one: DesignWork, number: int, mark: str) -> str:
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _again(one: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
-    """What the first chapter has said of the build-up, in short in those that follow."""
-    return {} if number == 1 else {"force_notes": base_plate.build_up_again(one.work)}
+def _again(design: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
+    """Return the build-up in short, as the first chapter has given it in full."""
+    return {} if number == 1 else {"force_notes": base_plate.build_up_again(design.work)}
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
-    """Name, what it is, where it goes, and its colour in the picture, of each part."""
+    """Return name, kind, place and colour in the picture of each part."""
     rows = []
     paints = colours(job.assembled)
     for placed in job.assembled.parts:
-        what = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
+        kind = placed.part.kind if placed.made is None else f"SBA {placed.made.design.name}"
         on = placed.part.on
-        where = "everything else is fixed on it" if on is None else f"{on}, {placed.part.at}"
-        rows.append((placed.name, what, where, f"#{bytes(paints[placed.name]).hex()}"))
+        where = "first part" if on is None else f"{on}, {placed.part.at}"
+        rows.append((placed.name, kind, where, f"#{bytes(paints[placed.name]).hex()}"))
     return rows
 
 
 def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
-    found: list[tuple[str, str]] = []
+    warnings: list[tuple[str, str]] = []
     if job.waived:
-        said = " / ".join(finding.message for finding in job.findings if finding.by_user)
-        words = (
-            f"made although the assembly waives {', '.join(job.waived)}. What they found: {said}"
-        )
-        found.append(("Waived checks", words))
+        messages = " / ".join(finding.message for finding in job.findings if finding.by_user)
+        words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {messages}"
+        warnings.append(("Waived checks", words))
     if job.lowered:
-        found.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
-    for one in job.works:
-        for title, text in cautions(one.work):
+        warnings.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
+    for design in job.works:
+        for title, text in cautions(design.work):
             is_own = title.startswith(("Press", "Waived", "Lowered"))
-            found.append((f"{title} ({one.name})" if is_own else title, text))
+            warnings.append((f"{title} ({design.name})" if is_own else title, text))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
-        words = "small and brittle, they snap together; keep them from what a magnet harms."
-        found.append(("Magnets", words))
-    every = [*job.findings, *(finding for one in job.works for finding in one.work.job.findings)]
-    return list(dict.fromkeys([*found, *for_the_designer(every)]))
+        words = (
+            "small and brittle; they snap together. Keep them away from anything that a magnet "
+            "harms."
+        )
+        warnings.append(("Magnets", words))
+    every = [
+        *job.findings,
+        *(finding for design in job.works for finding in design.work.job.findings),
+    ]
+    return list(dict.fromkeys([*warnings, *for_the_designer(every)]))
 
 
 def _bill(job: AssemblyJob) -> list[bill.Item]:
-    """Films of all designs together, what each design needs beside them, what is bought."""
+    """Return films of all designs together, each design's other items, and what is bought."""
     items = _films(job)
-    for one in job.works:
-        items += [_named(item, one) for item in bill.bill(one.work) if not _is_elsewhere(item)]
+    for design in job.works:
+        items += [
+            _named(item, design) for item in bill.bill(design.work) if not _is_elsewhere(item)
+        ]
     items += bought(job.assembled, job.copies)
     return list(dict.fromkeys(items))
 
 
 def _is_elsewhere(item: bill.Item) -> bool:
-    """Films are summed over the designs, and the tube to wrap is a part of the assembly."""
+    """Return True for films, which are summed over the designs, and for the tube to wrap, a part
+    here.
+    """
     name, _, rest = item.name.partition(" ")
     is_film = name.isupper() and rest == "film"
     return is_film or item.name in ("Tube to wrap", "Adhesive of the wrap")
 
 
-def _named(item: bill.Item, one: DesignWork) -> bill.Item:
-    """A design's item with its name."""
-    if item.name == "Release film":
-        return item
-    return bill.Item(f"{item.name} ({one.name})", item.what, item.quantity)
+def _named(item: bill.Item, design: DesignWork) -> bill.Item:
+    """Return a design's item under its name."""
+    return bill.Item(f"{item.name} ({design.name})", item.what, item.quantity)
 
 
 def _films(job: AssemblyJob) -> list[bill.Item]:
     areas: dict[Film, float] = {}
-    for one in job.works:
-        for layer in one.work.laminate.layers:
-            area = layer.profile.area * one.work.job.copies / 100
+    for design in job.works:
+        for layer in design.work.laminate.layers:
+            area = layer.profile.area * design.work.job.copies / 100
             areas[layer.film] = areas.get(layer.film, 0.0) + area
     items = []
     for film, area in areas.items():
         sheets = [sheet for sheet in job.sheets if sheet.material == film.material]
         sizes: dict[str, int] = {}
         for sheet in sheets:
-            size = say.size(sheet.width, sheet.length)
+            size = units.size(sheet.width, sheet.length)
             sizes[size] = sizes.get(size, 0) + 1
-        needed = ", ".join(f"{say.count(n, 'sheet')} {size}" for size, n in sizes.items())
-        what = f"{film.product}, {say.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
-        items.append(bill.Item(f"{film.material} film", what, needed))
+        needed = ", ".join(f"{units.count(n, 'sheet')} {size}" for size, n in sizes.items())
+        product = (
+            f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of parts"
+        )
+        items.append(bill.Item(f"{film.material} film", product, needed))
     return items
 
 
 def _press_words(one: DesignWork) -> str:
-    """How often the press closes on a design, and why that is enough."""
+    """Return the laminations of a design, and why they are enough."""
     runs, minutes = one.runs, one.work.schedule.total_press_minutes
     design = one.work.design
-    copies = say.count(runs.copies, "copy", "copies")
+    copies = units.count(runs.copies, "copy", "copies")
     words = f"{design.name}, {copies}: "
     if runs.together > 1:
         width, length = design.press.platen_width, design.press.platen_length
         at_once = "all at once" if runs.count == 1 else f"{runs.together} at a time"
         words += (
-            f"{say.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "
-            f"{say.size(width, length)}: copies are alike layer by layer, so they share the "
+            f"{units.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "
+            f"{units.size(width, length)}: copies are alike layer by layer, so they share the "
             f"pressure evenly (ours: the paper does not say how many it pressed at once). "
-            f"{say.plain(say.product(runs.count, minutes))} min in the press instead of "
-            f"{say.plain(say.product(runs.copies, minutes))}"
+            f"{units.plain(units.product(runs.count, minutes))} min in the press instead of "
+            f"{units.plain(units.product(runs.copies, minutes))}"
         )
     else:
-        pressed = say.plain(say.product(runs.count, minutes))
-        words += f"{say.count(runs.count, 'lamination')}, {pressed} min in the press"
+        pressed = units.plain(units.product(runs.count, minutes))
+        words += f"{units.count(runs.count, 'lamination')}, {pressed} min in the press"
     if design.form.wrap is not None and design.form.stacks > 1:
         words += f". Its {design.form.stacks} SBAs lie on one sheet and are laminated at once"
         words += ", as in the paper"
@@ -250,80 +256,82 @@ def _press_words(one: DesignWork) -> str:
 
 
 def _marks(job: AssemblyJob) -> dict[str, str]:
-    """A letter for each of several designs, so that labels stay short."""
-    names = [one.name for one in job.works]
+    """Return a letter for each of several designs, so that labels stay short."""
+    names = [design.name for design in job.works]
     return {name: ascii_uppercase[i % 26] if names[1:] else "" for i, name in enumerate(names)}
 
 
 def _not_together(job: AssemblyJob) -> str:
-    """Why unlike designs do not share the press; empty where there is only one."""
+    """Return why unlike designs do not share the press; empty where there is only one."""
     if len(job.works) < 2:
         return ""
-    sizes = [f"{one.name} {say.millimetres(one.work.laminate.thickness)}" for one in job.works]
+    sizes = [
+        f"{design.name} {units.millimetres(design.work.laminate.thickness)}" for design in job.works
+    ]
     return (
-        f"Not pressed together: {listed([one.name for one in job.works])}. Their stacks differ "
-        f"in height ({listed(sizes)}) and steps; the paper presses only like patterns at once, "
-        "and glues these parts to each other."
+        f"Not pressed together: {listed([design.name for design in job.works])}. Their stacks "
+        f"differ in height ({listed(sizes)}) and steps; the paper presses only like patterns at "
+        "once, and glues these parts to each other."
     )
 
 
-def _times(job: AssemblyJob) -> list[times.Time]:
-    rows: list[times.Time] = []
+def _times(job: AssemblyJob) -> list[bill.Time]:
+    rows: list[bill.Time] = []
     total: float | None = 0.0
-    for one in job.works:
-        plan, runs = one.work.schedule, one.runs
-        pressed = say.product(runs.count, plan.total_press_minutes)
+    for design in job.works:
+        plan, runs = design.work.schedule, design.runs
+        pressed = units.product(runs.count, plan.total_press_minutes)
         handled = runs.copies * plan.hands_minutes
         whole = None if pressed is None else pressed + handled
         total = None if total is None or whole is None else total + whole
         made_of = (
-            f"{say.count(runs.count, 'lamination')} of {say.plain(plan.total_press_minutes)} min; "
-            f"{handled:g} min to cut, lay up, pin and fit tubes"
+            f"{units.count(runs.count, 'lamination')} of {units.plain(plan.total_press_minutes)} "
+            f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
-        rows.append(times.Time(f"Making {one.name}", say.minutes(whole), made_of))
-    laser = say.minutes(times.laser_minutes(job.works[0].work))
-    basis = times.laser_basis(job.works[0].work)
-    rows.append(times.Time("Laser (within making)", laser, f"{basis}; all sheets"))
+        rows.append(bill.Time(f"Making {design.name}", units.minutes(whole), made_of))
+    laser = units.minutes(bill.laser_minutes(job.works[0].work))
+    basis = bill.laser_basis(job.works[0].work)
+    rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
     rows.append(
-        times.Time(
+        bill.Time(
             "Total, without joining",
-            say.whole_minutes(total),
-            "without heating the press up, leak tests, gluing and curing, of which the paper gives "
-            "no times",
+            units.whole_minutes(total),
+            "not included: heating the press, warming the plate, leak and proof tests, gluing and "
+            "curing, for which the paper gives no times",
         )
     )
     return rows
 
 
-# What the technician does to put an assembly together, part by part, each with a box to tick.
+# Joining, part by part.
 
 
 @dataclass(frozen=True)
 class JoinPage:
-    """One part's step."""
+    """The joining step of one part."""
 
     title: str
     actions: tuple[Action, ...]
 
 
 def join_pages(assembled: Assembled) -> list[JoinPage]:
-    """A step for each part: make it ready, then fix it."""
+    """Return a step for each part: make it ready, then fix it."""
     pages = []
     for placed in _in_order(assembled):
-        other = assembled.on(placed)
-        what = _what(placed)
-        title = placed.name if what == placed.name else f"{placed.name} ({what})"
+        carrier = assembled.on(placed)
+        kind = _kind(placed)
+        title = placed.name if kind == placed.name else f"{placed.name} ({kind})"
         lines = [line.name for line in _lines_through(assembled, placed)]
-        early = bool(lines) and other is not None
+        early = bool(lines) and carrier is not None
         actions = list(_ready(placed))
         if early:
             actions = [Action(f"Take {placed.name} with {listed(lines)} in it.")]
-        if other is not None:
-            title += f", {_where(placed)} of {other.name}"
-            if early and isinstance(other.part, Tube):
-                actions.append(Action(f"Lead {listed(lines)} through {other.name}."))
-            actions += _fix(placed, other)
-        actions += _supply(placed, other, assembled)
+        if carrier is not None:
+            title += f", {_where(placed)} of {carrier.name}"
+            if early and isinstance(carrier.part, Tube):
+                actions.append(Action(f"Lead {listed(lines)} through {carrier.name}."))
+            actions += _fix(placed, carrier)
+        actions += _supply(placed, carrier, assembled)
         if placed.part.note:
             actions.append(Action(placed.part.note))
         if actions:
@@ -332,14 +340,14 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
-    """Building order, but a line goes through a lumen while both its ends can still be reached."""
+    """Yield parts in building order; a line goes in while both ends of its lumen are in reach."""
     parts = assembled.parts
     for placed in parts:
         if placed.made is not None and placed.part.on is not None:
             yield from _lines_through(assembled, placed)
-        other = assembled.on(placed)
-        early = placed.part.at == "lumen" and other is not None and other.made is not None
-        if not (early and other is not None and other.part.on is not None):
+        carrier = assembled.on(placed)
+        early = placed.part.at == "lumen" and carrier is not None and carrier.made is not None
+        if not (early and carrier is not None and carrier.part.on is not None):
             yield placed
 
 
@@ -349,7 +357,7 @@ def _lines_through(assembled: Assembled, placed: PlacedPart) -> list[PlacedPart]
     ]
 
 
-def _what(placed: PlacedPart) -> str:
+def _kind(placed: PlacedPart) -> str:
     if placed.made is not None:
         return placed.made.design.name
     names = {"line": "vacuum or fluid line", "cup": "suction cup"}
@@ -366,66 +374,68 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     part = placed.part
     if isinstance(part, Tube):
         yield Action(
-            f"Cut {say.millimetres(part.length)} of {part.material} tube, outer diameter "
-            f"{say.millimetres(part.outer_diameter)}, inner "
-            f"{say.millimetres(part.inner_diameter)}, square. Mark its start, and a straight line "
-            "along it: that is angle 0."
+            f"Cut {units.millimetres(part.length)} of {part.material} tube, outer diameter "
+            f"{units.millimetres(part.outer_diameter)}, inner "
+            f"{units.millimetres(part.inner_diameter)}, square. Mark its start, and a straight "
+            "line along it: that is angle 0."
         )
     elif isinstance(part, Base):
         yield Action(
-            f"Have a {part.kind} of {part.material} ready, {say.size(part.width, part.length)}, "
-            f"{say.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
-            f"along the {say.millimetres(part.width)}, the same way."
+            f"Have a {part.kind} of {part.material} ready, {units.size(part.width, part.length)}, "
+            f"{units.millimetres(part.thickness)} thick. Mark its top, and on both faces an arrow "
+            f"along the {units.millimetres(part.width)}, the same way."
         )
     elif isinstance(part, Magnet):
         yield Action(
-            f"Measure {part.part}: {say.millimetres(part.diameter)} across, "
-            f"{say.millimetres(part.thickness)} thick. If it differs, change the file and check."
+            f"Measure {part.part}: {units.millimetres(part.diameter)} across, "
+            f"{units.millimetres(part.thickness)} thick. If it differs, change the assembly's file "
+            "and generate again."
         )
         yield Action(
-            "Hold it to the magnet that will hold it through the wall, and mark the face that is "
-            "drawn to it: that face goes outward."
+            "Bring it near the outer magnet, which will hold it through the wall, and mark the "
+            "face that is attracted: that face goes outward."
         )
     elif isinstance(part, Cup):
         yield Action(
             f"Cast the cup in {part.material} as its package says: rim "
-            f"{say.millimetres(part.diameter)}, neck {say.millimetres(part.neck)}, height "
-            f"{say.millimetres(part.height)}, wall {say.millimetres(part.wall)}, hole for the line "
-            f"{say.millimetres(part.bore)}."
+            f"{units.millimetres(part.diameter)}, neck {units.millimetres(part.neck)}, height "
+            f"{units.millimetres(part.height)}, wall {units.millimetres(part.wall)}, hole for the "
+            f"line {units.millimetres(part.bore)}."
         )
     elif isinstance(part, Line):
         yield Action(
-            f"Cut {part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, square and "
-            f"without burr; {say.millimetres(part.length)} are drawn, your rig may need more."
+            f"Cut {part.tubing}, outer diameter {units.millimetres(part.outer_diameter)}, square "
+            f"and without burr; the design has {units.millimetres(part.length)}, your rig may need "
+            "more."
         )
     else:
         yield Action(
-            f"Take a {_what(placed)} that has passed its leak test; its inlet tubes stay open."
+            f"Take a {_kind(placed)} that has passed its tests; its inlet tubes stay open."
         )
 
 
-def _fix(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+def _fix(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
     part = placed.part
     if isinstance(part, Line):
-        yield from _thread(placed, part, other)
+        yield from _thread(placed, part, carrier)
     elif isinstance(placed, PlacedSba) and placed.radius is not None:
-        yield from _bend(placed, other)
+        yield from _bend(placed, carrier)
     else:
         yield Action(
-            f"Lay it {_where(placed)} of {other.name}: {_spot(placed, other)}. Try it dry."
+            f"Lay it {_where(placed)} of {carrier.name}: {_spot(placed, carrier)}. Try it dry."
         )
-    yield from _glue(placed, other)
+    yield from _glue(placed, carrier)
 
 
-def _spot(placed: PlacedPart, other: PlacedPart) -> str:
-    """Where the middle of a part lies, and which way the part is turned."""
+def _spot(placed: PlacedPart, carrier: PlacedPart) -> str:
+    """Return the place of a part's middle and the way the part is turned."""
     part = placed.part
     x, y = part.offset
     if part.at == "outside":
-        spot = f"{_round(part.angle)}, {say.millimetres(part.along)} from the tube's start"
+        spot = f"{_round(part.angle)}, {units.millimetres(part.along)} from the tube's start"
         return spot if not part.turn else f"{spot}, turned {part.turn:g} degrees anti-clockwise"
     has_mark = isinstance(part, Sba | Tube | Base)
-    words = [f"looking at that face, with {_mark(other)} to the right"]
+    words = [f"looking at that face, with {_mark(carrier)} to the right"]
     if not (x or y or has_mark):
         return "axis on axis"
     if x or y:
@@ -436,40 +446,40 @@ def _spot(placed: PlacedPart, other: PlacedPart) -> str:
     else:
         words.append("axis on axis")
     if has_mark:
-        words.append(_heading(placed, other))
+        words.append(_heading(placed, carrier))
     return ", ".join(words)
 
 
 def _is_below(placed: PlacedPart) -> bool:
-    """Whether a part is fixed on a lower face, upside down."""
+    """Return True if a part is fixed on a lower face, upside down."""
     return placed.part.at in ("bottom", "start")
 
 
 def _aside(value: float, plus: str, minus: str) -> str:
-    return f"{say.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
+    return f"{units.millimetres(abs(value))} {plus if value > 0 else minus}" if value else ""
 
 
 def _mark(placed: PlacedPart) -> str:
-    """What shows a part's direction x."""
+    """Return the mark that shows a part's direction x."""
     if placed.made is not None:
         return f"the tab of {placed.made.laminate.inlets[0].chamber}"
     marks = {"tube": "the marked line", "base": "the arrow", "sheet": "the arrow"}
     return marks.get(placed.part.kind, "any side")
 
 
-def _heading(placed: PlacedPart, other: PlacedPart) -> str:
-    """Which face of a part is glued, and which way its mark points: an SBA bends by its tabs."""
+def _heading(placed: PlacedPart, carrier: PlacedPart) -> str:
+    """Return the glued face of a part and the way its mark points: an SBA bends by its tabs."""
     face = {"sba": "base", "tube": "start"}.get(placed.part.kind, "underside")
     # On a lower face the part lies upside down, and is looked at from below.
     turn = _angle(placed) + placed.turn
-    turn += _angle(other) - 180 if _is_below(placed) else -_angle(other)
+    turn += _angle(carrier) - 180 if _is_below(placed) else -_angle(carrier)
     turn = round(turn, 6) % 360
-    way = f"over {_mark(other)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
+    way = f"over {_mark(carrier)}" if turn == 0 else f"{turn:g} degrees anti-clockwise from there"
     return f"its {face} glued, {_mark(placed)} {way}"
 
 
 def _angle(placed: PlacedPart) -> float:
-    """Degrees from a part's x to its mark."""
+    """Return the degrees from a part's x to its mark."""
     if placed.made is None:
         return 0.0
     x, y = placed.made.laminate.inlets[0].direction
@@ -483,30 +493,33 @@ def _round(angle: float) -> str:
     return f"{abs(angle):g} degrees {way} from the marked line, looking at the tube's end"
 
 
-def _bend(placed: PlacedSba, other: PlacedPart) -> Iterator[Action]:
+def _bend(placed: PlacedSba, carrier: PlacedPart) -> Iterator[Action]:
     part = placed.part
     form = placed.made.design.form
-    middle = say.millimetres(part.along)
+    middle = units.millimetres(part.along)
     if form.wrap is None:
         yield Action(
-            f"Bend it round {other.name}, base inward: its lumen {_round(part.angle)}, {middle} "
+            f"Bend it round {carrier.name}, base inward: its lumen {_round(part.angle)}, {middle} "
             f"from the tube's start; {_tab(placed)}. Try it dry."
         )
         return
     end = "start" if part.turn % 360 == 180 else "end"
     yield Action(
-        f"Wrap the sheet round {other.name}, balloons outward, its straight edges along the tube: "
-        f"the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the middle "
-        f"SBA {_round(part.angle)}. Try it dry."
+        f"Wrap the sheet round {carrier.name}, balloons outward, its straight edges along the "
+        f"tube: the middle of the SBAs {middle} from the tube's start, tabs toward its {end}, the "
+        f"middle SBA {_round(part.angle)}. Try it dry."
     )
     yield Action(
         f"Check: the edges of the sheet meet, and the {form.stacks} SBAs lie {360 / form.stacks:g} "
-        f"degrees apart ({say.millimetres(form.wrap.pitch)} round the tube, measured on the sheet)."
+        f"degrees apart ({units.millimetres(form.wrap.pitch)} round the tube, measured on the "
+        "sheet)."
     )
 
 
 def _tab(placed: PlacedPart) -> str:
-    """Where chamber1's tab points: at no turn round the tube, then on toward the tube's end."""
+    """Return the direction of chamber1's tab: at no turn round the tube, then on toward the tube's
+    end.
+    """
     turn = placed.part.turn % 360
     plain = {
         0: "round the tube, anti-clockwise as you look at its end",
@@ -522,26 +535,30 @@ def _tab(placed: PlacedPart) -> str:
     )
 
 
-def _thread(placed: PlacedPart, line: Line, other: PlacedPart) -> Iterator[Action]:
+def _thread(placed: PlacedPart, line: Line, carrier: PlacedPart) -> Iterator[Action]:
     if line.at == "inlet":
         yield Action(
-            f"Push it into the inlet of {line.chamber} of {other.name}, beside the PTFE strip, in "
-            "place of a tube fitted earlier."
+            f"Push it into the inlet of {line.chamber} of {carrier.name}, beside the PTFE strip, "
+            "in place of a tube fitted earlier."
         )
         return
-    if other.part.on is not None and other.made is not None:
-        yield Action(f"Take {other.name}, not fixed yet: a {_what(other)} without leaks.")
-    past = line.along + line.length - other.height
-    face = "top" if other.made is not None else "end"
-    side = f"{say.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
-    yield Action(f"Thread it through the lumen of {other.name} until it ends {side}.")
+    if carrier.part.on is not None and carrier.made is not None:
+        yield Action(
+            f"Take {carrier.name}, not yet fixed: a {_kind(carrier)} that has passed its tests."
+        )
+    past = line.along + line.length - carrier.height
+    face = "top" if carrier.made is not None else "end"
+    side = f"{units.millimetres(abs(past))} {'past' if past >= 0 else 'short of'} its {face}"
+    yield Action(f"Thread it through the lumen of {carrier.name} until it ends {side}.")
 
 
-def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
+def _glue(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
     glue = _adhesive(placed)
     if glue is None:
         if placed.part.at == "outside" or not isinstance(placed.part, Line):
-            yield Action("No adhesive is named for this joint: say how it holds, or it is loose.")
+            yield Action(
+                "No adhesive is named for this joint: write here how it is fixed, ________."
+            )
         return
     how = (
         "a small drop"
@@ -556,29 +573,31 @@ def _glue(placed: PlacedPart, other: PlacedPart) -> Iterator[Action]:
 
 
 def _adhesive(placed: PlacedPart) -> str | None:
-    """The part's own; a sheet that is wrapped round its tube has its design's else."""
+    """Return the adhesive of a part; a sheet wrapped round its tube falls back on its design's."""
     wrap = None if placed.made is None else placed.made.design.form.wrap
     return placed.part.glue or (wrap.glue if wrap is not None else None)
 
 
-def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) -> Iterator[Action]:
-    """Where an actuator's tubes run, and how its tabs are folded."""
+def _supply(
+    placed: PlacedPart, carrier: PlacedPart | None, assembled: Assembled
+) -> Iterator[Action]:
+    """Yield the run of an actuator's tubes and the folding of its tabs."""
     if placed.made is None or not placed.made.laminate.inlets:
         return
     tie = "tie them there with a turn of thread, loose enough for tubes to slide"
-    own = runs(placed, assembled)
-    if other is not None and own:
+    tube_runs = runs(placed, assembled)
+    if carrier is not None and tube_runs:
         away = "start" if placed.part.at == "end" else "end"
-        over = listed(list(dict.fromkeys(name for run in own for name in run.over)))
+        over = listed(list(dict.fromkeys(name for run in tube_runs for name in run.over)))
         past = f"; where one crosses {over}, leave it slack" if over else ""
-        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in own])
+        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in tube_runs])
         yield Action(
             f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
-            f"along the outside of {other.name} toward its {away}: {places} degrees{past}; {tie}."
+            f"along the outside of {carrier.name} toward its {away}: {places} degrees{past}; {tie}."
         )
-    elif other is not None and placed.radius is not None:
+    elif carrier is not None and placed.radius is not None:
         yield Action(
-            f"Lead its tubes along {other.name}, the way the tabs point, off all balloons; {tie}."
+            f"Lead its tubes along {carrier.name}, the way the tabs point, off all balloons; {tie}."
         )
     else:
         yield Action(
@@ -587,43 +606,44 @@ def _supply(placed: PlacedPart, other: PlacedPart | None, assembled: Assembled) 
         )
 
 
-def _leak_pressures(made: Sequence[PlacedSba]) -> str:
-    """The leak tests' pressures, one number where the designs agree."""
-    pressures = {one.made.design.acceptance.leak_pressure_kpa for one in made}
+def _leak_pressures(actuators: Sequence[PlacedSba]) -> str:
+    """Return the leak tests' pressures, one number where the designs agree."""
+    pressures = {actuator.made.design.acceptance.leak_pressure_kpa for actuator in actuators}
     return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
 
 
 def final_checks(assembled: Assembled) -> list[Action]:
-    """What the finished assembly must do; figures are predictions."""
-    made = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
+    """Return the tests of the finished assembly; figures are predictions."""
+    actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     deploy = assembled.assembly.deploy
     actions = [
         Action(
-            f"Raise each actuator to {_leak_pressures(made)} kPa again: no leak, no joint opens.",
+            f"Raise each actuator to {_leak_pressures(actuators)} kPa again: no leak, no joint "
+            "opens.",
             (),
-            tuple(placed.name for placed in made) if len(made) > 1 else (),
+            tuple(placed.name for placed in actuators) if len(actuators) > 1 else (),
         )
     ]
     if any(isinstance(placed.part, Line) for placed in assembled.parts):
         actions.append(Action("Draw air through every line: it is open from end to end."))
     if any(isinstance(placed.part, Cup) for placed in assembled.parts):
-        actions.append(Action("Press the cup on glass and draw vacuum: it holds on."))
+        actions.append(Action("Press the cup on glass and draw vacuum: the cup holds."))
     if deploy.aperture_diameter is not None:
-        hole = say.millimetres(deploy.aperture_diameter)
+        hole = units.millimetres(deploy.aperture_diameter)
         actions.append(Action(f"Deflated and folded, it goes through a hole of {hole}."))
     if deploy.lumen_diameter is not None:
-        lumen = say.millimetres(deploy.lumen_diameter)
+        lumen = units.millimetres(deploy.lumen_diameter)
         actions.append(Action(f"Deflated, it slides through a tube of inner diameter {lumen}."))
         actions += [
             Action(
                 f"Inflated in the open until its films are taut, {placed.name} measures about "
                 f"{across}; in the tube of {lumen} it holds against a pull."
             )
-            for placed in made
+            for placed in actuators
             if (across := _across(placed)) is not None
         ]
     if any(isinstance(placed.part, Magnet) for placed in assembled.parts):
-        actions.append(Action("The outer magnet draws and holds the base through the wall."))
+        actions.append(Action("The outer magnet attracts and holds the base through the wall."))
     return actions
 
 
@@ -636,7 +656,7 @@ def _across(placed: PlacedSba) -> str | None:
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:
-    """Rows of the bill of materials for what is not cut from film."""
+    """Return rows of the bill of materials for what is not cut from film."""
     items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
     glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:
@@ -649,22 +669,22 @@ def _item(placed: PlacedPart, copies: int) -> Item:
     part, name = placed.part, f"{placed.part.kind.capitalize()} “{placed.name}”"
     if isinstance(part, Tube):
         size = (
-            f"{part.material}, outer diameter {say.millimetres(part.outer_diameter)}, inner "
-            f"{say.millimetres(part.inner_diameter)}, {say.millimetres(part.length)} long"
+            f"{part.material}, outer diameter {units.millimetres(part.outer_diameter)}, inner "
+            f"{units.millimetres(part.inner_diameter)}, {units.millimetres(part.length)} long"
         )
     elif isinstance(part, Magnet):
         size = (
-            f"{part.part}, {say.millimetres(part.diameter)} across, "
-            f"{say.millimetres(part.thickness)} thick"
+            f"{part.part}, {units.millimetres(part.diameter)} across, "
+            f"{units.millimetres(part.thickness)} thick"
         )
     elif isinstance(part, Cup):
-        size = f"cast from {part.material}, rim {say.millimetres(part.diameter)}"
+        size = f"cast from {part.material}, rim {units.millimetres(part.diameter)}"
     elif isinstance(part, Line):
         size = (
-            f"{part.tubing}, outer diameter {say.millimetres(part.outer_diameter)}, "
-            f"{say.millimetres(part.length)}"
+            f"{part.tubing}, outer diameter {units.millimetres(part.outer_diameter)}, "
+            f"{units.millimetres(part.length)}"
         )
     else:
         assert isinstance(part, Base)
-        size = f"{part.material}, {say.size(part.width, part.length)}"
+        size = f"{part.material}, {units.size(part.width, part.length)}"
     return Item(name, size, str(copies))

@@ -1,19 +1,16 @@
-"""What a traveller is written from, beside the pictures that it draws itself."""
+"""The order behind a traveller, what its pages are made from, and a box to tick."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.pressure_units import KILOPASCALS
 from sbafab.design.records import Design
 from sbafab.geometry.offset import Kerf
-from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule
-from sbafab.reports.drawing import TIMES
 from sbafab.rules.finding import Finding
 
 
@@ -44,7 +41,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """All that the pages are made from."""
+    """A design with its laminate, schedule, sheets and order: all that its pages are made from."""
 
     design: Design
     laminate: Laminate
@@ -54,11 +51,8 @@ class Work:
 
     @property
     def runs(self) -> Runs:
-        """How all copies are pressed."""
+        """The press runs of all copies."""
         return design_runs(self.design, self.laminate, self.job.copies)
-
-
-# One thing to do, with its box to tick.
 
 
 @dataclass(frozen=True)
@@ -68,94 +62,3 @@ class Action:
     text: str
     layers: tuple[int, ...] = ()
     ticks: tuple[str, ...] = ()
-
-
-# Quantities in the words and units that stand on dials and rulers.
-
-
-NEWTONS_PER_POUND = 4.4482216152605
-BLANK = "________"
-"""What is written in by hand."""
-ROUND = 10.0
-"""Minutes above which tenths say nothing."""
-
-DIRECTIONS = (
-    "to the right",
-    "to the back right",
-    "to the back",
-    "to the back left",
-    "to the left",
-    "to the front left",
-    "to the front",
-    "to the front right",
-)
-
-
-def temperature(celsius: float) -> str:
-    return f"{celsius:g} °C ({celsius * 9 / 5 + 32:.0f} °F)"
-
-
-def pressure(kilopascals: float) -> str:
-    return f"{kilopascals:g} kPa ({kilopascals / KILOPASCALS['psi']:.1f} psi)"
-
-
-def force(newtons: float) -> str:
-    pounds = newtons / NEWTONS_PER_POUND
-    return f"{newtons:.0f} N = {newtons / 1000:.3f} kN = {pounds:.0f} lbf"
-
-
-def minutes(value: float | None) -> str:
-    """Minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min; a blank for None,
-    which nobody stated.
-    """
-    if value is None:
-        return f"{BLANK} min"
-    return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
-
-
-def plain(value: float | None) -> str:
-    """Return a number without its unit, a blank for None."""
-    return BLANK if value is None else f"{value:g}"
-
-
-def clock(minutes: float) -> str:
-    """Hours and minutes: 0:05, 7:45."""
-    whole = round(minutes)
-    return f"{whole // 60}:{whole % 60:02d}"
-
-
-def hours(value: float | None) -> str:
-    return f"{BLANK} h" if value is None else f"{value / 60:.2f} h"
-
-
-def whole_minutes(value: float | None) -> str:
-    """Return minutes and hours, "105 min = 1.75 h"; a blank for None."""
-    return minutes(None) if value is None else f"{value:.0f} min = {hours(value)}"
-
-
-def product(number: int, value: float | None) -> float | None:
-    """Return a value so many times, None for None."""
-    return None if value is None else number * value
-
-
-def millimetres(value: float) -> str:
-    return f"{round(value, 3) + 0.0:g} mm"
-
-
-def size(width: float, length: float) -> str:
-    return f"{round(width, 2):g} {TIMES} {round(length, 2):g} mm"
-
-
-def count(number: int, noun: str, plural: str = "") -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
-
-
-def stacks(number: int) -> str:
-    """After the definite article: the stack, the 3 stacks."""
-    return "stack" if number == 1 else f"{number} stacks"
-
-
-def toward(inlet: Inlet) -> str:
-    """Where an inlet tab points on the bench: x goes to the right, y to the back."""
-    u, v = inlet.direction
-    return DIRECTIONS[round(math.atan2(v, u) / (math.pi / 4)) % 8]

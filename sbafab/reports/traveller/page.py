@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.kits import cited, departures, tube_name
-from sbafab.design.records import Design, HoldDown
+from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
@@ -26,15 +26,14 @@ from sbafab.models.formulas import sizes
 from sbafab.pressing.schedule import Schedule, listed
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
-from sbafab.reports.traveller import base_plate, bench, bill, panel, process, times
-from sbafab.reports.traveller import job as say
+from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
 from sbafab.reports.traveller.batch import batch_page
-from sbafab.reports.traveller.bench import hold_down
+from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import kerf_states
-from sbafab.reports.traveller.job import Action, Job, Work
-from sbafab.reports.traveller.process import order_of, punch
+from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.process import order_of, wrapping
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
-from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
+from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST
 
@@ -55,13 +54,13 @@ def traveller_html(
     sheets: Sequence[SheetFile],
     job: Job,
 ) -> str:
-    """The whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
+    """Return the whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
     work = Work(design, laminate, schedule, sheets, job)
     return environment().get_template(TEMPLATE).render(context(work))
 
 
 def environment() -> Environment:
-    """The templates of this folder; what they are not given is an error."""
+    """Return the environment of this folder's templates; an undefined name is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
@@ -76,10 +75,10 @@ def environment() -> Environment:
 
 
 def context(work: Work) -> dict[str, Any]:
-    """What the templates say of one design."""
+    """Return the values that the templates print of one design."""
     laminate, job = work.laminate, work.job
     text = record_text(laminate.name, job.design_sha256, job.generator)
-    others = _others(work)
+    other_marks = _other_marks(work)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),
         "work": work,
@@ -102,11 +101,11 @@ def context(work: Work) -> dict[str, Any]:
         "bill": bill.bill(work),
         "before_the_day": before_the_day([work]),
         "tools": tools([work]),
-        "others": others,
-        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
+        "others": other_marks,
+        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **other_marks}),
         "cuts": bill.cut_list(work),
-        "laser_minutes": times.laser_minutes(work),
-        "laser_basis": times.laser_basis(work),
+        "laser_minutes": bill.laser_minutes(work),
+        "laser_basis": bill.laser_basis(work),
         "lay_up": _lay_up(work),
         "force_notes": (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work)),
         "plate_holes": base_plate.holes(work),
@@ -122,7 +121,7 @@ def context(work: Work) -> dict[str, Any]:
         "wrapping": wrapping(work),
         "leak_words": process.leak_words(work),
         "proof_words": process.proof_words(work),
-        "times": times.times(work),
+        "times": bill.times(work),
         "kerf_notes": bill.kerf_notes(work),
         "expected_sizes": bill.expected_sizes(work),
         **panel.chapter(work),
@@ -130,21 +129,25 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:
-    """What the solid's colours are, each with its colour."""
-    own = ", ".join(dict.fromkeys(film.material for film in films(laminate) if not film.is_mask))
-    said = [(own if tone == "film" else words, tone) for tone, words in KEY]
-    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in said]
+    """Return the words and the hex code of each colour of the solid."""
+    structural = ", ".join(
+        dict.fromkeys(film.material for film in films(laminate) if not film.is_mask)
+    )
+    tones = [(structural if tone == "film" else words, tone) for tone, words in KEY]
+    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in tones]
 
 
-def _others(work: Work) -> dict[str, str]:
-    """A letter for each other design that lies on the same sheets, so that labels stay short."""
+def _other_marks(work: Work) -> dict[str, str]:
+    """Return a letter for each other design that lies on the same sheets, so that labels stay
+    short.
+    """
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
 
 
 def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
-    """What every page has: its style, and what stands at the head and foot of each sheet."""
+    """Return the values that every page prints: style, head and foot."""
     short = sha256[:SHORT_HASH]
     return {
         "title": title,
@@ -152,7 +155,7 @@ def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
         "generator": generator,
         "running_head": css_string(f"{title}  {short}"),
         "style": (HERE / STYLE).read_text(encoding="utf-8"),
-        "say": say,
+        "units": units,
         "notes": bill,
     }
 
@@ -170,10 +173,10 @@ def _facts(work: Work) -> list[tuple[str, str]]:
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
     names = {
         "thickness": "Thickness, flat (nominal films)",
-        "width": f"Width of all that is cut, with {extras}",
-        "length": f"Length of all that is cut, with {extras}",
-        "outline_diameter": f"Films without {extras} fit a circle round the axis of",
-        "overall_diameter": f"All that is cut, with {extras}, fits one of",
+        "width": f"Overall width, with {extras}",
+        "length": f"Overall length, with {extras}",
+        "outline_diameter": f"Diameter round the axis, without {extras}",
+        "overall_diameter": f"Diameter round the axis, with {extras}",
         "pitch": "Pitch round the tube",
         "deflated_diameter": "Diameter on its tube, deflated",
         "reached_diameter": "Diameter on its tube, inflated (computed)",
@@ -185,7 +188,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
         ("Chambers", str(len(laminate.chambers))),
         ("Layers", f"{len(laminate.layers)} of {len(laminate.patterns)} patterns"),
         *(
-            (names.get(name, name.replace("_", " ")), say.millimetres(value))
+            (names.get(name, name.replace("_", " ")), units.millimetres(value))
             for name, value in sizes(work.design, laminate).items()
         ),
         ("Inlets", str(len(laminate.inlets))),
@@ -195,7 +198,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A sheet as it stands in the cut list; ``said`` tells how a long one is drawn."""
+    """A sheet as it stands in the cut list; ``note`` tells how a long one is drawn."""
 
     sheet: SheetFile
     picture: str
@@ -208,7 +211,7 @@ class SheetRow:
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
 ) -> list[SheetRow]:
-    """The film sheets of a design; patterns go with the mark or the name of theirs."""
+    """Return the film sheets of a design; patterns go with the mark or the name of theirs."""
     films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
@@ -221,9 +224,9 @@ def sheet_rows(
                 sheet,
                 sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
-                say.size(sheet.width, sheet.length),
-                say.minutes(sheet.minutes),
-                rows_said(sheet),
+                units.size(sheet.width, sheet.length),
+                units.minutes(sheet.minutes),
+                picture_note(sheet),
             )
         )
     return rows
@@ -242,15 +245,15 @@ class LayUpRow:
 
 
 def _lay_up(work: Work) -> list[LayUpRow]:
-    """The layers bottom to top, rounds named once."""
-    held = {
+    """Return the layers bottom to top, rounds once."""
+    pins_of = {
         index: listed([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
-    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(held, turn)]
+    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(pins_of, turn)]
 
 
-def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
+def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
     rows = []
     for place, layers in enumerate(turn.places):
         repeat = "once"
@@ -263,7 +266,7 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
                 layer_numbers([layer.index for layer in layers]),
                 layers[0],
                 len(layers[0].profile.pieces),
-                "; ".join(dict.fromkeys(held[layer.index] for layer in layers)),
+                "; ".join(dict.fromkeys(pins_of[layer.index] for layer in layers)),
                 repeat,
                 len(turn.places) if place == 0 else 0,
             )
@@ -272,18 +275,18 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
 
 
 def css_string(words: str) -> str:
-    """Words as a CSS string that can neither end early nor leave the style element."""
+    """Return words as a CSS string that can neither end early nor leave the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
-# Templates compiled once, not in every run: kept beside them, as Python keeps its modules.
+# Compiled templates, cached beside them as Python caches its modules.
 
 
 def compiled_beside(folder: Path) -> BytecodeCache:
-    """What reads them in ``__pycache__``, and writes them there where Python may write.
+    """Return the cache of compiled templates in ``__pycache__``, filled where Python may write.
 
-    Each is kept with its source's checksum and is made anew when that changed. Where the folder
-    cannot be read or written, nothing is kept.
+    Each template is kept with its source's checksum and compiled again when that changes. Where the
+    folder cannot be read or written, nothing is kept.
     """
     from jinja2 import FileSystemBytecodeCache
     from jinja2.bccache import Bucket
@@ -304,7 +307,7 @@ def compiled_beside(folder: Path) -> BytecodeCache:
     return Compiled(str(place), f"%s.{sys.implementation.cache_tag}.jinja")
 
 
-# The code that a phone reads: which design this sheet of paper belongs to.
+# The QR code: which design this sheet of paper belongs to.
 
 
 QUIET = 4
@@ -312,40 +315,44 @@ QUIET = 4
 
 
 def code_text(name: str, design_sha256: str, generator: str) -> str:
-    """What the code says, a line each; plain text, for there is nothing to look up anywhere."""
+    """Return the code's plain text, a line each: name, checksum, generator; it links to nothing."""
     return f"{name}\nsha256 {design_sha256}\n{generator}"
 
 
 def record_text(name: str, design_sha256: str, generator: str) -> str:
-    """The same for a design that is built, and the command that shows what came out of it."""
-    told = code_text(name, design_sha256, generator)
-    return f"{told}\nsbafab record --find {design_sha256[:12]}"
+    """Return the code's text for a design that is built, with the command that finds its build
+    records.
+    """
+    text = code_text(name, design_sha256, generator)
+    return f"{text}\nsbafab record --find {design_sha256[:12]}"
 
 
 def code_svg(text: str) -> str:
-    """The text as a QR code, inline SVG without a size of its own."""
+    """Return the text as a QR code, inline SVG without a size of its own."""
     import segno
 
     code = segno.make(text, error="m", micro=False)
     return code.svg_inline(border=QUIET, omitsize=True, light="white", svgclass="code")
 
 
-# What the technician must know before starting; the rules' findings have their own page.
+# Warnings; the rules' findings have their own page.
 
 
 def cautions(work: Work) -> list[tuple[str, str]]:
-    """Every warning once: a short title and what it says."""
+    """Return every warning once: a short title and its text."""
     return list(dict.fromkeys(_all(work)))
 
 
 def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
-    """Where the rules' warnings stand: nobody at the press can mend them; empty without any."""
+    """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
+    any.
+    """
     rules = {finding.rule for finding in findings if finding.verdict == "warn"}
     if not rules:
         return []
     words = (
-        f"{say.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. findings.html "
-        "says of what, and what helps; at the press do as the steps say."
+        f"{units.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. "
+        "findings.html gives places and remedies; at the press follow the steps."
     )
     return [("For the designer", words)]
 
@@ -361,14 +368,14 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     if job.waived:
         yield (
             "Waived rules",
-            f"made although the design waives {', '.join(job.waived)}. What they found: "
+            f"made although the design waives {', '.join(job.waived)}. Findings: "
             + " / ".join(f.message for f in job.findings if f.by_user),
         )
     if job.lowered:
         yield (
             "Lowered limits",
-            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. What holds here may fail the usual "
-            "limits: make sure that this is meant.",
+            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. A pass here may be a failure at the usual "
+            "limits: ask the designer whether this is intended.",
         )
     nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
     if nominal:
@@ -391,178 +398,5 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
 
 
 def _is_in_step(warning: str) -> bool:
-    """Whether the press step itself says it where the layer is laid."""
+    """Return True if the press step itself gives the warning where the layer is laid."""
     return warning.endswith("align by hand")
-
-
-# Before the day: what must be ready, and the tools. The paper gives times of the press alone.
-
-
-UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
-LOUPE = "10x with a scale of 0.1 mm"
-"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
-
-
-class Tool(NamedTuple):
-    """A row of the list of tools."""
-
-    name: str
-    use: str
-
-
-HOLDERS: Mapping[HoldDown, Tool] = {
-    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
-    "carrier": Tool(
-        "Carrier sheet of low tack, silicone adhesive",
-        "holds masks and their parts under the beam: one as large as each sheet",
-    ),
-    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
-}
-
-
-def before_the_day(works: Sequence[Work]) -> list[Action]:
-    """What must be at hand, cut, dry and measured before the press is switched on."""
-    return [Action(text) for text in _before(works)]
-
-
-def _before(works: Sequence[Work]) -> Iterator[str]:
-    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
-    materials = list(dict.fromkeys(film.material for film in films))
-    unknown = [name for name, _, known in kerf_states(works[0].job, materials) if not known]
-    if unknown:
-        yield (
-            f"Kerf of {listed(unknown)} measured and the files generated again; or it is accepted "
-            "that edges are nominal (warning above)."
-        )
-    if any(film.warning for film in films):
-        yield "Leave to cut these films, from the laser's owner; exhaust tried (warning above)."
-    if any(work.laminate.pins for work in works):
-        yield (
-            "Base plate made and measured (table under Cut): place and depth of each hole; every "
-            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
-            "from below. Where none does, lap the hole. The corner that is cut off is marked."
-        )
-    release = sum(2 * len(work.schedule.steps) for work in works)
-    yield f"Cut to the size above: {release} release films and the press pad."
-    if any(work.job.underlay is not None for work in works):
-        prints = sum(base_plate.hot_prints(work) for work in works if work.job.underlay)
-        yield (
-            f"Underlay printed at 100 %, {say.count(prints, 'time', 'times')}, the bars of each "
-            "print measured, each cut out along its dotted line."
-        )
-    yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
-    first = works[0].schedule.steps[0]
-    hot = say.temperature(first.temperature_c)
-    yield (
-        f"Pressure of {first.pressure_kpa:g} kPa found once, cold, with {bench.film_words(works)} "
-        f"in the whole build-up, at {say.force(first.force_n)}; division of the press's gauge: "
-        "________."
-    )
-    yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
-    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
-    yield from bench.before_the_day(works[0].schedule.heating, steps)
-    yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
-    if any(work.laminate.inlets for work in works):
-        yield "Adhesive in date; how long it cures stands on its package: ________ h."
-
-
-def tools(works: Sequence[Work]) -> list[Tool]:
-    """What is worked with, but for what is used up."""
-    laminates = [work.laminate for work in works]
-    first = works[0].schedule.steps[0]
-    width, length = first.platen_mm
-    found = [
-        Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
-        Tool("Lint-free cloths, isopropanol, clean gloves", "films and parts, before they bond"),
-    ]
-    masks = [layer for one in laminates for layer in one.layers if layer.is_mask]
-    held = {
-        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
-        for work in works
-        for layer in work.laminate.layers
-    }
-    found += [tool for hold, tool in HOLDERS.items() if hold in held]
-    if any(len(layer.profile.pieces) > 1 for layer in masks):
-        found.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
-    sizes = sorted({pin.diameter for one in laminates for pin in one.pins})
-    if sizes:
-        said = listed([f"⌀{say.millimetres(size)}" for size in sizes])
-        thin = listed([f"⌀{say.millimetres(punch(size))}" for size in sizes])
-        found += [
-            Tool(f"Drills, flat cutters, reamers H7 {said}", "base plate, if you make it yourself"),
-            Tool("Depth gauge, small hammer", "pins to their shoulders, their heights checked"),
-            Tool(f"Pin punches {thin}, or shanks of drills", "pins out, from below"),
-            Tool("Flat tweezers, pliers", "to hold the films down and to draw the pins"),
-            Tool("Needle", "to prick what lies under the films over the pins"),
-        ]
-    if any(work.job.underlay is not None for work in works):
-        found.append(Tool("Knife, steel rule, 100 mm at least", "underlay: its bars, its cut"))
-    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
-    if hands:
-        finest = say.millimetres(min(hand.hand_placement for hand in hands))
-        found.append(
-            Tool(
-                f"Measuring loupe, {LOUPE}; bright light",
-                f"to lay by eye to {finest}, and to measure what came out (sbafab record "
-                "--offset): the bare eye tells about 0.1 mm",
-            )
-        )
-    found += [
-        Tool(
-            f"Heat press, {say.size(width, length)}",
-            f"both platens to {say.temperature(first.temperature_c)}, {say.force(first.force_n)}",
-        ),
-        Tool("Thermocouple with a reader, clock", "edge of the base plate: when a step begins"),
-        Tool(f"{bench.film_words(works)[:1].upper()}{bench.film_words(works)[1:]}", bench.COLD),
-        Tool("Heat-proof gloves", "the plate comes out as hot as the platens"),
-    ]
-    if any(one.inlets for one in laminates):
-        ears = "ears, " if any(one.registration == "ears" for one in laminates) else ""
-        found += [
-            Tool("Fine scissors, razor blade, pen", f"{ears}strips, tubes; marks on tabs"),
-            Tool(
-                "Regulator or syringe with a gauge, water or soapy water, eye protection",
-                "leak and proof test",
-            ),
-            Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
-        ]
-    return found
-
-
-# How a laminate that goes round a tube is fixed there, with its supply tubes.
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Some laminates go round a tube in the end; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    closed = (
-        f"overlapping by {say.millimetres(wrap.overlap)}"
-        if wrap.overlap
-        else "meeting edge to edge"
-    )
-    return [
-        Action("Wipe the tube and the sheet's under side with isopropanol, let them dry."),
-        Action(
-            f"Try it dry. Wrap the sheet round its tube, outer diameter "
-            f"{say.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            f"along the tube, {closed}."
-        ),
-        Action(
-            f"Glue: {wrap.glue}, a thin, even film on the tube below the sheet. Keep it off "
-            "inlets, tabs and balloons. What holds the sheet is ours: the paper does not say."
-        ),
-        Action(
-            "Wrap it again, stroke it on from the middle to both edges, and bind it with tape over "
-            "release film, the balloons empty, until the adhesive has cured as its package says."
-        ),
-        Action(
-            "Lead the supply tubes along the tube, the way the tabs point, and tie them to it with "
-            "a turn of thread behind the tabs, so that no pull reaches them."
-        ),
-        Action(
-            f"Raise each chamber to {work.design.acceptance.leak_pressure_kpa:g} kPa once more: "
-            "balloons open evenly round the tube, and no edge of the sheet lifts."
-        ),
-    ]

@@ -1,7 +1,8 @@
-"""What all pictures of the page share: the outline of every pattern, drawn once and used often.
+"""Shared parts of the page's pictures: pattern outlines, labels, rounds of layers, stacks of a
+step.
 
-Pictures are inline SVG with millimetres as units. Masks are hatched as well as coloured, so that a
-grey print still tells them from structural films.
+Pictures are inline SVG in millimetres. Masks are hatched as well as coloured, so that a grey print
+still tells them from structural films.
 """
 
 from __future__ import annotations
@@ -21,10 +22,11 @@ LINE = 0.22
 """Width in mm on the page of the outline of a part."""
 THUMB = (24.0, 12.5)
 HATCH_STEP = 1.3
+PLATE = "#f1f1ef"
 
 
 def definitions(regions: Iterable[tuple[str, Region]]) -> str:
-    """The outlines that ``used`` refers to, by id, in a picture that takes no room."""
+    """Return the outlines that pictures refer to by id, in a picture that takes no room."""
     paths = (
         f'<path id="{name}" d="{path_data(region)}" fill-rule="evenodd"/>'
         for name, region in regions
@@ -59,8 +61,8 @@ class Picture:
         self._elements += elements
 
     def part(self, shape: str, film: Film, matrix: tuple[float, ...], look: str) -> None:
-        """A shape drawn by its id; ``matrix`` takes its frame to the page, ``look`` is fresh,
-        made (both opaque) or clear.
+        """Add a shape by its id; ``matrix`` takes its frame to the page, ``look`` is fresh, made
+        (both opaque) or clear.
         """
         scale = abs(matrix[0]) or abs(matrix[1])
         fill = "#e4e7ea" if look == "made" else self._fill(film, scale)
@@ -71,16 +73,28 @@ class Picture:
             f'stroke="{ink(film).line}" stroke-width="{coord(LINE / scale)}"/>'
         )
 
+    def plate(self, plate: Region, matrix: tuple[float, ...], is_used: bool = True) -> None:
+        """Add the base plate; dashed where it is not used, as it still shows the way round."""
+        scale, moved = matrix[0], " ".join(map(coord, matrix))
+        dash = "" if is_used else f' stroke-dasharray="{coord(1.6 / scale)} {coord(1.2 / scale)}"'
+        self.add(
+            f'<path d="{path_data(plate)}" fill="{PLATE if is_used else "none"}" '
+            f'fill-rule="evenodd" stroke="{draw.GREY}" stroke-width="{coord(0.25 / scale)}"{dash} '
+            f'transform="matrix({moved})"/>'
+        )
+
     def _fill(self, film: Film, scale: float) -> str:
-        own = ink(film)
+        colours = ink(film)
         if not film.is_mask:
-            return own.fill
-        self._hatches.setdefault((scale, own), f"hatch-{self.name}-{len(self._hatches) + 1}")
-        return f"url(#{self._hatches[scale, own]})"
+            return colours.fill
+        self._hatches.setdefault((scale, colours), f"hatch-{self.name}-{len(self._hatches) + 1}")
+        return f"url(#{self._hatches[scale, colours]})"
 
     def svg(self) -> str:
         w, h = coord(self.width), coord(self.height)
-        hatches = "".join(_hatch(name, scale, own) for (scale, own), name in self._hatches.items())
+        hatches = "".join(
+            _hatch(name, scale, colours) for (scale, colours), name in self._hatches.items()
+        )
         return (
             f'<svg class="picture" role="img" aria-label={quoteattr(self.words)} '
             f'width="{w}mm" height="{h}mm" viewBox="0 0 {w} {h}" font-family="{draw.FONT}" '
@@ -89,24 +103,24 @@ class Picture:
         )
 
 
-def _hatch(name: str, scale: float, own: Ink) -> str:
-    """Oblique lines, as dense on the page whatever the scale of what they fill."""
+def _hatch(name: str, scale: float, colours: Ink) -> str:
+    """Return a hatch of oblique lines, equally dense on the page at every scale."""
     turned = f"rotate(45) scale({coord(1 / scale)})"
     step = coord(HATCH_STEP)
     return (
         f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="{step}" height="{step}" '
-        f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{own.fill}"/>'
-        f'<rect width="0.18" height="{step}" fill="{own.line}" fill-opacity="0.6"/></pattern>'
+        f'patternTransform="{turned}"><rect width="{step}" height="{step}" fill="{colours.fill}"/>'
+        f'<rect width="0.18" height="{step}" fill="{colours.line}" fill-opacity="0.6"/></pattern>'
     )
 
 
 def flat(scale: float, at: Point) -> tuple[float, ...]:
-    """Plan view: the part's origin comes to ``at`` on the page, y upward."""
+    """Return the matrix of a plan view: the part's origin comes to ``at`` on the page, y upward."""
     return scale, 0.0, 0.0, -scale, at[0], at[1]
 
 
 def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle") -> str:
-    """Words over a drawing, with a white rim that keeps them legible."""
+    """Return words over a drawing, with a white rim that keeps them legible."""
     x, y = map(coord, at)
     return (
         f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="{anchor}" stroke="#ffffff" '
@@ -116,7 +130,7 @@ def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle
 
 
 def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
-    """A pattern by itself, small."""
+    """Return a small picture of a pattern."""
     low_x, low_y, high_x, high_y = bounds
     scale = min((THUMB[0] - 1) / (high_x - low_x), (THUMB[1] - 1) / (high_y - low_y))
     picture = Picture(name, *THUMB, f"outline of pattern {pattern}")
@@ -126,7 +140,7 @@ def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
     return picture.svg()
 
 
-# Long stacks in few words: what repeats is a round, named once and counted.
+# Rounds: layers that repeat, named once and counted.
 
 
 LONGEST_ROUND = 12
@@ -136,7 +150,7 @@ INSIDE = 0.1
 
 @dataclass(frozen=True)
 class Round:
-    """Layers that are laid again and again in the same order; ``turns`` holds every turn of it."""
+    """Layers that are laid repeatedly in one order; ``turns`` holds every turn of it."""
 
     turns: tuple[tuple[Layer, ...], ...]
 
@@ -163,9 +177,11 @@ class Round:
 
 
 def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
-    """The layers in order, repetitions gathered; what does not repeat is a round of one layer."""
+    """Return the layers in order, repetitions gathered; a layer that does not repeat is a round of
+    one.
+    """
     keys = [(layer.pattern, layer.role) for layer in layers]
-    found: list[Round] = []
+    gathered: list[Round] = []
     start = 0
     while start < len(layers):
         period, count = _repetition(keys[start : start + len(keys)])
@@ -173,13 +189,13 @@ def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
             tuple(layers[start + turn * period : start + (turn + 1) * period])
             for turn in range(count)
         )
-        found.append(Round(turns))
+        gathered.append(Round(turns))
         start += period * count
-    return tuple(found)
+    return tuple(gathered)
 
 
 def _repetition(keys: Sequence[object]) -> tuple[int, int]:
-    """Period and count of the repetition at the start that covers most; (1, 1) without one."""
+    """Return period and count of the longest repetition at the start; (1, 1) without one."""
     best = 1, 1
     for period in range(1, min(LONGEST_ROUND, len(keys) // 2) + 1):
         count = 1
@@ -202,17 +218,17 @@ class Bed:
 
 
 def beds(steps: Sequence[AssemblyStep], step: AssemblyStep) -> tuple[Bed, ...]:
-    """The stacks of a step, lowest first."""
+    """Return the stacks of a step, lowest first."""
     before = [earlier for earlier in steps if earlier.number < step.number]
-    found = []
+    stacks = []
     for stack in step.stacks:
         maker = next((e.number for e in reversed(before) if set(e.layers) == set(stack)), None)
-        found.append(Bed(stack, maker))
-    return tuple(found)
+        stacks.append(Bed(stack, maker))
+    return tuple(stacks)
 
 
 def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
-    """The inlets whose tab is part of at least one of the layers."""
+    """Return the inlets whose tab is part of at least one of the layers."""
     shapes = [layer.profile for layer in distinct_layers(laminate, layers)]
     return tuple(
         inlet

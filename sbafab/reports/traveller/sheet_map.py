@@ -1,4 +1,4 @@
-"""A film sheet as it lies on the machine, every part labelled with its pattern."""
+"""The map of a film sheet as it lies on the machine, every part labelled with its pattern."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class _Strip(NamedTuple):
         return x + (p[0] - self.bounds[0]) * self.scale, y + (self.bounds[3] - p[1]) * self.scale
 
     def matrix(self, placement: Placement) -> tuple[float, ...]:
-        """A quarter turn and a shift in the sheet's frame, then to the page."""
+        """Return matrix of a quarter turn and a shift in the sheet's frame, then to the page."""
         u, v = QUARTERS[placement.turn]
         s = self.scale
         # The columns are where the part's axes go.
@@ -69,13 +69,13 @@ class _Strip(NamedTuple):
 
 
 def part_regions(sheets: Sequence[SheetFile]) -> Iterator[tuple[str, Region]]:
-    """The parts that lie on the sheets by id; all sheets of a material share one nest."""
-    seen: set[str] = set()
+    """Yield the parts that lie on the sheets by id; all sheets of a material share one nest."""
+    names: set[str] = set()
     for sheet in sheets:
         for index, part in enumerate(sheet.nest.parts):
             name = _part_id(sheet, index)
-            if name not in seen:
-                seen.add(name)
+            if name not in names:
+                names.add(name)
                 yield name, part.region
 
 
@@ -84,25 +84,25 @@ def _part_id(sheet: SheetFile, index: int) -> str:
 
 
 def is_long(sheet: SheetFile) -> bool:
-    """Whether the sheet is drawn in rows across the page, each a part of its length."""
+    """Return True if the sheet is drawn in rows across the page, each a part of its length."""
     return max(sheet.width, sheet.length) > LONG * min(sheet.width, sheet.length)
 
 
-def rows_said(sheet: SheetFile) -> str:
-    """What is not seen at once in the picture of a sheet: rows, a turn, an empty rest."""
+def picture_note(sheet: SheetFile) -> str:
+    """Return what the picture of a sheet does not show at once: rows, a turn, an empty rest."""
     if not is_long(sheet):
         used = _used(sheet)
         return f"the sheet above {used:.0f} mm is empty" if used < sheet.length else ""
     strips = _strips(sheet)
-    said = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
+    rows = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
     if not strips[0].turned:
-        return said
+        return rows
     turn = "turned by 90°: its lower left corner is at the upper left"
-    return f"{turn}; {said}" if said else turn
+    return f"{turn}; {rows}" if rows else turn
 
 
 def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
-    """The sheet in plan, its lower left corner at the lower left; a long one in rows.
+    """Return the sheet in plan, its lower left corner at the lower left; a long one in rows.
 
     A part is labelled with its pattern after the mark of its design, or the design's name.
     """
@@ -146,7 +146,7 @@ def _strips(sheet: SheetFile) -> list[_Strip]:
 
 
 def _used(sheet: SheetFile) -> float:
-    """How far up a sheet its parts and pins reach, and a border more; mm."""
+    """Return the length in mm that parts and pins use, with a border more."""
     nest = sheet.nest
     tops = [nest.region(placement).bounds[3] for placement in nest.on_sheet(sheet.number - 1)]
     tops += [y + diameter / 2 for _, y, diameter in nest.stock.pins]
@@ -154,7 +154,7 @@ def _used(sheet: SheetFile) -> float:
 
 
 def _window(strip: _Strip) -> list[str]:
-    """Opens a picture in the picture that shows nothing beside the strip."""
+    """Return the opening tags of a nested picture that shows nothing beside the strip."""
     (x, y), (wide, high) = strip.corner, strip.size
     place = " ".join(map(coord, (x, y, wide, high)))
     return [
@@ -167,13 +167,13 @@ def _window(strip: _Strip) -> list[str]:
 def _draw(
     picture: Picture, sheet: SheetFile, film: Film, strip: _Strip, marks: Mapping[str, str]
 ) -> None:
-    """Parts, pins and labels of a strip."""
-    seen = [
+    """Draw parts, pins and labels of a strip."""
+    visible = [
         (placement, sheet.nest.region(placement))
         for placement in sheet.nest.on_sheet(sheet.number - 1)
     ]
-    seen = [(placement, region) for placement, region in seen if _meets(region.bounds, strip)]
-    for placement, _ in seen:
+    visible = [(placement, region) for placement, region in visible if _meets(region.bounds, strip)]
+    for placement, _ in visible:
         name = _part_id(sheet, placement.part)
         picture.part(name, film, strip.matrix(placement), "fresh")
     for x, y, diameter in sheet.nest.stock.pins:
@@ -182,7 +182,7 @@ def _draw(
         picture.add(
             f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{radius}" fill="#777777"/>'
         )
-    _label(picture, sheet, strip, marks, seen)
+    _label(picture, sheet, strip, marks, visible)
 
 
 def _label(
@@ -190,28 +190,28 @@ def _label(
     sheet: SheetFile,
     strip: _Strip,
     marks: Mapping[str, str],
-    seen: Sequence[tuple[Placement, Region]],
+    visible: Sequence[tuple[Placement, Region]],
 ) -> None:
-    """Every part's pattern; parts that lie alike are labelled alike unless labels would meet."""
-    known: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
+    """Label every part; equal parts are labelled equally unless labels would meet."""
+    by_placement: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
     taken: list[Bounds] = []
     page = (*strip.corner, *_far(strip))
-    for placement, region in seen:
+    for placement, region in visible:
         part = sheet.nest.parts[placement.part]
         words = marked(part.design, part.pattern, marks)
-        alike = placement.part, placement.turn
-        if alike not in known:
+        key = placement.part, placement.turn
+        if key not in by_placement:
             shape = region.mapped(strip.at, strip.scale, mirror=True)
-            known[alike] = region.bounds, labels(words, shape)
-        bounds, places = known[alike]
-        places, kept = tee(places)
-        known[alike] = bounds, kept
+            by_placement[key] = region.bounds, labels(words, shape)
+        bounds, places = by_placement[key]
+        places, copy = tee(places)
+        by_placement[key] = bounds, copy
         (x, y), (first_x, first_y) = strip.at(region.bounds[:2]), strip.at(bounds[:2])
         moved = (place.moved(x - first_x, y - first_y) for place in places)
-        found = first_free(moved, page, taken)
-        if found is not None:
-            taken.append(found.box)
-            picture.add(label(found.at, words, found.size))
+        free = first_free(moved, page, taken)
+        if free is not None:
+            taken.append(free.box)
+            picture.add(label(free.at, words, free.size))
 
 
 def _far(strip: _Strip) -> Point:
@@ -224,11 +224,11 @@ def _meets(bounds: Bounds, strip: _Strip) -> bool:
 
 
 def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
-    """A pattern after the mark of its design, the design's name where it has none."""
+    """Return a pattern after the mark of its design, or the design's name where it has none."""
     return f"{marks.get(design, design)} {pattern}".lstrip()
 
 
-# Where the label of a part stands: on the part, off its holes and off other labels.
+# Places for labels: on the part, off its holes and off other labels.
 
 
 LEGIBLE = 1.5
@@ -258,10 +258,11 @@ class PlacedLabel(NamedTuple):
 
 
 def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
-    """Where the words may stand on a part as it is drawn, the best place first.
+    """Yield places for the words on a part as it is drawn, the best first.
 
-    Off its holes if they can, near its middle, as large as may be; none where nobody could read
-    them. A place is measured when its turn has come: the first one is nearly always taken.
+    They are off its holes if they can be, near its middle and as large as may be; none are yielded
+    where nobody could read them. A place is measured when its turn has come: the first one is
+    nearly always taken.
     """
     low_x, _, high_x, _ = part.bounds
     width = OVER * (high_x - low_x)
@@ -290,8 +291,8 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
 
 
 class _Candidate(NamedTuple):
-    """A label with the least that it costs, as far as is known: ``far`` off the middle and small,
-    holes ``covered``, points ``off`` the part; what is quickly told is asked first.
+    """A label with the least that it can cost: ``far`` off the middle and small, holes ``covered``,
+    points ``off`` the part; what is quickly measured comes first.
 
     ``sides``: points of its box that have not been looked for on the part yet; None where the holes
     have not been counted either.
@@ -308,7 +309,9 @@ class _Candidate(NamedTuple):
         return self._measured(covered, 0, sides)
 
     def beside(self, part: Region) -> _Candidate:
-        """With the points up to the first one that is off the part, which costs much."""
+        """Return the candidate measured up to its first point that is off the part, which costs
+        much.
+        """
         assert self.sides is not None
         for number, point in enumerate(self.sides):
             if not part.contains(point):
@@ -321,13 +324,15 @@ class _Candidate(NamedTuple):
 
 
 def first_free(
-    found: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
+    candidates: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
 ) -> PlacedLabel | None:
-    """The first of the labels that stands on the page and off the boxes of other labels."""
+    """Return the first label that stands on the page and off the boxes of other labels; None for
+    none.
+    """
     return next(
         (
             label
-            for label in found
+            for label in candidates
             if _within(label.box, page) and not any(_meet(label.box, box) for box in taken)
         ),
         None,
@@ -335,7 +340,7 @@ def first_free(
 
 
 def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
-    """The label of words that are ``em`` sizes of their letters wide."""
+    """Return the label of words that are ``em`` sizes of their letters wide."""
     x, y = middle
     wide, high = size * em / 2, HIGH * size / 2
     box = x - wide, y - high, x + wide, y + high
@@ -343,7 +348,7 @@ def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
 
 
 def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
-    """Points of a part's box and how far off its middle they are, from 0 to 1; nearest first."""
+    """Yield distance from the middle, 0 to 1, and point, over a part's box; nearest first."""
     low_x, low_y, high_x, high_y = bounds
     x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
     for off, u, v in _grid():
@@ -352,7 +357,7 @@ def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
 
 @cache
 def _grid() -> list[tuple[float, float, float]]:
-    """The same of a box from -1 to 1: how far off, and both shares."""
+    """Return distances and coordinates of a grid over a box from -1 to 1, nearest first."""
     steps = range(-STEPS, STEPS + 1)
     grid = [(i / (STEPS + 1), j / (STEPS + 1)) for i in steps for j in steps]
     nearest = sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p))
@@ -360,7 +365,7 @@ def _grid() -> list[tuple[float, float, float]]:
 
 
 def _sides(box: Bounds, holes: Sequence[Bounds]) -> tuple[Point, ...]:
-    """Corners and middles of the words' box, but for what stands on a hole of the part."""
+    """Return corners and middles of the words' box that stand on no hole of the part."""
     points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
     return tuple([p for p in points if not any(_meet((*p, *p), hole) for hole in holes)])
 

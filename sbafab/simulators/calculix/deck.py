@@ -15,8 +15,8 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.write_inp import write_inp
+from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.meshing.formats.inp import write_inp
 from sbafab.simulators.simulator import Wish, chamber_pressures
 
 if TYPE_CHECKING:

@@ -18,11 +18,10 @@ import numpy as np
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.elements import CORNERS, FACES
+from sbafab.meshing.conforming.element_mesh import flat_triangles
 from sbafab.meshing.conforming.layup import Symmetry, images, sector
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.sweep import flat_triangles
-from sbafab.meshing.conforming.write_vtu import write_fields
+from sbafab.meshing.conforming.mesh import CORNERS, FACES, Mesh
+from sbafab.meshing.formats.vtu import write_fields
 from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import AMBIENT, draw_length_bar, seen, view_of
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg

@@ -12,7 +12,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import volume_mesh
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, layup
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.process import Progress
 from sbafab.simulators.calculix.deck import JOB, DeckSettings, started, write_deck
 from sbafab.simulators.calculix.results import (

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from sbafab.errors import DesignError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour, disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Interface, Laminate
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.meshing.conforming.layup import Layup
-    from sbafab.meshing.conforming.model import Mesh
+    from sbafab.meshing.conforming.mesh import Mesh
 
 STEPS_ACROSS = 3.0
 """Sides of triangles in the smallest pocket's radius, where its bonds are not narrower."""
@@ -33,8 +33,8 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
     film's modulus is not known, or the mesher is not installed.
     """
     from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
-    from sbafab.meshing.conforming.elements import volumes
     from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, narrowest_ring
+    from sbafab.meshing.conforming.mesh import volumes
 
     names = tuple(chamber.name for chamber in laminate.chambers)
     told = checked(names, pressures, PRESSURE, "pressure", "kPa")

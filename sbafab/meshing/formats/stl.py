@@ -15,8 +15,8 @@ AT_ONCE = 8192
 """Triangles worked out together: few enough that their numbers stay in the processor's cache."""
 
 
-def write_stl(surface: Surface, path: Path) -> None:
-    """Write the surface in mm; the format itself carries no unit."""
+def write_stl(surface: Surface, path: Path, _material: str = "") -> None:
+    """Write the surface in mm; the format itself has no place for a unit or a material."""
     import numpy as np
 
     places = np.ascontiguousarray(surface.points.T)

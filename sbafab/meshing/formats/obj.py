@@ -1,4 +1,4 @@
-"""OBJ: a cavity's surface as text."""
+"""OBJ: a surface as text."""
 
 from __future__ import annotations
 

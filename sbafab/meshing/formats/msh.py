@@ -1,16 +1,14 @@
-"""MSH 2.2, text: what Gmsh and the solvers around it read, sets as physical groups."""
+"""MSH 2.2 as text for Gmsh and the solvers around it, sets as physical groups."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from sbafab.meshing.conforming.elements import FACES
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import FACES, Mesh
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
 NODE = "%d %.12g %.12g %.12g\n"
@@ -75,8 +73,10 @@ def _elements(block: Block, first: int) -> str:
 
 
 def _walls(mesh: Mesh, faces: NDArray[np.int64], group: int) -> list[Block]:
+    import numpy as np
+
     kinds: dict[int, list[NDArray[np.int64]]] = {}
     for number, local in enumerate(FACES[mesh.kind]):
         nodes = mesh.cells[faces[faces[:, 1] == number, 0]][:, list(local)]
         kinds.setdefault(TRIANGLE6 if len(local) == 6 else SQUARE8, []).append(nodes)
-    return [Block(kind, group, np.concatenate(found)) for kind, found in kinds.items()]
+    return [Block(kind, group, np.concatenate(faces)) for kind, faces in kinds.items()]

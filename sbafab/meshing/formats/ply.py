@@ -1,18 +1,18 @@
-"""PLY: a cavity's surface, binary in double precision."""
+"""PLY: a surface, binary in double precision."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from sbafab.meshing.surface import Surface
 
-FACE = np.dtype([("count", "u1"), ("nodes", "<i4", 3)])
+FACE = [("count", "u1"), ("nodes", "<i4", 3)]
 
 
 def write_ply(surface: Surface, path: Path) -> None:
     """Write a surface; lengths are mm."""
+    import numpy as np
+
     header = [
         "ply",
         "format binary_little_endian 1.0",

@@ -92,8 +92,8 @@ def _rows(form: bytes, columns: Sequence[NDArray[np.bytes_]]) -> bytes:
     """The form once a row, its places filled with the words of the columns."""
     import numpy as np
 
-    first, *others = (np.asarray(part) for part in form.split(b"%s"))
-    fields = [first, *chain.from_iterable(zip(columns, others, strict=True))]
+    first, *rest = (np.asarray(part) for part in form.split(b"%s"))
+    fields = [first, *chain.from_iterable(zip(columns, rest, strict=True))]
     kinds = [(str(number), field.dtype) for number, field in enumerate(fields)]
     parts = []
     for start in range(0, len(columns[0]), AT_ONCE):

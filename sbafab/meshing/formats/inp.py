@@ -1,4 +1,4 @@
-"""INP: what Abaqus and CalculiX read, every set written out."""
+"""INP for Abaqus and CalculiX, every set written out."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sbafab.meshing.conforming.elements import ElementKind
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import ElementKind, Mesh
 
 if TYPE_CHECKING:
     import numpy as np

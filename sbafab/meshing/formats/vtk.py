@@ -1,10 +1,10 @@
-"""Legacy VTK, text: what SOFA's MeshVTKLoader reads, which knows no wedges."""
+"""Legacy VTK as text for SOFA's MeshVTKLoader, which has no wedges."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from sbafab.meshing.conforming.model import Mesh
+from sbafab.meshing.conforming.mesh import Mesh
 
 POINT = "%.10g %.10g %.10g\n"
 TRIANGLE, TETRAHEDRON = 5, 10
