@@ -1,4 +1,4 @@
-"""The program from Python: the commands' names, each a function.
+"""The program from Python: a function for each command.
 
 >>> import sbafab
 >>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
@@ -83,7 +83,7 @@ Source = Design | str | Path
 
 
 def design_of(source: Source, changes: Sequence[Change], tables: Mapping[str, Any]) -> Design:
-    """The design with its keys changed. Raises DesignError."""
+    """Return the design with its keys changed. Raises DesignError."""
     if isinstance(source, Design):
         return source.with_(*changes, **tables) if changes or tables else source
     return actuators.load_design(source, [*changes, tables])
@@ -92,7 +92,7 @@ def design_of(source: Source, changes: Sequence[Change], tables: Mapping[str, An
 def either_of(
     source: Source | Assembly, changes: Sequence[Change], tables: Mapping[str, Any]
 ) -> Design | Assembly:
-    """The design or the assembly, likewise."""
+    """Return the design or the assembly with its keys changed. Raises DesignError."""
     from sbafab.assemblies.files import load
     from sbafab.assemblies.records import Assembly
 
@@ -103,37 +103,37 @@ def either_of(
     return load(source, [*changes, tables])
 
 
-def parted(asked: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What of the keywords are fields of the record, and what are tables of a design."""
+def parted(options: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Split keywords into fields of the record and tables of a design."""
     names = {field.name for field in fields(record)}
     return (
-        {name: value for name, value in asked.items() if name in names},
-        {name: value for name, value in asked.items() if name not in names},
+        {name: value for name, value in options.items() if name in names},
+        {name: value for name, value in options.items() if name not in names},
     )
 
 
-# A design from its file to its laminate, what the rules find in it, and its shapes.
+# A design from its file to its laminate, findings and shapes.
 
 
 def templates() -> list[str]:
-    """Names of the designs and assemblies that ship, in alphabetical order."""
+    """Return the names of the designs and assemblies that ship, in alphabetical order."""
     return template_names()
 
 
 def template(name: str) -> str:
-    """The commented text (TOML) of a design that ships. Raises DesignError for another name."""
+    """Return the text (TOML) of a design that ships. Raises DesignError for another name."""
     return template_text(name)
 
 
 def schema() -> dict[str, Any]:
-    """JSON schema (2020-12) of a design or assembly file: every key, its default and meaning."""
+    """Return the JSON schema (2020-12) of a design file: every key, its default and meaning."""
     from sbafab.assemblies.records import Assembly
 
     return actuators.schema(Assembly)
 
 
 def load(source: Source, *changes: Change, **tables: Any) -> Design:
-    """A design, with keys changed and checked like those of a file.
+    """Return a design, with keys changed and checked like those of a file.
 
     Lengths are mm, or texts with a unit such as ``"0.75 mm"`` and ``"6 in"``. Raises DesignError
     with field, value and what is allowed.
@@ -142,9 +142,9 @@ def load(source: Source, *changes: Change, **tables: Any) -> Design:
 
 
 def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
-    """A design or an assembly from the text of a file; relative paths in it start beside ``path``.
+    """Return a design or an assembly from the text of a file. Raises DesignError.
 
-    Raises DesignError.
+    Relative paths in it start beside ``path``.
     """
     from sbafab.assemblies.files import load_text
 
@@ -152,7 +152,7 @@ def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
 
 
 def resolved(design: Design | Assembly) -> dict[str, Any]:
-    """The tables of a design or an assembly with every default written out; lengths are mm."""
+    """Return the tables of a design or assembly with every default written out; lengths are mm."""
     from sbafab.assemblies.files import plain_tables
     from sbafab.design.files import resolved as written_out
 
@@ -160,7 +160,7 @@ def resolved(design: Design | Assembly) -> dict[str, Any]:
 
 
 def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
-    """The laminate of a design: its layers bottom to top, lengths in mm, the axis at (0, 0).
+    """Return the laminate of a design: its layers bottom to top, lengths in mm, the axis at (0, 0).
 
     In a notebook it shows itself as a picture. Raises DesignError. The lay-up is the paper's
     (Sec. 2).
@@ -189,7 +189,7 @@ def check(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Findings:
-    """What the rule deck finds in a design; of an assembly, also what is found between parts.
+    """Check a design with the rule deck; an assembly also between its parts.
 
     Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is told
     each rule; what it raises ends the check. Raises DesignError for what cannot be built. Limits
@@ -204,9 +204,9 @@ def check(
 def checking(
     source: Source, laminate: Laminate | None = None, pause: Callable[[], None] | None = None
 ) -> Iterator[tuple[str, Findings]]:
-    """Every rule's name and what it finds in a design, one after the other, as they are measured.
+    """Yield every rule's name and its findings in a design, as they are measured.
 
-    Who stops asking stops the deck; registration-yield, which draws builds, comes last.
+    Iteration may stop at any rule; registration-yield, which draws builds, comes last.
     ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
     long rules, and what it raises ends the deck. Raises DesignError.
     """
@@ -218,12 +218,12 @@ def checking(
     design = load(source)
     measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
     for rule in RULES:
-        found = run_rule(rule, measures.laminate, measures.limits, measures)
-        yield rule.name, Findings(found)
+        findings = run_rule(rule, measures.laminate, measures.limits, measures)
+        yield rule.name, Findings(findings)
 
 
 def check_folder(folder: str | Path) -> Findings:
-    """What the rule deck finds in the cut files of an output folder as they lie on disk.
+    """Check the cut files of an output folder as they lie on disk with the rule deck.
 
     Also whether the folder is what its ``design.toml`` makes (findings ``manifest-claims``,
     ``as-designed``, ``file-integrity``). Raises OutputError where none can be read there.
@@ -235,7 +235,7 @@ def check_folder(folder: str | Path) -> Findings:
 
 
 def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: Any) -> Surface:
-    """The closed surface of the flat actuator in mm, for example for ``solid(...).trimesh()``.
+    """Return the closed surface of the flat actuator in mm, as for ``solid(...).trimesh()``.
 
     Films have their nominal thickness, pockets that of their mask. Of an assembly's part it is the
     outside, in the part's own frame and bent round its tube; ``part.pose`` places it. Raises
@@ -253,7 +253,7 @@ def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: An
 
 
 def drawing(layer: Layer) -> Drawing:
-    """A layer as an ezdxf document in mm: nominal edges as in its cut file, no kerf taken off.
+    """Return a layer as an ezdxf document in mm: nominal edges as in its cut file, without kerf.
 
     It is DXF R2010: a closed LWPOLYLINE with bulges a contour, CIRCLE for a full circle.
     """
@@ -269,9 +269,7 @@ def drawing(layer: Layer) -> Drawing:
 
 
 def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
-    """What a drawing of a layer gives the size of: circles, radii and widths in mm, each with its
-    words.
-    """
+    """Return the dimensions on a layer's drawing: circles, radii and widths in mm, with labels."""
     from sbafab.reports.drawing import dimensions as measured
 
     return measured(laminate, layer)
@@ -340,19 +338,19 @@ def mesh(
     *changes: Change,
     out: str | Path = "out",
     formats: Sequence[str] = ("vtu",),
-    **asked: Any,
+    **options: Any,
 ) -> Run:
     """Writes solid, cavities and conforming meshes; the latter stand in the run's ``conforming``.
 
-    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``asked`` holds fields of
-    ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``, beside tables of the design.
-    Takes the extra "mesh". Raises DesignError and OutputError.
+    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``options`` holds
+    fields of ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``, beside tables of the
+    design. Takes the extra "mesh". Raises DesignError and OutputError.
     """
     from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.runs.run import Conforming, RunRequest
     from sbafab.runs.run import generate as run
 
-    settings, tables = parted(asked, MeshSettings)
+    settings, tables = parted(options, MeshSettings)
     conforming = Conforming(MeshSettings(**settings), tuple(formats))
     design = load(source, *changes, **tables)
     return run(RunRequest(design, Path(out), ("mesh",), conforming=conforming))
@@ -375,11 +373,11 @@ def simulate(
     simulator: Name,
     out: str | Path = "out",
     export: bool = False,
-    **asked: Any,
+    **options: Any,
 ) -> Simulated:
     """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
 
-    ``simulator`` is "calculix", "sofa" or "mujoco". ``asked`` holds fields of ``Wish``, such as
+    ``simulator`` is "calculix", "sofa" or "mujoco". ``options`` holds fields of ``Wish``, such as
     ``pressure`` kPa, ``chambers`` kPa by name and ``minutes``, beside tables of the design.
     ``export`` writes what it reads and runs nothing. Raises DesignError for what it cannot do, and
     OutputError.
@@ -387,12 +385,12 @@ def simulate(
     from sbafab.runs.run import simulate as run
     from sbafab.simulators.simulator import Wish
 
-    wish, tables = parted(asked, Wish)
+    wish, tables = parted(options, Wish)
     design = load(source, *changes, **tables)
     return run(design, simulator, Wish(**wish), Path(out), export=export)
 
 
-# What a lab measures: the kerf of its laser, and what came out of the press.
+# Measurements of a lab: the kerf of its laser, results of its actuators.
 
 
 def kerf(
@@ -417,11 +415,11 @@ def record(
     lab: str | Path = "lab.sqlite",
     table: str | Path | None = None,
     again: bool = False,
-    **said: Any,
+    **values: Any,
 ) -> list[Record]:
-    """Records what came out of a design or an assembly in the lab's file; the records added.
+    """Record results of a design or an assembly in the lab's file; return the records added.
 
-    ``said`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
+    ``values`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
     what was measured: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
     ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the
     design. A ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of
@@ -430,15 +428,17 @@ def record(
     from sbafab.results import recording
     from sbafab.results.store import Lab
 
-    told = {name: value for name, value in said.items() if name in recording.SAID}
-    tables = {name: value for name, value in said.items() if name not in recording.SAID}
-    results = recording.results_of(told, table)
+    results_by_name = {
+        name: value for name, value in values.items() if name in recording.RESULT_NAMES
+    }
+    tables = {name: value for name, value in values.items() if name not in recording.RESULT_NAMES}
+    results = recording.results_of(results_by_name, table)
     built = recording.built_from(source, [*changes, tables] if tables else changes)
     return recording.record(Lab(Path(lab)), built, results, again)
 
 
 def report(lab: str | Path = "lab.sqlite") -> Report:
-    """What all records of a lab's file say together: success, figures, tolerances.
+    """Evaluate all records of a lab's file: success, figures, tolerances.
 
     Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
     OutputError where the file cannot be read.
@@ -460,22 +460,22 @@ def predict(
     volumes_ul: Sequence[float] = (),
     quick: bool = False,
     laminate: Laminate | None = None,
-    **asked: Any,
+    **options: Any,
 ) -> Prediction:
-    """What a design will do; each figure has a unit and names its model and its trust.
+    """Predict what a design will do; each figure has a unit and names its model and its trust.
 
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
-    ``asked`` holds fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss`` mm
-    and ``modulus_mpa``, beside tables of the design. Raises DesignError for what is out of every
+    ``options`` holds fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss``
+    mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what is out of every
     model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
     in balance.
     """
     from sbafab.models.figures import Asked, Factors
     from sbafab.models.prediction import predict as model_predict
 
-    factors, tables = parted(asked, Factors)
+    factors, tables = parted(options, Factors)
     wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
     return model_predict(load(source, *changes, **tables), wish, laminate, quick)
 
@@ -488,7 +488,7 @@ def predict_assembly(
     pause: Callable[[], None] | None = None,
     **tables: Any,
 ) -> AssemblyPrediction:
-    """What the parts of an assembly do inflated: reach, load, grip, and what they then touch.
+    """Predict the inflated parts of an assembly: reach, load, grip, and what they then touch.
 
     All actuators are at ``pressure_kpa``, and ``load_g`` g hangs across their tips; the paper's
     marble by default (Sec. 5). ``pause`` is called between parts of the work, which takes seconds;
@@ -497,12 +497,12 @@ def predict_assembly(
     from sbafab.assemblies.build import Assembled
     from sbafab.reports.assembly_prediction import predict_assembly as model_predict
 
-    found = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
-    return model_predict(found, pressure_kpa, load_g, pause or (lambda: None))
+    assembled = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
+    return model_predict(assembled, pressure_kpa, load_g, pause or (lambda: None))
 
 
 def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
-    """How a radial part of an assembly holds, and its inflated balloons; None for other parts.
+    """Return the grip of a radial part of an assembly and its inflated balloons; None for others.
 
     The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
     one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
@@ -516,24 +516,24 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     if part not in names:
         raise DesignError(f"no part is named {part!r}; there are {', '.join(names)}")
     placed = assembled[part]
-    found = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
-    if found is None or not isinstance(placed, PlacedSba):
+    outcome = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
+    if outcome is None or not isinstance(placed, PlacedSba):
         return None
-    free = (found.free - found.deflated) / 2 / placed.made.laminate.balloons
-    return found, gripping(placed, found.room or free)
+    free = (outcome.free - outcome.deflated) / 2 / placed.made.laminate.balloons
+    return outcome, gripping(placed, outcome.room or free)
 
 
-def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **asked: Any) -> Stack:
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **options: Any) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
-    ``most_pressure`` kPa is the most that it may be asked for; ``asked`` holds fields of
+    ``most_pressure`` kPa is the most that it may be asked for; ``options`` holds fields of
     ``Factors`` beside tables of the design. Raises DesignError for pockets that are not round.
     Balloons lengthen and tilt and carry no shear (paper, Sec. 4.4).
     """
     from sbafab.models.figures import Factors
     from sbafab.models.stack import stack as stack_of
 
-    factors, tables = parted(asked, Factors)
+    factors, tables = parted(options, Factors)
     design = load(source, *changes, **tables)
     return stack_of(design, most_pressure=most_pressure, factors=Factors(**factors))
 
@@ -572,12 +572,12 @@ def find(
     least: Mapping[str, float] | None = None,
     most: Mapping[str, float] | None = None,
     best: str = "mass",
-    **asked: Any,
+    **options: Any,
 ) -> FoundDesign:
     """The design that meets requirements and is best in one thing, or the nearest miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
-    20})``: ``least`` and ``most`` are in mm, N, g and kPa. ``asked`` holds fields of
+    20})``: ``least`` and ``most`` are in mm, N, g and kPa. ``options`` holds fields of
     ``FindRequest``, such as ``tries``, beside tables of the design; ``found.best.values`` are the
     found keys. Raises DesignError for a quantity that it does not know, with those it does.
     """
@@ -585,7 +585,7 @@ def find(
     from sbafab.search.find import find as run_find
     from sbafab.search.trial import read_all
 
-    settings, tables = parted(asked, FindRequest)
+    settings, tables = parted(options, FindRequest)
     at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best)
@@ -597,12 +597,12 @@ def sweep(
     *changes: Change,
     vary: Sequence[str],
     out: str | Path = "out",
-    **asked: Any,
+    **options: Any,
 ) -> SweptDesigns:
     """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
 
     ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` (mm) and
-    ``"stack.balloons=3,6,9"``. ``asked`` holds fields of ``SweepRequest``, such as ``samples``,
+    ``"stack.balloons=3,6,9"``. ``options`` holds fields of ``SweepRequest``, such as ``samples``,
     ``pressures_kpa``, ``workers`` and ``dask``, beside tables of the design. Raises DesignError for
     a key that is not there, and OutputError.
     """
@@ -610,7 +610,7 @@ def sweep(
     from sbafab.search.sweep import sweep as run_sweep
     from sbafab.search.vary import read_varied
 
-    settings, tables = parted(asked, SweepRequest)
+    settings, tables = parted(options, SweepRequest)
     design = load(source, *changes, **tables)
     varied = tuple(read_varied(text) for text in vary)
     return run_sweep(SweepRequest(design, varied, **settings), Path(out))

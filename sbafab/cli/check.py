@@ -32,11 +32,10 @@ from sbafab.errors import DesignError, SbafabError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sbafab.assemblies.records import Assembly
+    from sbafab.cli.printing import Group
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.checked import Checked
-    from sbafab.process import Progress
+    from sbafab.output.job import CheckedJob
     from sbafab.rules.finding import Finding
 
 YIELD_RULE = "registration-yield"
@@ -170,6 +169,7 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
     from sbafab.actuators import load_design
     from sbafab.assemblies.files import load
     from sbafab.design.records import Design
+    from sbafab.output.job import check_job
 
     source = load(request.source, request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
@@ -179,51 +179,30 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
                     "--target-yield goes with a design, and this is an assembly; check its "
                     "parts' designs one by one"
                 )
-            return _check_assembly(source, progress)
+            return _outcome(check_job(source, progress=progress))
         has_target = source.rules.target_yield is not None
         if request.target is not None:
             assignments = _with_target(request, request.target)
             source = load_design(request.source, assignments, request.waivers)
-        return _check_design(source, progress)._replace(has_target=has_target)
+        return _outcome(check_job(source, progress=progress))._replace(has_target=has_target)
 
 
-def _check_design(design: Design, progress: Progress) -> CheckOutcome:
-    from sbafab.output.checked import check as run_check
-
-    checked = run_check(design, progress)
-    return _outcome(design.name, checked.findings, [checked])
-
-
-def _check_assembly(assembly: Assembly, progress: Progress) -> CheckOutcome:
-    """Check the designs of an assembly, and between its parts."""
-    from sbafab.output.job import check_job
-
-    checked = check_job(assembly, progress=progress)
-    return _outcome(assembly.name, checked.findings, checked.designs, checked.between)
-
-
-def _outcome(
-    name: str,
-    findings: Sequence[Finding],
-    checked: Sequence[Checked],
-    between: Sequence[Finding] | None = None,
-) -> CheckOutcome:
+def _outcome(job: CheckedJob) -> CheckOutcome:
     """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
     from sbafab.models.formulas import size_said, sizes
     from sbafab.output.checked import refuse_undoable
-    from sbafab.rules.deck import has_failed
 
-    if not has_failed(findings):
-        refuse_undoable(checked)
+    if not job.failed:
+        refuse_undoable(job.designs)
     return CheckOutcome(
         "design",
-        name,
-        findings,
-        groups_of(checked, between),
-        notes_of(checked),
-        [each.design for each in checked],
-        {each.design.name: sizes(each.design, each.laminate) for each in checked},
-        {each.design.name: size_said(each.design, each.laminate) for each in checked},
+        job.name,
+        job.findings,
+        groups_of(job.designs, job.between),
+        notes_of(job.designs),
+        [each.design for each in job.designs],
+        {each.design.name: sizes(each.design, each.laminate) for each in job.designs},
+        {each.design.name: size_said(each.design, each.laminate) for each in job.designs},
     )
 
 
@@ -245,7 +224,6 @@ def _check_folder(request: CheckRequest) -> CheckOutcome:
     import logging
 
     from sbafab.cli.printing import Group
-    from sbafab.errors import DesignError
     from sbafab.runs.check_folder import check_folder
 
     if request.assignments or request.waivers or request.target is not None:

@@ -1,6 +1,7 @@
 """The files of a design's folder: one table, a row a file or folder, and what writes each.
 
-Adding an output file takes one row of ``ARTEFACTS`` and the function that renders it.
+Adding an output file takes one row of ``ARTEFACTS`` and the function that renders it, which imports
+pictures and pages itself: a run of some parts loads none of them.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def would_replace(
 
 
 def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the files listed by an earlier run (``swap.listed_files``) and not by the new one."""
+    """Return the files that an earlier run listed and the new manifest does not."""
     return tuple(path for path in listed if path not in index["files"])
 
 
@@ -95,8 +95,8 @@ def _value(keys: Mapping[str, object], key: str) -> str:
 def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     """Copy files of the old run that this one did not write, if they are of the same design.
 
-    ``index`` is the new manifest, completed by their entries. Raises OutputError where results of
-    a simulator would be lost to input of other settings.
+    ``index`` is the new manifest, completed by their entries. Raises OutputError where results of a
+    simulator would be lost to input of other settings.
     """
     old = read_manifest(old_folder)
     if old is None or not carried_over(old, index):

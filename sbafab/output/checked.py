@@ -11,6 +11,7 @@ from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
+from sbafab.cutting.sheets import Machine
 from sbafab.design.files import design_sha256
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.kits import citation
@@ -34,7 +35,6 @@ from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
-    from sbafab.cutting.sheets import Machine
     from sbafab.meshing.conforming.meshes import ConformingMeshes
     from sbafab.models.figures import Prediction
 
@@ -199,8 +199,6 @@ def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
 
 def machine(design: Design) -> Machine:
     laser = design.laser
-    from sbafab.cutting.sheets import Machine
-
     return Machine(
         cut_speed=laser.cut_speed,
         travel_speed=laser.travel_speed,

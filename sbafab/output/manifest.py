@@ -35,21 +35,14 @@ from sbafab.version import GENERATOR
 
 MOST_SIZE = 10_000.0
 """mm, of a film sheet."""
-
-
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
-
-
 Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
-
-
 Thickness = Annotated[float, Field(gt=0, le=10)]
-
-
 BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
-
-
 Schema = Literal["sbafab/manifest@1"] | BatchSchema
+
+
+# The records.
 
 
 class _Claim(BaseModel):
@@ -297,13 +290,7 @@ class AssemblyManifest(JobManifest):
     meshes: tuple[dict[str, Any], ...] = ()
 
 
-# What ``manifest.json`` holds: the records that a run writes it from, and that it is read with.
-#
-# A key with a default may be missing in a folder that is read. What the manifest claims is held
-# against the files by ``as_built``, which measures it there and asks nothing that wrote it.
-
-
-# ``manifest.json`` and ``checks.json``: what a program reads of an output folder.
+# Manifests of plans.
 
 
 def as_json(value: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
 from sbafab.output.schema_ids import REPRODUCTION_SCHEMA
+from sbafab.reports.charts import relation_svg
 from sbafab.reproduction import rows
 from sbafab.reproduction.rows import Row, predicted, table
 
@@ -137,8 +138,6 @@ def reproduce(folder: Path) -> dict[str, list[Row]]:
 
     Raises OutputError where the folder cannot be written.
     """
-    from sbafab.reports.charts import relation_svg
-
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
     sections = tables(single, three)
     files = {

@@ -1,4 +1,4 @@
-"""Rows of the paper's figures beside ours, and how they are written."""
+"""Rows of the paper's figures beside the predictions, as values and as Markdown."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def predicted(
     return predict(load_design(template), Asked(pressures, calibration=factors or Factors()))
 
 
-# Rows of what is made, its sizes, its strokes by the paper's own models, and other simulations.
+# Manufacture, sizes, strokes by the paper's own models, other simulations.
 
 
 def process() -> Iterator[Row]:
@@ -236,7 +236,7 @@ def simulators() -> Iterator[Row]:
         yield Row(figure, exact(value, unit, "Sec. 4.2, 3.2"), None, NONE, why)
 
 
-# Rows of energy, force, time, bending and stiffness.
+# Energy, force, time, bending, stiffness.
 
 
 STACK = "elastic stack"

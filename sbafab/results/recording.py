@@ -31,8 +31,8 @@ from sbafab.results.records import (
 from sbafab.results.store import Lab
 from sbafab.version import GENERATOR
 
-SAID = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
-"""What can be said of an actuator, by its name."""
+RESULT_NAMES = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
+"""Names of the values that a result of an actuator may have."""
 
 
 def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:
@@ -181,7 +181,7 @@ def _number(text: str, column: str, where: str) -> float:
     return float(text.replace(",", "."))
 
 
-# Finding records by what a traveller's code says, by a serial or by a design's name.
+# Records found by a traveller's code, a serial or a design's name.
 
 
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")

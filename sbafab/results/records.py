@@ -20,6 +20,7 @@ from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
 from sbafab.output.checked import limits
+from sbafab.rules.registration_yield import simulate
 from sbafab.version import GENERATOR
 
 PASS, FAIL = "pass", "fail"
@@ -176,7 +177,7 @@ def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
         )
 
 
-# What a design promises, kept beside its records so that a report needs no design file.
+# Promises of a design, stored with its records so that a report needs no design file.
 
 
 FIGURES = {
@@ -196,8 +197,6 @@ TOLERANCES = {
 
 def promised(design: Design) -> Build:
     """The design with its predictions, tolerances and yield. Raises DesignError."""
-    from sbafab.rules.registration_yield import simulate
-
     laminate = laminate_of(design)
     share = simulate(laminate, limits(design)).whole
     registration = design.registration
@@ -219,8 +218,6 @@ def promised(design: Design) -> Build:
 
 def promised_assembly(assembled: Assembled) -> Build:
     """Return the promises of an assembly: it holds where every part holds. Raises DesignError."""
-    from sbafab.rules.registration_yield import simulate
-
     good, builds = 1.0, 0
     for part in assembled.designs:
         share = simulate(part.laminate, limits(part.design)).whole
@@ -255,8 +252,8 @@ def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[f
     """
     figures = {}
     if burst is not None:
-        rows = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
-        figures["burst_kpa"] = (burst, rows)
+        model_text = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
+        figures["burst_kpa"] = (burst, model_text)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
             if figure.name == name and figure.model.title.startswith(model):

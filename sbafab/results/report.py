@@ -1,4 +1,4 @@
-"""What a lab's records say together: success, measured against predicted, tolerances.
+"""Evaluation of a lab's records: success, measured against predicted, tolerances.
 
 Designs that build the same actuator (``Build.actuator``) count as one. An actuator that was mended
 and tested again counts by its first attempt.
@@ -16,6 +16,7 @@ from typing import Any, Literal, NamedTuple
 from sbafab.cutting.calibration import Value, student_t
 from sbafab.errors import DesignError
 from sbafab.results.records import ERRORS, NUMBERS, PASS, TOLERANCES, Build, Record
+from sbafab.results.store import rebuilt, yield_with
 from sbafab.rules.registration_yield import Share
 
 # Intervals of 95 % for what a few measurements say, by closed formulas.
@@ -464,8 +465,6 @@ def _bounds(group: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
 
 def _measured_yield(build: Build, bounds: Mapping[str, Most]) -> MeasuredYield | None:
     """The yield of a recorded design with measured errors for stated ones."""
-    from sbafab.results.store import rebuilt, yield_with
-
     design = rebuilt(build)
     if design is None:
         return None

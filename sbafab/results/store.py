@@ -16,17 +16,15 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from sbafab.actuators import build as laminate_of
 from sbafab.actuators import records
 from sbafab.design.files import ASSEMBLY, actuator_sha256, validated
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
+from sbafab.output.checked import limits
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
-
-if TYPE_CHECKING:
-    from sbafab.rules.registration_yield import Share
+from sbafab.rules.registration_yield import Share, simulate
 
 APPLICATION = 0x5BAFAB
 VERSION = 2
@@ -489,9 +487,6 @@ def yield_with(design: Design, errors: Mapping[str, float]) -> Share:
     ``errors``: the most by which placement (mm), turn (degrees) or cutting (mm) are off, by the
     name in Tolerances. Raises DesignError where the design cannot be built.
     """
-    from sbafab.output.checked import limits
-    from sbafab.rules.registration_yield import simulate
-
     stated = limits(design)
     bench = replace(
         stated,

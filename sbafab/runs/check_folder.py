@@ -38,6 +38,8 @@ from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.meshing.surface import Surface, open_edges
+from sbafab.models.figures import Asked, Factors
+from sbafab.models.prediction import predict
 from sbafab.nesting.records import NestPart, parts_of
 from sbafab.output.artefacts import (
     ARTEFACTS,
@@ -310,9 +312,6 @@ def _prediction_problems(
     """Return differences of the prediction from one for the same request."""
     if "predict.json" not in claims.files:
         return []
-    from sbafab.models.figures import Asked, Factors
-    from sbafab.models.prediction import predict
-
     try:
         request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
         measured = request.pocket_loss, request.modulus_mpa
