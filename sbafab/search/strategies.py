@@ -266,7 +266,7 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
 
 
 def _name(search: SearchSpace) -> str:
-    requirements = [free.said for free in search.wanted.requirements]
+    requirements = [requirement.said for requirement in search.wanted.requirements]
     keys = [f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}" for free in search.free]
     design = search.wanted.design
     return "; ".join(

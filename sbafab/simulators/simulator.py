@@ -1,4 +1,4 @@
-"""What any simulator is asked for and gives back, and where to find it."""
+"""The interface of a simulator, its requests and results, and the processes that run it."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ MOST_PRESSURE = 1000.0
 
 @dataclass(frozen=True)
 class Wish:
-    """What a simulator is asked for; None where its own default will do.
+    """Settings of a simulation; None where the simulator's default will do.
 
     ``pressure`` in kPa for every chamber that ``chambers`` does not name; ``minutes`` is the most
-    real time a run may take. Which of the rest counts is said by each simulator's ``USES``:
+    real time a run may take. Each simulator's ``USES`` names the others that it reads:
     ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber.
     """
 
@@ -48,16 +48,16 @@ class Wish:
 
     @property
     def given(self) -> list[str]:
-        """Names of the fields that not every simulator knows and that were said."""
+        """Names of the set fields that not every simulator reads."""
         names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
         return [name for name in names if getattr(self, name) not in (None, {})]
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run found: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
+    """Result of a run: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
 
-    ``stopped`` is one sentence if it ended early; what it found until then holds.
+    ``stopped`` is one sentence if it ended early; the results until then are valid.
     """
 
     rows: tuple[tuple[str, float, str], ...]
@@ -66,47 +66,49 @@ class Result:
 
 
 class Simulator(Protocol):
-    """The module ``simulator`` of a simulator's folder."""
+    """The module ``run`` of a simulator's folder."""
 
     USES: tuple[str, ...]
 
     def why_not(self, laminate: Laminate) -> str | None:
-        """The reason why there can be no input for a laminate, None if there can."""
+        """Return the reason why there can be no input for a laminate, or None."""
 
-    def export(self, laminate: Laminate, wish: Wish, folder: Path) -> None:
-        """Writes what the simulator reads, with all that it loads."""
+    def export(self, laminate: Laminate, request: Wish, folder: Path) -> None:
+        """Write the simulator's input, with all that it loads."""
 
-    def run(self, laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
-        """Writes it, runs it, and reads back what it found."""
+    def run(self, laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+        """Write the input, run it, and read the results back."""
 
 
 def simulator(name: Name) -> Simulator:
-    """The simulator of that name; what it imports is loaded only now."""
-    return cast(Simulator, import_module(f"sbafab.simulators.{name}.simulator"))
+    """Return the simulator of that name; its imports are loaded only now."""
+    return cast(Simulator, import_module(f"sbafab.simulators.{name}.run"))
 
 
 def users(field_name: str) -> list[str]:
-    """The simulators that use a field of a wish."""
+    """Return the simulators that use a field of a request."""
     return [name for name in NAMES if field_name in simulator(name).USES]
 
 
 def chamber_pressures(
-    names: Sequence[str], wish: Wish, usual: float, most: float = MOST_PRESSURE
+    names: Sequence[str], request: Wish, default: float, most: float = MOST_PRESSURE
 ) -> dict[str, float]:
-    """Pressure in kPa of every chamber: those named, and ``wish.pressure`` in the others.
+    """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 
-    With nothing said it is the ``usual`` one in all of them; with single ones only, 0 in the
-    others. Raises DesignError for a chamber that is not there and a pressure out of range.
+    Without any it is the ``default`` in all of them; with single ones only, 0 in the others. Raises
+    DesignError for a chamber that is not there and a pressure out of range.
     """
-    refuse_unknown(names, wish.chambers, "pressure")
-    in_all = (0.0 if wish.chambers else usual) if wish.pressure is None else wish.pressure
-    found = {name: wish.chambers.get(name, in_all) for name in names}
-    for name, value in found.items():
+    refuse_unknown(names, request.chambers, "pressure")
+    in_all = (
+        (0.0 if request.chambers else default) if request.pressure is None else request.pressure
+    )
+    pressures = {name: request.chambers.get(name, in_all) for name in names}
+    for name, value in pressures.items():
         if not (math.isfinite(value) and 0 <= value <= most):
             raise DesignError(f"pressure of {name} = {value:g} kPa must be from 0 to {most:g} kPa")
-    if not any(found.values()):
+    if not any(pressures.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
-    return found
+    return pressures
 
 
 def refuse_time(seconds: float, least: float) -> None:
@@ -117,17 +119,17 @@ def refuse_time(seconds: float, least: float) -> None:
         )
 
 
-def refuse_unknown(names: Sequence[str], given: Mapping[str, float], what: str) -> None:
+def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantity: str) -> None:
     """Raises DesignError for a chamber that is not there."""
-    unknown = next((name for name in given if name not in names), None)
+    unknown = next((name for name in requested if name not in names), None)
     if unknown is not None:
         raise DesignError(
-            f"{what} names chamber {unknown}, which is not there; "
+            f"{quantity} names chamber {unknown}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
 
 
-# Starting a program, watching it, and stopping it when it takes too long or is interrupted.
+# A program started, watched, and stopped after its time or on an interrupt.
 
 
 LOOK_EVERY = 0.1
@@ -139,7 +141,7 @@ OUT_OF_TIME = "it was stopped after"
 
 
 class Ended(NamedTuple):
-    """How a program ended: its exit code, and why it was stopped, None if it ended by itself."""
+    """End of a program: its exit code, and why it was stopped, None if it ended by itself."""
 
     code: int
     stopped: str | None
@@ -147,10 +149,10 @@ class Ended(NamedTuple):
 
 def program_path(name: str, install: str) -> str:
     """Path of an installed program. Raises OutputError that says how to ``install`` it."""
-    found = shutil.which(name)
-    if found is None:
+    path = shutil.which(name)
+    if path is None:
         raise OutputError(f"{name} was not found; {install}")
-    return found
+    return path
 
 
 def run_program(
@@ -159,10 +161,10 @@ def run_program(
     limit: float | None,
     look: Callable[[], None],
 ) -> Ended:
-    """Runs a command in the folder of its ``log``, which takes what it prints.
+    """Run a command in the folder of its ``log``, which takes what it prints.
 
     ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
-    stop the run, not the program that started it, so that what was reached can be kept. One
+    stop the run, not the program that started it, so that partial results can be kept. One
     thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError where it cannot be started.
     """
     began = time.monotonic()
@@ -216,7 +218,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             continue
 
 
-# Where the tip is and how it leans, from the nodes that mark it.
+# Place and lean of the tip, from the nodes that mark it.
 
 
 @dataclass(frozen=True)

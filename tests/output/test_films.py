@@ -23,7 +23,7 @@ from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.coarse.shell import actuator
 from sbafab.simulators.mujoco.model import model_text
-from sbafab.simulators.sofa.files import why_no_scene
+from sbafab.simulators.sofa.scenes import why_no_scene
 
 FILMS = """
 [films.tpu50]

@@ -15,8 +15,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError, OutputError
 from sbafab.simulators.mujoco.model import write_model
-from sbafab.simulators.mujoco.run import MujocoRun, run_model, simulate
-from sbafab.simulators.mujoco.simulator import USES, export, run, why_not
+from sbafab.simulators.mujoco.run import USES, MujocoRun, export, run, run_model, simulate, why_not
 from sbafab.simulators.simulator import Wish
 
 BALLOON = ("1dof-5mm", "stack.balloons=1")

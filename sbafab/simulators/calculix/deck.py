@@ -77,18 +77,18 @@ class DeckSettings:
 
 
 def deck_settings(
-    laminate: Laminate, wish: Wish | None = None, procedure: Procedure = "dynamic"
+    laminate: Laminate, request: Wish | None = None, procedure: Procedure = "dynamic"
 ) -> DeckSettings:
     """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
-    pressures = chamber_pressures(names, wish or Wish(), PAPER_PRESSURE)
+    pressures = chamber_pressures(names, request or Wish(), PAPER_PRESSURE)
     films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
     film = films.pop("TPE", TPE)
     return DeckSettings(pressures, procedure, film=film, others=films)
 
 
 def _elastic(film: Film) -> Elastic:
-    """What a film is like. Raises DesignError where its modulus is not known."""
+    """Return the film's elastic constants. Raises DesignError where its modulus is not known."""
     if film.elastic is None:
         raise DesignError(
             f"CalculiX needs Young's modulus of {film.material}; add "
@@ -131,7 +131,7 @@ FLAT = 1e-6
 
 
 def is_lone_balloon(mesh: Mesh) -> bool:
-    """Whether the mesh is of two films only: nothing but the bonded ring can hold them."""
+    """Return True if the mesh has two films only: nothing but the bonded ring can hold them."""
     return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
 
 
@@ -183,13 +183,13 @@ def _on_plane(mesh: Mesh, name: str) -> Iterator[str]:
     if min(abs(normal)) < FLAT:
         yield f"*BOUNDARY\n{name}, {1 if abs(normal[0]) > FLAT else 2}\n"
         return
-    held = np.empty(0, dtype=np.int64) if is_lone_balloon(mesh) else mesh.node_sets[BASE]
+    fixed = np.empty(0, dtype=np.int64) if is_lone_balloon(mesh) else mesh.node_sets[BASE]
     on_axis = nodes[np.hypot(*mesh.points[nodes, :2].T) < FLAT]
-    for node in np.setdiff1d(on_axis, held):
+    for node in np.setdiff1d(on_axis, fixed):
         yield f"*BOUNDARY\n{node + 1}, 1, 2\n"
     # The first term is the one that is eliminated: that of the larger factor.
     first, second = (1, 2) if abs(normal[0]) >= abs(normal[1]) else (2, 1)
-    for node in np.setdiff1d(nodes, np.concatenate([held, on_axis])):
+    for node in np.setdiff1d(nodes, np.concatenate([fixed, on_axis])):
         yield (
             f"*EQUATION\n2\n{node + 1}, {first}, {normal[first - 1]:.12g}, "
             f"{node + 1}, {second}, {normal[second - 1]:.12g}\n"
@@ -251,10 +251,10 @@ def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
 
 
 def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    asked = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
+    pressures = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
     yield "*HEADING\n"
     yield "Stacked balloon actuator; units mm, N, MPa, t, s\n"
-    yield f"** Pressures at the end: {asked}\n"
+    yield f"** Pressures at the end: {pressures}\n"
     yield f"*INCLUDE, INPUT={MESH_FILE}\n"
     yield from _cavity_faces(mesh)
     yield from _sections(mesh, settings)

@@ -54,8 +54,8 @@ class Frame:
         """Equivalent stress (n,) in MPa."""
         xx, yy, zz, xy, yz, zx = self.stress.T
         direct = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
-        found: NDArray[np.float64] = np.sqrt(direct / 2 + 3 * (xy**2 + yz**2 + zx**2))
-        return found
+        equivalent: NDArray[np.float64] = np.sqrt(direct / 2 + 3 * (xy**2 + yz**2 + zx**2))
+        return equivalent
 
 
 def read_frd(path: Path, nodes: int, whole: bool = True) -> list[Frame]:
@@ -120,14 +120,14 @@ def _blocks(
 
 def read_sta(path: Path) -> list[float]:
     """Times in s at which a run has converged so far; a line being written is left out."""
-    found = []
+    times = []
     lines = path.read_text(encoding="ascii", errors="replace").split("\n") if path.is_file() else []
     for line in lines[2:-1]:
         fields = line.split()
         # A number of attempts with U behind it is of an increment that did not converge.
         if len(fields) == 7 and fields[2].isdigit():
-            found.append(float(fields[4]))
-    return found
+            times.append(float(fields[4]))
+    return times
 
 
 # What a run found: stroke, air and wall stress against pressure.
@@ -202,7 +202,7 @@ def history(
 
 
 def _work(before: State, pressures: Mapping[str, float], volumes: Mapping[str, float]) -> float:
-    """What the air has done since a state, in uJ (kPa x ul)."""
+    """Return the work of the air since a state, in uJ (kPa x ul)."""
     return sum(
         (before.pressures[name] + pressures[name]) / 2 * (volumes[name] - before.volumes[name])
         for name in volumes
@@ -212,13 +212,13 @@ def _work(before: State, pressures: Mapping[str, float], volumes: Mapping[str, f
 def _poles(mesh: Mesh, laminate: Laminate, name: str) -> NDArray[np.int64]:
     """The node of a set nearest to each stack's axis, if that lies in the mesh."""
     nodes = mesh.node_sets[name]
-    found = []
+    nearest = []
     for chamber in laminate.chambers:
         for x, y in chamber.centres:
             apart = np.hypot(mesh.points[nodes, 0] - x, mesh.points[nodes, 1] - y)
             if apart.min() <= NEAR:
-                found.append(nodes[apart.argmin()])
-    return np.array(found) if found else nodes
+                nearest.append(nodes[apart.argmin()])
+    return np.array(nearest) if nearest else nodes
 
 
 def _tilt(before: NDArray[np.float64], after: NDArray[np.float64]) -> float | None:
@@ -238,7 +238,7 @@ def _walls(mesh: Mesh, chamber: str) -> NDArray[np.int64]:
 
 
 def _volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
-    """What triangles enclose, in mm3; sides that are open must be upright (symmetry planes)."""
+    """Return the volume within triangles in mm3; open sides must be upright (symmetry planes)."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)[:, 2]
     return float(np.sum(across * (a + b + c)[:, 2]) / 6)
@@ -251,8 +251,8 @@ def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
         return 1.0
     (centres,) = (c.centres for c in laminate.chambers if c.name == chamber)
     discs = [disc(centre, NEAR) for centre in centres]
-    meshed = sum((one & part.region).area for one in discs)
-    return meshed / sum(one.area for one in discs) or 1.0
+    meshed = sum((circle & part.region).area for circle in discs)
+    return meshed / sum(circle.area for circle in discs) or 1.0
 
 
 def history_csv(states: Sequence[State]) -> str:
@@ -281,12 +281,12 @@ def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
     To see the undeformed one, warp by the displacement with a factor of -1.
     """
     # VTK's order of a symmetric tensor is that of CalculiX.
-    found = {
+    fields = {
         "displacement": frame.displacement,
         "von_mises": frame.von_mises,
         "stress": frame.stress,
     }
-    write_fields(path, mesh.kind, mesh.points + frame.displacement, mesh.cells, found, {})
+    write_fields(path, mesh.kind, mesh.points + frame.displacement, mesh.cells, fields, {})
 
 
 # A picture of the deformed actuator, coloured by its stress (Pillow).
@@ -356,13 +356,13 @@ def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> N
     width, height = SIZE
     draw_length_bar(draw, width - MARGIN, height - 40, width / 4, pixels_per_mm, font)
     draw.text((MARGIN, height - 100), caption, fill=INK, font=font)
-    left, right, top = MARGIN, MARGIN + 400, height - 64
-    for x, colour in enumerate(_coloured(np.linspace(0, 1, right - left)).round().astype(int)):
-        draw.line((left + x, top, left + x, top + 18), fill=tuple(colour.tolist()))
+    start, end, top = MARGIN, MARGIN + 400, height - 64
+    for x, colour in enumerate(_coloured(np.linspace(0, 1, end - start)).round().astype(int)):
+        draw.line((start + x, top, start + x, top + 18), fill=tuple(colour.tolist()))
     for part in (0.0, 0.5, 1.0):
-        at = left + part * (right - left)
+        at = start + part * (end - start)
         draw.text((at, top + 24), f"{part * most:.3g}", fill=INK, font=font, anchor="ma")
-    draw.text((right + 20, top - 3), "von Mises stress, MPa", fill=INK, font=font)
+    draw.text((end + 20, top - 3), "von Mises stress, MPa", fill=INK, font=font)
 
 
 # Stroke, air and wall stress against pressure as one SVG, for screen and print.
@@ -373,8 +373,8 @@ def history_svg(title: str, states: Sequence[State]) -> str:
     last = states[-1]
     fullest = max(last.pressures, key=lambda name: last.pressures[name])
     x = [state.pressures[fullest] for state in states]
-    alike = len(set(last.pressures.values())) == 1
-    x_label = "pressure, kPa" if alike else f"pressure in {fullest}, kPa"
+    is_even = len(set(last.pressures.values())) == 1
+    x_label = "pressure, kPa" if is_even else f"pressure in {fullest}, kPa"
     several = len(last.volumes) > 1
 
     def curve(label: str, values: Sequence[float]) -> ChartCurve:

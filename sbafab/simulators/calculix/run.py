@@ -1,4 +1,4 @@
-"""Running ``ccx``: to which load it came, and what stopped it."""
+"""CalculiX: the run of a deck, its results in one folder, and the interface of a simulator."""
 
 from __future__ import annotations
 
@@ -6,15 +6,22 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
-from sbafab.errors import OutputError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import volume_mesh
-from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, layup
+from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, images, layup
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.process import Progress
-from sbafab.simulators.calculix.deck import JOB, DeckSettings, started, write_deck
+from sbafab.simulators.calculix.deck import (
+    JOB,
+    DeckSettings,
+    Procedure,
+    deck_settings,
+    started,
+    write_deck,
+)
 from sbafab.simulators.calculix.results import (
     SAME_TIME,
     Frame,
@@ -27,14 +34,21 @@ from sbafab.simulators.calculix.results import (
     read_sta,
     write_deformed,
 )
-from sbafab.simulators.simulator import INTERRUPTED, OUT_OF_TIME, program_path, run_program
+from sbafab.simulators.simulator import (
+    INTERRUPTED,
+    OUT_OF_TIME,
+    Result,
+    Wish,
+    program_path,
+    run_program,
+)
 
 LOG = "ccx.log"
 DIVERGED = "its iterations no longer converge, however small the step"
 
 
 class Ending(NamedTuple):
-    """How a run ended: the last converged time in s, and what stopped it, None if nothing did."""
+    """End of a run: the last converged time in s, and what stopped it, None if nothing did."""
 
     time: float
     stopped: str | None
@@ -74,7 +88,7 @@ def _reached(sta: Path) -> float:
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> str | None:
-    """What went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
+    """Return what went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
 
     A step that diverges and is tried again with less is no failure.
     """
@@ -89,7 +103,7 @@ def _complaint(log: Path, code: int, is_there: bool) -> str | None:
     return f"it ended with code {code} and without a word"
 
 
-# A whole run: mesh, deck, ccx, and what it found, in one folder.
+# A whole run in one folder: mesh, deck, ccx and results.
 
 
 HISTORY = "history.csv"
@@ -157,10 +171,10 @@ def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
 
 
 def _stopped(ending: Ending, states: Sequence[State], settings: DeckSettings) -> str:
-    kept = states[-1]
+    last = states[-1]
     return (
         f"ccx stopped at {_place(ending.time, settings)}: {ending.stopped}; results up to "
-        f"{max(kept.pressures.values()):.3g} kPa are kept; {_advice(ending, settings)}"
+        f"{max(last.pressures.values()):.3g} kPa are kept; {_advice(ending, settings)}"
     )
 
 
@@ -207,3 +221,51 @@ def _tidy(folder: Path) -> None:
     of_ccx = [path for path in folder.glob(f"{JOB}.*") if path.suffix not in KEPT]
     for path in (*of_ccx, folder / "spooles.out", folder / LOG):
         path.unlink(missing_ok=True)
+
+
+# The interface of a simulator.
+
+
+USES = ("h", "symmetry", "procedure")
+
+
+def why_not(laminate: Laminate) -> str | None:
+    """Every laminate can be meshed."""
+    return None
+
+
+def export(laminate: Laminate, request: Wish, folder: Path) -> None:
+    """Write the deck, and the mesh that it includes."""
+    mesh, settings = _settings(laminate, request)
+    write_deck(deck_mesh(laminate, mesh), settings, folder)
+
+
+def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+    """Run the deck; the folder holds deck, results, table and pictures."""
+    mesh, settings = _settings(laminate, request)
+    history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, tell)
+    last = history.states[-1]
+    rows = [(name, value, "kPa") for name, value in last.pressures.items()]
+    rows += [("stroke", last.stroke, "mm")]
+    rows += [("tilt", last.tilt, "degrees")] if last.tilt is not None else []
+    rows += [(f"air in {name}", value, "ul") for name, value in last.volumes.items()]
+    rows += [("von Mises stress, at most", last.stress, "MPa")]
+    figures = {"states": [state.as_dict() for state in history.states]}
+    return Result(tuple(rows), figures, history.stopped)
+
+
+def _settings(laminate: Laminate, request: Wish) -> tuple[MeshSettings, DeckSettings]:
+    defaults = MeshSettings()
+    mesh = MeshSettings(
+        h=defaults.h if request.h is None else request.h,
+        symmetry=cast(Symmetry, request.symmetry or defaults.symmetry),
+        wrapped=False,
+    )
+    settings = deck_settings(laminate, request, cast(Procedure, request.procedure or "dynamic"))
+    for name, meshed in images(laminate, mesh.symmetry).items():
+        if settings.pressures[name] != settings.pressures[meshed]:
+            raise DesignError(
+                f"symmetry {mesh.symmetry} computes {meshed} in place of {name}: give both one "
+                "pressure, or take symmetry full"
+            )
+    return mesh, settings

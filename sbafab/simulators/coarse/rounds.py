@@ -1,4 +1,4 @@
-"""What the coarse mesh needs of a laminate: round pockets on their axes, read off its profiles."""
+"""Round pockets on their axes, read off a laminate's profiles, for the coarse mesh."""
 
 from __future__ import annotations
 

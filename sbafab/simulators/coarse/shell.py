@@ -176,7 +176,7 @@ class Web:
         lumen: Sequence[int],
     ) -> list[Triangle]:
         """The web's triangles, counter-clockwise from above, from the nodes of all its edges."""
-        found: list[Triangle] = []
+        triangles: list[Triangle] = []
         for k in range(self.lobes):
             for side in (1, -1):
 
@@ -193,8 +193,8 @@ class Web:
                 for a, b, c in self.half:
                     corners = (node(a), node(b), node(c))
                     # A mirrored triangle begins with the mirrored edge.
-                    found.append(corners if side > 0 else (corners[1], corners[0], corners[2]))
-        return found
+                    triangles.append(corners if side > 0 else (corners[1], corners[0], corners[2]))
+        return triangles
 
 
 @cache
@@ -223,7 +223,7 @@ def web_of(lobes: int, radii: tuple[float, float, float, float, float], sectors:
 
 
 def _junction(axis: float, rim: float, hub: float, half: float) -> float:
-    """Where the outline crosses the middle between two lobes: on the hub, or where lobes meet."""
+    """Return the outline's point midway between two lobes: on the hub, or where they meet."""
     apart = axis * math.sin(half)
     return hub if apart >= rim else max(hub, axis * math.cos(half) + math.sqrt(rim**2 - apart**2))
 
@@ -235,13 +235,13 @@ def _triangulated(places: dict[WebNode, Point]) -> tuple[tuple[WebNode, WebNode,
     # Corners meant to lie on the axis of symmetry must do so for the triangulation.
     names = {(round(x, 9), round(y, 9)): place for place, (x, y) in places.items()}
     polygon = shapely.Polygon(list(names))
-    found = []
+    triangles = []
     for triangle in shapely.constrained_delaunay_triangles(polygon).geoms:
         a, b, c = (names[x, y] for x, y in list(triangle.exterior.coords)[:3])
         corners = (a, b, c) if triangle.exterior.is_ccw else (a, c, b)
         first = corners.index(min(corners))
-        found.append((corners[first], corners[first - 2], corners[first - 1]))
-    return tuple(sorted(found))
+        triangles.append((corners[first], corners[first - 2], corners[first - 1]))
+    return tuple(sorted(triangles))
 
 
 # The coarse shell of a whole actuator: mid-surfaces that share the nodes of what is bonded.
@@ -298,7 +298,7 @@ class CoarseMesh:
         return max(z for _, _, z in self.position)
 
     def volume(self, chamber: str) -> float:
-        """What the chamber's cavity holds at the start."""
+        """Volume of the chamber's cavity at the start."""
         return enclosed(self.position, dict(self.cavities)[chamber])
 
     def mass(self, thickness: float, density: float) -> float:
@@ -586,9 +586,9 @@ class CoarseActuator:
         """Mean pocket radius over that of the 5 mm pocket that was measured."""
         return sum(self.stack.pockets) / self.balloons / 2.5
 
-    def volumes(self, given: Mapping[str, float] | None, usual: float) -> dict[str, float]:
-        """What every chamber is given, in ul. Raises DesignError for unknown chambers."""
-        return checked(self.stack.chambers, given, usual, "volume", "ul")
+    def volumes(self, requested: Mapping[str, float] | None, default: float) -> dict[str, float]:
+        """Return the air of every chamber, in ul. Raises DesignError for unknown chambers."""
+        return checked(self.stack.chambers, requested, default, "volume", "ul")
 
 
 def actuator(
@@ -604,24 +604,25 @@ def actuator(
     unknown.
     """
     stack = round_stack(laminate)
-    told = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
-    return CoarseActuator(stack, tuple(told.items()), sectors, start)
+    by_chamber = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
+    return CoarseActuator(stack, tuple(by_chamber.items()), sectors, start)
 
 
 def checked(
     chambers: tuple[str, ...],
-    given: Mapping[str, float] | None,
-    usual: float,
-    what: str,
+    requested: Mapping[str, float] | None,
+    default: float,
+    quantity: str,
     unit: str,
 ) -> dict[str, float]:
-    """What each chamber is told: the usual, or what is given and 0 for the rest."""
-    if given is None:
-        return dict.fromkeys(chambers, usual)
-    refuse_unknown(chambers, given, what)
-    for name, value in given.items():
+    """Return a value for every chamber: the default, or what is requested and 0 for the rest."""
+    if requested is None:
+        return dict.fromkeys(chambers, default)
+    refuse_unknown(chambers, requested, quantity)
+    for name, value in requested.items():
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(
-                f"{what} of {name} = {value:g} {unit} must be 0 or more; vacuum has not been tried"
+                f"{quantity} of {name} = {value:g} {unit} must be 0 or more; vacuum has not "
+                "been tried"
             )
-    return {name: float(given.get(name, 0.0)) for name in chambers}
+    return {name: float(requested.get(name, 0.0)) for name in chambers}

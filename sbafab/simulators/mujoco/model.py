@@ -52,7 +52,7 @@ def model_text(actuator: CoarseActuator) -> str:
     return f'<?xml version="1.0"?>\n<!--\n{_note(actuator)}\n-->\n{body}\n'
 
 
-def held(actuator: CoarseActuator) -> frozenset[int]:
+def fixed_nodes(actuator: CoarseActuator) -> frozenset[int]:
     """Nodes that stand still: the base; of a lone balloon its centre, so that it bulges both ways.
 
     That is how the CalculiX deck holds them.
@@ -62,7 +62,7 @@ def held(actuator: CoarseActuator) -> frozenset[int]:
 
 
 def _add_nodes(world: ET.Element, actuator: CoarseActuator) -> None:
-    still = held(actuator)
+    still = fixed_nodes(actuator)
     masses = _masses(actuator)
     for node, place in enumerate(actuator.mesh.rest):
         body = ET.SubElement(world, "body", {"name": f"n{node}", "pos": _numbers(place)})
@@ -108,7 +108,7 @@ def _add_films(deformable: ET.Element, actuator: CoarseActuator) -> None:
 
 
 def _add_start(keyframe: ET.Element, actuator: CoarseActuator) -> None:
-    still = held(actuator)
+    still = fixed_nodes(actuator)
     mesh = actuator.mesh
     moved = (
         q - p
@@ -199,10 +199,10 @@ def write_model(
     ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere; ``sectors`` nodes
     make a ring. Raises DesignError where the pockets are not round or a chamber is unknown.
     """
-    made = actuator(laminate, pressures, sectors)
+    coarse = actuator(laminate, pressures, sectors)
     texts = {
-        MODEL: model_text(made),
-        DATA: json.dumps(_data(made), separators=(",", ":")) + "\n",
+        MODEL: model_text(coarse),
+        DATA: json.dumps(_data(coarse), separators=(",", ":")) + "\n",
         PYTHON: files("sbafab.simulators.mujoco").joinpath("inflate.py.txt").read_text("utf-8"),
     }
     folder.mkdir(parents=True, exist_ok=True)
@@ -211,14 +211,14 @@ def write_model(
     return [folder / name for name in texts]
 
 
-def _data(made: CoarseActuator) -> dict[str, object]:
-    mesh = made.mesh
+def _data(coarse: CoarseActuator) -> dict[str, object]:
+    mesh = coarse.mesh
     return {
         "schema": "sbafab/mujoco@1",
-        "name": made.stack.name,
+        "name": coarse.stack.name,
         "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
         "start": START,
-        "pressures": dict(made.pressures),
+        "pressures": dict(coarse.pressures),
         "cavities": dict(mesh.cavities),
         "tip": mesh.tip,
         "roots": mesh.roots,

@@ -1,16 +1,32 @@
-"""SOFA's XML scenes: a tree of nodes and components, written with the plugins that it needs."""
+"""The four scenes of SOFA as text, and the files of a design."""
 
 from __future__ import annotations
 
+import json
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
 
+from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
+from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
+from sbafab.simulators.coarse.rounds import elastic_of, why_not_round
 from sbafab.simulators.coarse.shell import CoarseActuator, CoarseMesh, Triangle, standing
-from sbafab.simulators.sofa.shell import FilmGroup, Shell, film_groups, nearly_flat, round_shell
+from sbafab.simulators.sofa.shell import (
+    COARSE_SECTORS,
+    FilmGroup,
+    Shell,
+    conforming_shell,
+    film_groups,
+    half_full,
+    nearly_flat,
+    round_actuator,
+    round_shell,
+)
 
 Attribute = str | float | int | Sequence[float] | Sequence[Sequence[float]]
 
@@ -186,7 +202,7 @@ def add_tip(node: ET.Element, nodes: Sequence[int]) -> None:
     )
 
 
-# What stands at the top of every scene: what it is, what is scaled, fitted or artificial.
+# The comment at the top of every scene: contents, and what is scaled, fitted or artificial.
 
 
 UNITS = "Units: mm, kg, s; so force mN, pressure and modulus kPa, volume ul."
@@ -338,7 +354,7 @@ def volume_scene(actuator: CoarseActuator, volumes: Mapping[str, float] | None =
     ``volumes`` by chamber, 0 for those left out. Raises DesignError for an unknown chamber.
     """
     usual = float(f"{VOLUME * actuator.balloons / 15 * actuator.size**3:.3g}")
-    told = actuator.volumes(volumes, usual)
+    requested = actuator.volumes(volumes, usual)
     shell = round_shell(actuator)
     root = root_node(DT)
     add(root, "FreeMotionAnimationLoop")
@@ -370,7 +386,7 @@ def volume_scene(actuator: CoarseActuator, volumes: Mapping[str, float] | None =
             template="Vec3",
             triangles="@c.triangles",
             valueType="volumeGrowth",
-            value=told[name],
+            value=requested[name],
         )
     add_tip(node, shell.tip)
     return document(root, volume_note(shell, DT, usual, VOLUME_PRESSURE))
@@ -587,3 +603,88 @@ def prism(
                 triangles += [(a, b, a + 4), (b, b + 4, a + 4)]
     top = 4 * (frames - 1)
     return points, [*triangles, (top, top + 1, top + 2), (top, top + 2, top + 3)]
+
+
+# The scenes of a design as files.
+
+
+SHELL_FILE, FRAMES_FILE, VOLUME_FILE, BEAM_FILE = (
+    "actuator.scn",
+    "actuator_frames.scn",
+    "actuator_volume.scn",
+    "actuator_beam.scn",
+)
+DATA, PYTHON = "actuator.json", "scene.py"
+LEAST_LOBES = 3
+"""A beam of fewer chambers bends by none, or one way only."""
+
+
+def why_no_scene(laminate: Laminate) -> str | None:
+    """The reason why no scene can be written for a laminate, or None."""
+    try:
+        for layer in laminate.tpe_layers:
+            elastic_of(layer.film)
+    except DesignError as reason:
+        return str(reason)
+    return None
+
+
+def write_scenes(
+    laminate: Laminate,
+    folder: Path,
+    pressures: Mapping[str, float] | None = None,
+    volumes: Mapping[str, float] | None = None,
+) -> list[Path]:
+    """Writes the scenes of a laminate with all that they load; the files, the default one first.
+
+    ``pressures`` in kPa and ``volumes`` (scene C, above its start) in ul, by chamber; chambers
+    left out get 0. By default 5 kPa and some 80 ul in every chamber. Scenes B and C are for round
+    pockets of one film, scene D for three chambers of them or more. Raises DesignError where a
+    chamber is unknown, and for other pockets where the mesher is not installed.
+    """
+    texts = {}
+    if why_not_round(laminate) is None:
+        shell = round_shell(round_actuator(laminate, pressures))
+        frames = round_actuator(laminate, pressures, COARSE_SECTORS, FRAMES_START)
+        volume = round_actuator(laminate, pressures, COARSE_SECTORS, half_full)
+        texts = {SHELL_FILE: shell_scene(shell), FRAMES_FILE: frames_scene(frames)}
+        texts[VOLUME_FILE] = volume_scene(volume, volumes)
+        if frames.stack.lobes >= LEAST_LOBES:
+            texts[BEAM_FILE] = beam_scene(frames)
+    else:
+        shell = conforming_shell(laminate, pressures)
+        texts = {SHELL_FILE: shell_scene(shell)}
+    texts[DATA] = json.dumps(_data(shell), separators=(",", ":")) + "\n"
+    texts[PYTHON] = files("sbafab.simulators.sofa").joinpath("scene.py.txt").read_text("utf-8")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8", newline="\n")
+    return [folder / name for name in texts]
+
+
+def _data(shell: Shell) -> dict[str, object]:
+    highest = max(shell.pressures.values())
+    return {
+        "schema": "sbafab/sofa@1",
+        "name": shell.name,
+        "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
+        "position": shell.position,
+        "rest_position": shell.rest,
+        "membranes": [_group(group) for group in shell.membranes],
+        "bending": [_group(group) for group in shell.bending],
+        "cavities": dict(shell.cavities),
+        "pressures": dict(shell.pressures),
+        "fixed": shell.fixed,
+        "tip": shell.tip,
+        "true_mass": float(f"{shell.mass:.4g}"),
+        "nodal_mass_by_dt2": round(nodal_stiffness(highest, shell.size), 4),
+    }
+
+
+def _group(group: FilmGroup) -> dict[str, object]:
+    return {
+        "name": group.name,
+        "stiffness": float(f"{group.stiffness:.6g}"),
+        "poisson": group.poisson,
+        "triangles": group.triangles,
+    }
