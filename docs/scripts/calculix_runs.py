@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import sbafab
-from docs.scripts.measured import Record, Table, keep, record
+from docs.scripts.measured import Record, keep, record
+from docs.scripts.tables import Table
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.axisymmetric import axisymmetric_strokes

@@ -135,10 +135,10 @@ def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
 
 
 def _counts(found: Assembly, assembled: Assembled) -> Iterator[tuple[str, str, str]]:
-    actuators = [part for part in found.parts.values() if part.kind == "sba"]
-    yield "parts", str(len(found.parts)), ""
-    yield "actuators", str(len(actuators)), ""
-    yield "designs", str(len(assembled.designs)), ""
+    actuators = sum(part.kind == "sba" for part in found.parts.values())
+    counts = {"part": len(found.parts), "actuator": actuators, "design": len(assembled.designs)}
+    for name, count in counts.items():
+        yield (name if count == 1 else f"{name}s"), str(count), ""
 
 
 def _first_sentence(text: str) -> str:

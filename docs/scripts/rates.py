@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from docs.scripts.measured import Record, Table
+    from docs.scripts.measured import Record
+    from docs.scripts.tables import Table
 
 
 def statistic(table: Table) -> str:

@@ -17,7 +17,8 @@ from pathlib import Path
 from unittest import mock
 
 import sbafab
-from docs.scripts.measured import Record, Table, keep
+from docs.scripts.measured import Record, keep
+from docs.scripts.tables import Table
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.simulators.coarse.shell import CoarseActuator
 from sbafab.simulators.sofa import scenes as scene_files

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from docs.scripts import measured, tables
-from docs.scripts.measured import BLOCK, FOLDER, HOW, Table, filled, record
+from docs.scripts.measured import BLOCK, FOLDER, HOW, filled, record
 from docs.scripts.rates import WORDS
-from docs.scripts.tables import SUMMARIES
+from docs.scripts.tables import SUMMARIES, Table
 from sbafab.cli import COMMANDS
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT
