@@ -227,7 +227,7 @@ TABS_HINT = (
 
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """Return a result as JSON."""
-    from sbafab.cli.formats import FIND_SCHEMA
+    from sbafab.output.schema_ids import FIND_SCHEMA
 
     def trial_json(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}
