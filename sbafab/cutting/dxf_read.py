@@ -1,4 +1,4 @@
-"""What the entities of a cut file draw, from their numbers: contours and edges, exact."""
+"""Cut files read back: entities, appearance, this program's form or ezdxf's, exact contours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kerf: moving the cut half its width into the waste, so that the part keeps its size."""
+"""Kerf and chords: cuts moved into the waste by half their width, arcs drawn as safe chords."""
 
 from __future__ import annotations
 

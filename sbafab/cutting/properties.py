@@ -1,4 +1,4 @@
-"""The custom properties that every cut file carries: what it is of, and how it was cut."""
+"""Layers, colours, names and custom properties of cut files, and how they draw arcs."""
 
 from __future__ import annotations
 

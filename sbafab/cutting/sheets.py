@@ -1,4 +1,4 @@
-"""Film sheets: the parts of a nest as one cut file a sheet, with a picture beside it."""
+"""Film sheets: parts of a nest as one cut file a sheet, with label, cutting time and picture."""
 
 from __future__ import annotations
 

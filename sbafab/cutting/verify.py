@@ -1,4 +1,4 @@
-"""Every cut file is read back and compared with the profile it was written from."""
+"""Verification: every cut file is read back and compared with the profile it was written from."""
 
 from __future__ import annotations
 

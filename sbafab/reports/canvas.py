@@ -1,6 +1,4 @@
-"""Raster pictures: a canvas of few flat colours, a depth buffer for surfaces, a length bar
-(Pillow).
-"""
+"""Raster pictures: a canvas of flat colours, a depth buffer for surfaces, a length bar (Pillow)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engineering drawing in SVG is made of: text, lines, arrows, dimensions, leaders.
+"""Engineering drawings in SVG: text, lines, arrows and leaders, and the dimensions of a profile.
 
 Every function returns SVG elements. Coordinates are millimetres on the page, y down.
 """

@@ -1,4 +1,4 @@
-"""An inflated actuator as surfaces: films between the plates of a pose of the elastic stack.
+"""Inflated actuators as surfaces, from poses of the elastic stack; parts of an assembly as solids.
 
 Each balloon is two films turned round its chamber's axis on the plane midway between two plates,
 and set up to the plates, which may lean; its meridian is that of the balloon between plates as far

@@ -1,4 +1,4 @@
-"""Pictures of an inflated actuator: PNG, animated GIF or WebP, and GLB for viewers."""
+"""Pictures of an inflated or flat actuator: PNG, animated GIF or WebP, and GLB for viewers."""
 
 from __future__ import annotations
 
