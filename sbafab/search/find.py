@@ -34,7 +34,14 @@ from sbafab.process import Progress, unheard
 from sbafab.rules.finding import Place
 from sbafab.search.page import front
 from sbafab.search.quantities import Subject, refuse_unknown_key, shown_value
-from sbafab.search.strategies import explore, neighbours, refine, try_every_design, widen_ranges
+from sbafab.search.strategies import (
+    explore,
+    neighbours,
+    refine,
+    try_every_design,
+    widen_ranges,
+    with_optuna,
+)
 from sbafab.search.trial import (
     Goal,
     GridPoint,
@@ -204,8 +211,6 @@ def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
     problem = SearchProblem(request.design, request.requirements, request.goal)
     space = SearchSpace(problem, free_keys(request), request.tries, tell)
     if request.optuna:
-        from sbafab.search.strategies import with_optuna
-
         with_optuna(space, request.storage)
     elif space.size <= request.tries:
         try_every_design(space)

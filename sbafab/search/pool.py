@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.process import processors
-from sbafab.search.measure import SweepRow
+from sbafab.search.measure import SweepRow, fingerprint
 
 AHEAD = 3
 """Jobs a worker is handed before it has done the first."""
@@ -122,8 +122,6 @@ def _row(future: Future[SweepRow]) -> SweepRow:
         message = " ".join(str(error).split())[:300]
         row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}", "seconds": 0.0}
     if row["outcome"] == "unlike":
-        from sbafab.search.measure import fingerprint
-
         raise OutputError(
             f"a worker runs sbafab {row['reason']} and this is {fingerprint()}; install the same "
             "version there"

@@ -249,6 +249,7 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
     """Answers (number, job) with (number, JSON) until the pipe closes."""
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # In the worker alone: the server need not load what its jobs use.
     from sbafab.studio.jobs import SupersededError, answers
 
     if warm:

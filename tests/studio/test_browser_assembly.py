@@ -201,8 +201,8 @@ def test_an_assembly_moves_and_says_how_it_grips(brace: Watched) -> None:
     assert f"{pose.bend:.1f}°" in readings[1]
     assert share_changed(before, picture(brace, "#view-swing .surface")) > 0.02
     trust = page.locator("#view-swing .trust").inner_text()
-    assert "no calibration" in trust
-    assert "Contact between parts is not felt here" in trust
+    assert "not calibrated" in trust
+    assert "Contact between parts is ignored here" in trust
     # Emptied, the grip is as wide as its films.
     page.get_by_role("button", name="Vent").locator("visible=true").click()
     brace.until("document.querySelector('#view-swing').textContent.includes('15.33 mm')")

@@ -123,8 +123,8 @@ def round_shell(coarse: CoarseActuator) -> Shell:
         size=max(coarse.stack.pockets) / 2.5,
         about=(
             f"{len(mesh.rest)} nodes, {triangles} triangles; rings of {coarse.sectors} corners "
-            f"have the area of\nthe circles. It starts {mesh.height:.4g} mm high ({balloon_ul:.3g} ul "
-            "a balloon). Inlet tabs and strips are left out."
+            f"have the area of\nthe circles. It starts {mesh.height:.4g} mm high "
+            f"({balloon_ul:.3g} ul a balloon). Inlet tabs and strips are left out."
         ),
     )
 
