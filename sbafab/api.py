@@ -383,11 +383,11 @@ def simulate(
     OutputError.
     """
     from sbafab.runs.run import simulate as run
-    from sbafab.simulators.simulator import Wish
+    from sbafab.simulators.simulator import SimulationRequest
 
-    wish, tables = parted(options, Wish)
+    wish, tables = parted(options, SimulationRequest)
     design = load(source, *changes, **tables)
-    return run(design, simulator, Wish(**wish), Path(out), export=export)
+    return run(design, simulator, SimulationRequest(**wish), Path(out), export=export)
 
 
 # Measurements of a lab: the kerf of its laser, results of its actuators.
@@ -472,11 +472,13 @@ def predict(
     model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
     in balance.
     """
-    from sbafab.models.figures import Asked, Factors
+    from sbafab.models.figures import Factors, PredictionRequest
     from sbafab.models.prediction import predict as model_predict
 
     factors, tables = parted(options, Factors)
-    wish = Asked(tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors))
+    wish = PredictionRequest(
+        tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors)
+    )
     return model_predict(load(source, *changes, **tables), wish, laminate, quick)
 
 

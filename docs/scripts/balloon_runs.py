@@ -23,7 +23,7 @@ from sbafab.actuators import load_design
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
-from sbafab.models.rippled import resolved, rippled, risen
+from sbafab.models.rippled import free_shapes, resolves_waves, rippled
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.calculix.run import simulate
@@ -115,10 +115,10 @@ CASES = (
 def elastic(case: Case) -> Found:
     """What the elastic balloon says."""
     one = case.balloon
-    if case.waves and resolved(one):
+    if case.waves and resolves_waves(one):
         found = rippled(one, case.pressures, case.waves).shapes
     else:
-        found = risen(one, case.pressures)
+        found = free_shapes(one, case.pressures)
     return found.height, found.volume
 
 

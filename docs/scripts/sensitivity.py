@@ -18,7 +18,7 @@ from sbafab.models import paper
 from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import bent, blocked
+from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack
 from sbafab.reproduction.rows import FITTED
@@ -117,7 +117,7 @@ def _wider(found: Stack, by: float) -> Stack:
 
 def _straight(found: Stack, full: float) -> list[float]:
     strokes = np.array(paper.HEIGHTS) * (full - found.flat_height)
-    force = found.chambers * blocked(found, paper.FORCE_KPA, strokes)
+    force = found.chambers * blocked_force(found, paper.FORCE_KPA, strokes)
     return [float(value) for value in force]
 
 
@@ -125,7 +125,7 @@ def _bent(found: Stack, one: Variant) -> Iterator[float]:
     rest = paper.FORCE_KPA if one.all_push else 0.0
     pressed = [paper.FORCE_KPA] * one.pushing + [rest] * (found.chambers - one.pushing)
     for angle, _ in paper.FORCE_BENT:
-        pose = bent(found, one.pushing, angle)
+        pose = pose_bent_by(found, one.pushing, angle)
         yield math.nan if pose is None else _held(found, pose, pressed, one.sticks)
 
 

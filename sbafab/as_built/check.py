@@ -17,7 +17,7 @@ from sbafab.as_built.claims import (
     property_problems,
 )
 from sbafab.as_built.cut_files import CutPart, LayerFile, path_in_folder, read_layers
-from sbafab.as_built.expected import Meant, RunWork, departure, expected_laminate
+from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, departure, expected_laminate
 from sbafab.as_built.kerf_removed import chords_for_arc
 from sbafab.as_built.measures import (
     batch_problems,
@@ -77,7 +77,7 @@ class AsBuiltFolder:
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
-    expected: Meant | None
+    expected: ExpectedLaminate | None
     design_findings: tuple[Finding, ...] | None = None
     """The findings of the design check of a run that has just written the folder."""
     measured: tuple[Finding, ...] = ()
@@ -113,7 +113,7 @@ class FolderReadBack:
         return (*self.findings, *findings_of(DESIGNED, [*problems], AS_DESIGNED))
 
 
-def read_back(folder: Path, works: Mapping[str, RunWork] | None = None) -> FolderReadBack:
+def read_back(folder: Path, works: Mapping[str, WrittenDesign] | None = None) -> FolderReadBack:
     """Read an output folder, of one design or several, as it lies on the disk.
 
     ``works``: the designs of a run that has just written the folder, by name, with their expected
@@ -151,7 +151,7 @@ def _findings(built: AsBuiltFolder) -> tuple[Finding, ...]:
     )
 
 
-def _read_job(folder: Path, works: Mapping[str, RunWork] | None) -> FolderReadBack:
+def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> FolderReadBack:
     """Read the designs of a job, its sheets, and the places between the parts of an assembly.
 
     ``works``: the designs of a run that has just written the folder.
@@ -199,7 +199,9 @@ def _read_job(folder: Path, works: Mapping[str, RunWork] | None) -> FolderReadBa
     return FolderReadBack(all_findings, designed, tuple(folders), job)
 
 
-def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuiltFolder:
+def read_folder(
+    folder: Path, of_job: bool = False, work: WrittenDesign | None = None
+) -> AsBuiltFolder:
     """Read the laminate of a folder's cut files, with the problems of files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run
@@ -210,7 +212,7 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
     design, is_readable, problems = _design(folder, claims)
     if work is not None:
-        expected: Meant | None = work.expected
+        expected: ExpectedLaminate | None = work.expected
     else:
         expected = expected_laminate(design, claims.curves) if is_readable else None
     problems += order_problems(claims, design)
@@ -258,7 +260,7 @@ def _laminate(
     files: Sequence[LayerFile],
     claims: Manifest,
     design: Design,
-    expected: Meant | None,
+    expected: ExpectedLaminate | None,
     panel: SheetPanel | None,
 ) -> Laminate:
     """Return the laminate as cut, with bores, inlets and pins of the design.

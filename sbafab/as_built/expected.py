@@ -237,7 +237,7 @@ class Expected(NamedTuple):
     path: Region
 
 
-class Meant(NamedTuple):
+class ExpectedLaminate(NamedTuple):
     """A design's laminate, and the beam's path for each of its patterns."""
 
     laminate: Laminate
@@ -254,14 +254,14 @@ class Meant(NamedTuple):
         return [Expected(layer.profile, self.paths[layer.pattern]) for layer in layers]
 
 
-class RunWork(NamedTuple):
+class WrittenDesign(NamedTuple):
     """The design that a run has just written: laminate, paths and findings."""
 
-    expected: Meant
+    expected: ExpectedLaminate
     findings: tuple[Finding, ...]
 
 
-def expected_laminate(design: Design, curves: str | None) -> Meant | None:
+def expected_laminate(design: Design, curves: str | None) -> ExpectedLaminate | None:
     """Return the laminate of a design drawn with ``curves``; None if it cannot be built or cut.
 
     With chords, the laminate that these cut.
@@ -272,7 +272,7 @@ def expected_laminate(design: Design, curves: str | None) -> Meant | None:
         paths = compensated_paths(laminate, settings)
         if settings.curves.in_chords:
             laminate = as_cut(laminate, paths, settings)
-        return Meant(laminate, paths)
+        return ExpectedLaminate(laminate, paths)
     except (DesignError, GeometryError, OutputError, ArithmeticError):
         return None
 

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from sbafab.as_built.claims import bare_problem, claim
 from sbafab.as_built.cut_files import LayerFile, check_sequence, path_in_folder, sound_digest
-from sbafab.as_built.expected import AGREEMENT, Meant, departure
+from sbafab.as_built.expected import AGREEMENT, ExpectedLaminate, departure
 from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
@@ -47,7 +47,7 @@ from sbafab.output.manifest import (
     Manifest,
     SheetClaim,
 )
-from sbafab.rules.bridges import apart
+from sbafab.rules.bridges import mismatch_area
 
 # Pieces on film sheets, compared with the pieces of the layer files.
 
@@ -543,7 +543,7 @@ def _number_problems(sheet: CutSheet, drawing: ReadBack) -> list[Problem]:
 
 
 def read_panel(
-    folder: Path, claims: Manifest, files: Sequence[LayerFile], expected: Meant | None
+    folder: Path, claims: Manifest, files: Sequence[LayerFile], expected: ExpectedLaminate | None
 ) -> tuple[SheetPanel | None, list[LayerFile], list[Problem]]:
     """Return the panel of a folder's files, the layer files that it frees, and problems.
 
@@ -582,7 +582,7 @@ def _with_part(file: LayerFile, layer: Layer, panel: SheetPanel) -> LayerFile:
         return file
     parts = [part for part in freed(panel, layer).parts if not part.is_empty]
     # What is not freed at all is told by the rule bridges.
-    region = max(parts, key=lambda part: apart(part, layer.profile), default=layer.profile)
+    region = max(parts, key=lambda part: mismatch_area(part, layer.profile), default=layer.profile)
     return replace(file, part=replace(file.part, region=region))
 
 

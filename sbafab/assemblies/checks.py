@@ -259,7 +259,7 @@ def reach(placed: PlacedPart) -> float:
     return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in edges)
 
 
-def runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
+def supply_runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
     """Return the runs along a tube of the supply tubes of an actuator on its end or start."""
     tube = assembled.on(placed)
     if placed.made is None or tube is None or not isinstance(tube.part, Tube):
@@ -320,7 +320,7 @@ def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
     if assembled.assembly.deploy.lumen_diameter is None:
         return
     for placed in assembled.parts:
-        supply = runs(placed, assembled)
+        supply = supply_runs(placed, assembled)
         if not supply:
             continue
         crossing = [run for run in supply if run.over]

@@ -189,7 +189,7 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
 
 def _outcome(job: CheckedJob) -> CheckOutcome:
     """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
-    from sbafab.models.formulas import size_said, sizes
+    from sbafab.models.formulas import size_phrases, sizes
     from sbafab.output.checked import refuse_undoable
 
     if not job.failed:
@@ -202,7 +202,7 @@ def _outcome(job: CheckedJob) -> CheckOutcome:
         notes_of(job.designs),
         [each.design for each in job.designs],
         {each.design.name: sizes(each.design, each.laminate) for each in job.designs},
-        {each.design.name: size_said(each.design, each.laminate) for each in job.designs},
+        {each.design.name: size_phrases(each.design, each.laminate) for each in job.designs},
     )
 
 

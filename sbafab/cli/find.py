@@ -14,7 +14,7 @@ from sbafab.cli.printing import print_json, print_line, print_verdict, print_wra
 from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError
 from sbafab.search.find import FoundDesign
-from sbafab.search.quantities import AskedQuantity, shown_value
+from sbafab.search.quantities import Quantity, shown_value
 from sbafab.search.quantity_names import quantity_lines
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from sbafab.process import Progress
     from sbafab.search.find import FindRequest, FoundDesign
-    from sbafab.search.quantities import AskedQuantity
+    from sbafab.search.quantities import Quantity
     from sbafab.search.trial import Goal, Requirement, Trial
 
 HELP = """Find the best design that meets requirements.
@@ -310,7 +310,7 @@ def _print_quantities(result: FoundDesign) -> None:
         print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
 
 
-def _print_measured(result: FoundDesign, quantity: AskedQuantity) -> None:
+def _print_measured(result: FoundDesign, quantity: Quantity) -> None:
     measured = result.measured.get(quantity.said)
     if measured is not None:
         print_wrapped(f"({measured.sentence()})", indent="    ")

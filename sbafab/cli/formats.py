@@ -15,7 +15,7 @@ from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
-from sbafab.models.figures import Asked, Factors, LeftOut, Points, VerdictLine
+from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
@@ -374,7 +374,7 @@ def _batch() -> dict[str, Any]:
 def _predict() -> dict[str, Any]:
     loss = {**number(), "description": "mm"}
     factors = of(Factors, pocket_loss=loss)["properties"]
-    asked = of(Asked, "calibration", **factors)
+    asked = of(PredictionRequest, "calibration", **factors)
     design_with = {
         "type": "boolean",
         "description": "false where another model gives the same quantity, and that one is to "

@@ -22,7 +22,7 @@ from sbafab.errors import OutputError
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
-    from sbafab.reports.inflated_picture import Movement, PictureWish
+    from sbafab.reports.inflated_picture import Movement, PictureRequest
 
 
 @click.command()
@@ -107,7 +107,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     from sbafab.reports.inflated_picture import (
         MOVING,
         WHY,
-        PictureWish,
+        PictureRequest,
     )
 
     if pressures and volumes:
@@ -116,7 +116,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     is_inflated = has_balloons(model_form(loaded))
     path = path or Path(f"{loaded.name}-{'inflated' if is_inflated else 'flat'}.png")
     pixels = width or (480 if path.suffix.lower() in MOVING else 1000)
-    wish = PictureWish(
+    wish = PictureRequest(
         pressures or {"": 5.0},
         volumes or None,
         elevation=elevation,
@@ -137,7 +137,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
         raise OutputError(f"{path} cannot be written: {error.strerror}") from error
 
 
-def _draw_flat(design: Design, wish: PictureWish, path: Path) -> None:
+def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
     from sbafab.actuators import build
     from sbafab.reports.inflated_picture import WHY, write_flat_picture
 
@@ -145,7 +145,7 @@ def _draw_flat(design: Design, wish: PictureWish, path: Path) -> None:
     print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}")
 
 
-def _draw_inflated(design: Design, wish: PictureWish, path: Path) -> None:
+def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
     from sbafab.actuators import build
     from sbafab.models.drawn import model_form, near_discs
     from sbafab.models.paper import counterparts_of_pose

@@ -116,8 +116,8 @@ def predict(
     from sbafab.assemblies.files import load
     from sbafab.design.records import Design
     from sbafab.errors import OutputError
-    from sbafab.models.figures import Asked, Factors
-    from sbafab.models.formulas import size_said
+    from sbafab.models.figures import Factors, PredictionRequest
+    from sbafab.models.formulas import size_phrases
     from sbafab.models.prediction import predict as predicted
     from sbafab.output.artefacts import prediction_json
     from sbafab.runs.run import RunRequest, generate
@@ -128,7 +128,9 @@ def predict(
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
     _refuse_for_design(design)
-    wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
+    wish = PredictionRequest(
+        pressures or PredictionRequest.pressures_kpa, flow, volumes, Factors(**factors)
+    )
     with shown_progress(request.as_json) as progress:
         progress("predicting", 0, 1)
         prediction = predicted(design, wish)
@@ -146,7 +148,7 @@ def predict(
             {**prediction_json(design, prediction), "failed": failed, "folder": str(run.folder)}
         )
     else:
-        print_listed("size", size_said(design, run.laminate))
+        print_listed("size", size_phrases(design, run.laminate))
         print_prediction(prediction, verbose)
         if not run.failed:
             details = "" if verbose else " Details: -v"

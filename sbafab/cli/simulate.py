@@ -22,7 +22,7 @@ from sbafab.cli.printing import Group, print_failed, print_findings, print_json,
 from sbafab.cli.progress import shown_progress
 
 if TYPE_CHECKING:
-    from sbafab.simulators.simulator import Name, Result, Wish
+    from sbafab.simulators.simulator import Name, Result, SimulationRequest
 
 SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
@@ -106,9 +106,9 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     from sbafab.output.checked import checks
     from sbafab.runs.run import result_json
     from sbafab.runs.run import simulate as run
-    from sbafab.simulators.simulator import Wish
+    from sbafab.simulators.simulator import SimulationRequest
 
-    wish = Wish(**settings)
+    wish = SimulationRequest(**settings)
     _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
@@ -136,12 +136,12 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _refuse_unused(simulator: Name, wish: Wish) -> None:
+def _refuse_unused(simulator: Name, wish: SimulationRequest) -> None:
     """Raise UsageError for an option that the simulator does not use."""
     from sbafab.simulators.simulator import simulator as simulator_module
     from sbafab.simulators.simulator import users
 
-    for name in wish.given:
+    for name in wish.specific_fields:
         if name not in simulator_module(simulator).USES:
             option = "volume" if name == "volumes" else name
             raise click.UsageError(

@@ -79,13 +79,13 @@ def sweep(
     that was stopped.
     """
     from sbafab.actuators import load_design
-    from sbafab.models.figures import Asked
+    from sbafab.models.figures import PredictionRequest
     from sbafab.models.formulas import force
     from sbafab.search import sweep as search
     from sbafab.search.vary import read_varied
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    kpa = pressures or Asked.pressures_kpa
+    kpa = pressures or PredictionRequest.pressures_kpa
     force(kpa, 0.0)  # raises for pressures out of range
     ranges = tuple(read_varied(text) for text in varied)
     sweep_request = search.SweepRequest(design, ranges, pressures_kpa=kpa, **settings)

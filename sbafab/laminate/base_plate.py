@@ -19,7 +19,7 @@ LAPPED_PLAY = 0.002
 """Greatest play in mm of a pin in a hole lapped to it: our estimate, hardly felt by hand."""
 
 
-class Making(NamedTuple):
+class HoleProcess(NamedTuple):
     """A machine's way of making the plate's holes.
 
     ``position`` is the greatest distance of a hole from its place, mm, in any direction;
@@ -31,10 +31,10 @@ class Making(NamedTuple):
     is_lapped: bool
 
 
-MAKINGS: Mapping[PlateMachine, Making] = {
-    "jig-borer": Making("a jig borer", 0.003, True),
-    "cnc-mill": Making("a CNC mill", 0.025, False),
-    "drill-press": Making("a drill press, marked out by hand", 0.2, False),
+HOLE_PROCESSES: Mapping[PlateMachine, HoleProcess] = {
+    "jig-borer": HoleProcess("a jig borer", 0.003, True),
+    "cnc-mill": HoleProcess("a CNC mill", 0.025, False),
+    "drill-press": HoleProcess("a drill press, marked out by hand", 0.2, False),
 }
 """Positions: a jig borer 0.003 and a hole marked out by hand 0.2 (a maker's guide to drilled and
 reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 in, what two shops
@@ -53,7 +53,7 @@ def hole_deviation(diameter: float) -> float:
 
 def most_play(diameter: float, machine: PlateMachine) -> float:
     """Return the most by which a plate's hole is wider than its pin, mm in diameter."""
-    if MAKINGS[machine].is_lapped:
+    if HOLE_PROCESSES[machine].is_lapped:
         return LAPPED_PLAY
     return round(hole_deviation(diameter) - pin_deviations(diameter)[0], 6)
 
@@ -63,7 +63,7 @@ def pin_error(diameter: float, machine: PlateMachine) -> float:
 
     A jig borer's 0.003 + 0.002 / 2 is the 0.004 that the paper gives for its dowel pins (Sec. 2).
     """
-    return round(MAKINGS[machine].position + most_play(diameter, machine) / 2, 6)
+    return round(HOLE_PROCESSES[machine].position + most_play(diameter, machine) / 2, 6)
 
 
 def lone_pin_error(diameter: float, machine: PlateMachine) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes
-from sbafab.models.rippled import pressed, risen
+from sbafab.models.rippled import compressed_shapes, free_shapes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -279,7 +279,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     even = _spread(HEIGHT_POINTS)
     h = LEAST_HEIGHT + (top - LEAST_HEIGHT) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
-    shapes = pressed(balloon, pressures, heights, tied=True)
+    shapes = compressed_shapes(balloon, pressures, heights, tied=True)
     return BalloonMap(
         balloon, most_pressure, top, _fitted(pressures, heights, shapes, most_pressure, top)
     )
@@ -288,7 +288,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
 def highest(balloon: Balloon, most_pressure: float) -> float:
     """Height in mm to which it may rise freely: at a pressure, or where its films stretch most."""
     pressures = np.linspace(most_pressure / 8, most_pressure, 8)
-    free = risen(balloon, pressures)
+    free = free_shapes(balloon, pressures)
     longer = stretch(balloon, free)
     return float(np.interp(MOST_STRETCH, longer, free.height))
 

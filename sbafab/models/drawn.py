@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Form
-from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation
+from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest, Relation
 from sbafab.models.formulas import force
 from sbafab.models.kinematics import Actuator
 
@@ -141,7 +141,7 @@ FLAT_PLATES = Model(
 )
 
 
-def flat_forces(actuator: Actuator, request: Asked) -> Iterator[Figure]:
+def flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield upper bounds of the drawn pockets' blocked force, before plates part."""
     drawing = actuator.design.drawing
     if drawing is None or actuator.form.wrap is not None:

@@ -18,10 +18,18 @@ from sbafab.models import paper
 from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.figures import Asked, Factors, Figure, LeftOut, Model, Relation, Trace
+from sbafab.models.figures import (
+    Factors,
+    Figure,
+    LeftOut,
+    Model,
+    PredictionRequest,
+    Relation,
+    Trace,
+)
 from sbafab.models.kinematics import Actuator
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
-from sbafab.models.rippled import risen
+from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
 if TYPE_CHECKING:
@@ -54,7 +62,7 @@ def calibrated(model: Model, factors: Factors) -> Model:
     )
 
 
-def free_strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOut]:
+def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
     """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
     if not actuator.radii:
         return
@@ -84,7 +92,7 @@ def free_strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOu
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
     """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
     try:
-        shapes = {kind: risen(kind, pressures) for kind in kinds}
+        shapes = {kind: free_shapes(kind, pressures) for kind in kinds}
     except DesignError:
         return None
     return [
@@ -99,7 +107,7 @@ def _risen(
     """Return stroke (mm), air (ul) and energy (uJ, to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
-        shape = shapes[kind] if shapes else risen(kind, pressure)
+        shape = shapes[kind] if shapes else free_shapes(kind, pressure)
         longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(
@@ -158,7 +166,7 @@ CHAMBERS_SHUT = Model(
 )
 
 
-def elastic_stack(actuator: Actuator, request: Asked) -> Stack | LeftOut | None:
+def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
     """Return the stack of an actuator with round pockets, or why not; None for others."""
     if not actuator.radii:
         return None
@@ -169,7 +177,9 @@ def elastic_stack(actuator: Actuator, request: Asked) -> Stack | LeftOut | None:
         return LeftOut("elastic stack", str(error))
 
 
-def stack_figures(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def stack_figures(
+    actuator: Actuator, request: PredictionRequest, stack: Stack
+) -> Iterator[Figure | LeftOut]:
     """Yield forces, bending, times and stiffness of the stack."""
     yield from _forces(actuator, request, stack)
     if actuator.form.is_parallel:
@@ -184,14 +194,16 @@ def stroke_at(actuator: Actuator, share: float) -> float:
     return max(share * (actuator.full_height - actuator.thickness), 0.0)
 
 
-def _forces(actuator: Actuator, request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _forces(
+    actuator: Actuator, request: PredictionRequest, stack: Stack
+) -> Iterator[Figure | LeftOut]:
     model = calibrated(FORCE, request.calibration)
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
             try:
-                value = float(blocked(stack, pressure, stroke_at(actuator, share)))
+                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error))
                 continue
@@ -209,7 +221,7 @@ def chamber_count(number: int) -> str:
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
-def _bends(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(BEND, request.calibration)
     for pressure in request.pressures_kpa:
         for chambers in range(1, stack.chambers):
@@ -225,7 +237,9 @@ def _bends(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
             yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
 
 
-def _clearances(where: str, request: Asked, stack: Stack, pose: Pose) -> Iterator[Figure]:
+def _clearances(
+    where: str, request: PredictionRequest, stack: Stack, pose: Pose
+) -> Iterator[Figure]:
     """Yield the clearances of a bent stack: between rims, and between chambers."""
     model = calibrated(CONTACT, request.calibration)
     room = rim_gap(stack, pose)
@@ -234,7 +248,7 @@ def _clearances(where: str, request: Asked, stack: Stack, pose: Pose) -> Iterato
     yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
 
 
-def bent(stack: Stack, chambers: int, angle: float) -> Pose | None:
+def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
     empty; None where no pressure gives it.
     """
@@ -253,7 +267,7 @@ def bent(stack: Stack, chambers: int, angle: float) -> Pose | None:
     return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
 
 
-def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
@@ -262,7 +276,7 @@ def _bent_forces(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
             name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
-            pose = bent(stack, chambers, angle)
+            pose = pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
                 yield LeftOut(name, "it does not bend so far")
                 continue
@@ -280,7 +294,7 @@ def _three(values: Array) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def filled(
+def time_to_fill(
     stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
 ) -> tuple[float, Pose]:
     """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
@@ -297,12 +311,12 @@ def filled(
     return float((pose.volumes - empty.volumes).mean()) / flow, pose
 
 
-def _times(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
     model = calibrated(TIME, request.calibration)
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
-        time, pose = filled(stack, request.flow_ml_min, paper.FULL_KPA)
+        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
         yield LeftOut(name, str(error))
         return
@@ -311,7 +325,7 @@ def _times(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
     yield Figure("actuation", name, pose.height, "mm", model)
 
 
-def _stiffness(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
     for pressure in request.pressures_kpa[:1]:
         name = f"lateral tip stiffness at {pressure:g} kPa"
         try:
@@ -326,12 +340,12 @@ def _stiffness(request: Asked, stack: Stack) -> Iterator[Figure | LeftOut]:
             yield LeftOut(name, str(error))
 
 
-def _tip_stiffness(name: str, pose: Pose, model: Model, request: Asked) -> Figure:
+def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:
     value = PROBE_FORCE / float(pose.tip[0])
     return Figure("stiffness", name, value, "N/mm", calibrated(model, request.calibration))
 
 
-def force_traces(actuator: Actuator, request: Asked, stack: Stack) -> list[Trace]:
+def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:
     """Return curves of force against stroke, one a pressure."""
     most = actuator.full_height - actuator.thickness
     if not actuator.knows_full:
@@ -342,12 +356,12 @@ def force_traces(actuator: Actuator, request: Asked, stack: Stack) -> list[Trace
     for pressure in request.pressures_kpa:
         if pressure > stack.most_pressure:
             continue
-        values = (actuator.form.pushing * blocked(stack, pressure, strokes)).tolist()
+        values = (actuator.form.pushing * blocked_force(stack, pressure, strokes)).tolist()
         lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
     return lines
 
 
-def bend_relation(request: Asked, stack: Stack) -> Relation:
+def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
     """Return the curves of bend against pressure."""
     model = calibrated(BEND, request.calibration)
     pressures = np.geomspace(0.01, 20.0, SAMPLES)
@@ -362,7 +376,7 @@ def bend_relation(request: Asked, stack: Stack) -> Relation:
     )
 
 
-def workspace_traces(request: Asked, stack: Stack) -> list[Trace]:
+def workspace_traces(request: PredictionRequest, stack: Stack) -> list[Trace]:
     """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
     model = calibrated(BEND, request.calibration)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
@@ -445,7 +459,7 @@ def _radii(stack: Stack, pose: Pose) -> Array:
 SERIES_SAMPLES = 401
 
 
-def blocked(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
     stroke.
 

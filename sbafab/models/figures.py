@@ -228,7 +228,7 @@ class Factors:
 
 
 @dataclass(frozen=True)
-class Asked:
+class PredictionRequest:
     """Conditions of a prediction: pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul a balloon, and calibration factors.
     """
@@ -243,7 +243,7 @@ class Asked:
 class Prediction:
     """All that is predicted of one design."""
 
-    asked: Asked
+    asked: PredictionRequest
     figures: tuple[Figure, ...]
     relations: tuple[Relation, ...]
     left_out: tuple[LeftOut, ...]

@@ -238,7 +238,7 @@ def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None
     return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
 
 
-def size_said(design: Design, laminate: Laminate) -> tuple[str, ...]:
+def size_phrases(design: Design, laminate: Laminate) -> tuple[str, ...]:
     """Return the size in phrases: overall diameter, outline diameter, flat extent, and height.
 
     Films flow in the press: beside the height stands the paper's measured one.

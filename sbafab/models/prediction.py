@@ -23,12 +23,12 @@ from sbafab.models.figures import (
     REACHED,
     STACK,
     WIDEST,
-    Asked,
     Figure,
     LeftOut,
     Model,
     Points,
     Prediction,
+    PredictionRequest,
     Relation,
     Trace,
     chosen,
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 SAMPLES = 61
 
 
-def check_request(actuator: Actuator, request: Asked) -> None:
+def check_request(actuator: Actuator, request: PredictionRequest) -> None:
     """Raise DesignError for pressures, flows or volumes out of every model's range."""
     force(request.pressures_kpa, 0.0)
     seconds(0.0, request.flow_ml_min)
@@ -79,7 +79,7 @@ def full_model(actuator: Actuator) -> Model:
     )
 
 
-def strokes(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOut]:
+def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     if actuator.knows_full:
         full = full_model(actuator)
@@ -112,7 +112,7 @@ def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
         return LeftOut(f"{name}, {k.model.name}", str(error))
 
 
-def forces(actuator: Actuator, request: Asked) -> Iterator[Figure]:
+def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield the blocked force at each pressure, flat and at the paper's shares of full stroke."""
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
@@ -128,7 +128,7 @@ def _force(
     k: Kinematics,
     pressure: float,
     stroke: ArrayLike,
-    request: Asked,
+    request: PredictionRequest,
 ) -> NDArray[np.float64]:
     factor = actuator.form.pushing * request.calibration.contact_factor
     return factor * force(pressure, k.push(stroke))
@@ -138,7 +138,7 @@ def _each(actuator: Actuator) -> str:
     return "" if actuator.form.pushing == actuator.form.stacks else " of one SBA"
 
 
-def _force_model(actuator: Actuator, k: Kinematics, request: Asked) -> Model:
+def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) -> Model:
     trust = (
         "no film tension, no stretch; for d = 5 at 100 kPa the paper measured 0.76 to 1.24 times "
         "what Eq. 4 says, 0.74 to 1.65 times what Eqs. 1-3 say"
@@ -149,7 +149,7 @@ def _force_model(actuator: Actuator, k: Kinematics, request: Asked) -> Model:
     return model.times("contact factor", request.calibration.contact_factor)
 
 
-def power(actuator: Actuator, request: Asked, mass_g: float | None) -> Iterator[Figure]:
+def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Iterator[Figure]:
     """Yield time, work, speed and power density, all of it at the volume of the full stroke: where
     that is not known only times to the volumes of the request, and without a mass no power density.
     """
@@ -189,7 +189,9 @@ def power(actuator: Actuator, request: Asked, mass_g: float | None) -> Iterator[
         yield _power_density(actuator, request, whole, mass_g)
 
 
-def _power_density(actuator: Actuator, request: Asked, whole: float, mass_g: float) -> Figure:
+def _power_density(
+    actuator: Actuator, request: PredictionRequest, whole: float, mass_g: float
+) -> Figure:
     """Return the power density with the paper's air: its pump's flow, up to 10 kPa."""
     time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
     highest = max(request.pressures_kpa)
@@ -239,7 +241,7 @@ def stroke_relation(actuator: Actuator) -> Relation:
     )
 
 
-def force_relation(actuator: Actuator, request: Asked) -> Relation:
+def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
     """Return force against stroke, to full stroke, at every pressure of the request."""
     most = min(k.largest_stroke for k in actuator.kinematics)
     stroke = np.linspace(0, actuator.full_stroke if actuator.knows_full else most, SAMPLES)
@@ -335,7 +337,7 @@ def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     yield Figure("bending", "maximum lateral tip displacement", reach, "mm", CURVATURE)
 
 
-def folding(actuator: Actuator, request: Asked) -> Figure | LeftOut:
+def folding(actuator: Actuator, request: PredictionRequest) -> Figure | LeftOut:
     """Return the diameter of the channel that three folded lobes pass."""
     if actuator.form.stacks != LOBES:
         reason = f"the model is of {LOBES} lobes folded into a triangle"
@@ -351,7 +353,7 @@ def folding(actuator: Actuator, request: Asked) -> Figure | LeftOut:
     return Figure("size", "folded diameter", value, "mm", model)
 
 
-def bending_relation(actuator: Actuator, request: Asked) -> Relation:
+def bending_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
     """Return bend against time, each chamber fed at the flow of the request."""
     first = actuator.kinematics[0]
     model = Model(
@@ -445,7 +447,7 @@ NOMINAL = Model(
 
 def predict(
     design: Design,
-    request: Asked | None = None,
+    request: PredictionRequest | None = None,
     laminate: Laminate | None = None,
     quick: bool = False,
 ) -> Prediction:
@@ -455,7 +457,7 @@ def predict(
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
-    wish = request or Asked()
+    wish = request or PredictionRequest()
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -497,7 +499,7 @@ def _stack(together: Stack | LeftOut | None) -> Stack | None:
 
 
 def _figures(
-    actuator: Actuator, request: Asked, together: Stack | LeftOut | None
+    actuator: Actuator, request: PredictionRequest, together: Stack | LeftOut | None
 ) -> list[Figure | LeftOut]:
     """Return all figures, and the ones left out, in the order of their groups."""
     items = list(_geometric_figures(actuator, request))
@@ -508,7 +510,9 @@ def _figures(
     return sorted(items, key=_group_order)
 
 
-def _geometric_figures(actuator: Actuator, request: Asked) -> Iterator[Figure | LeftOut]:
+def _geometric_figures(
+    actuator: Actuator, request: PredictionRequest
+) -> Iterator[Figure | LeftOut]:
     mass = _mass(actuator.laminate)
     grams = None if isinstance(mass, LeftOut) else mass.value
     yield from _sizes(actuator, request)
@@ -541,7 +545,9 @@ def _group_order(item: Figure | LeftOut) -> int:
     return GROUPS.index(item.group)
 
 
-def _relations(actuator: Actuator, request: Asked, together: Stack | None) -> Iterator[Relation]:
+def _relations(
+    actuator: Actuator, request: PredictionRequest, together: Stack | None
+) -> Iterator[Relation]:
     if not actuator.kinematics:
         return
     yield stroke_relation(actuator)
@@ -567,7 +573,7 @@ def _relations(actuator: Actuator, request: Asked, together: Stack | None) -> It
         yield _diameter_relation(actuator, actuator.form.wrap)
 
 
-def _sizes(actuator: Actuator, request: Asked) -> Iterator[Figure]:
+def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
     factor = request.calibration.press_factor
     pressed = NOMINAL.times("press factor", factor)

@@ -67,13 +67,13 @@ class Rippled(NamedTuple):
     outside: Array
 
 
-def risen(balloon: Balloon, pressure: ArrayLike) -> Shapes:
+def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
     """Return free balloons at pressures (kPa): with waves in step where the pocket is wide and its
     rim ripples, else by ``inflate``.
     """
     shapes = inflate(balloon, pressure)
     rows = np.flatnonzero(shapes.pressure < _first_pressure(balloon) * END / START)
-    if not resolved(balloon) or not len(rows):
+    if not resolves_waves(balloon) or not len(rows):
         return shapes
     resolved_balloons = rippled(balloon, shapes.pressure[rows])
     grown = np.abs(resolved_balloons.outside - resolved_balloons.edge) > LEVEL * balloon.ring
@@ -83,7 +83,9 @@ def risen(balloon: Balloon, pressure: ArrayLike) -> Shapes:
     return Shapes(*parts)
 
 
-def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False) -> Shapes:
+def compressed_shapes(
+    balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False
+) -> Shapes:
     """Return balloons between plates at heights (mm), by ``inflate`` with a correction for waves.
 
     Where waves are in step with the rim a balloon rises freely by a share more. Between plates it
@@ -150,7 +152,7 @@ def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
     first, rungs = _first_pressure(balloon), round(math.log(END / START) / math.log(STEP))
     at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
     inside = (at > 0) & (at < rungs)
-    if not resolved(balloon) or not inside.any():
+    if not resolves_waves(balloon) or not inside.any():
         return HeightRatio(np.ones_like(pressure), np.zeros_like(pressure))
     waves = usual_waves(balloon)
     x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
@@ -168,7 +170,7 @@ def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
     return HeightRatio(a + u * (b + u * (c + u * d)), rate)
 
 
-def resolved(balloon: Balloon) -> bool:
+def resolves_waves(balloon: Balloon) -> bool:
     """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
     usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring

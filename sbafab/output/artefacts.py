@@ -50,7 +50,7 @@ from sbafab.pressing.tables import PRESS_SCHEMA, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
-from sbafab.simulators.simulator import Name, Wish, simulator
+from sbafab.simulators.simulator import Name, SimulationRequest, simulator
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
@@ -312,7 +312,7 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
     reason = simulator(name).why_not(folder.laminate)
     if reason is None:
         try:
-            simulator(name).export(folder.laminate, Wish(), folder.path / name)
+            simulator(name).export(folder.laminate, SimulationRequest(), folder.path / name)
         except (DesignError, OutputError) as error:
             # The meshes of CalculiX take an extra, which may be missing.
             reason = str(error)

@@ -248,6 +248,6 @@ def unpressed(platen_kpa: float, pad: Pad, stands_out: float) -> float:
     return stands_out * pad.modulus / (2 * platen_kpa)
 
 
-def pieces(thickness: float) -> int:
+def pad_sheets(thickness: float) -> int:
     """Return the number of sheets in the pile of a pad."""
     return max(1, math.ceil(thickness / PADS[-1] - 1e-9))

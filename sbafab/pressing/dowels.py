@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.laminate.base_plate import MAKINGS, PlateMachine
+from sbafab.laminate.base_plate import HOLE_PROCESSES, PlateMachine
 from sbafab.laminate.laminate import Pin
 
 Standard = Literal["ISO 8734", "ISO 2338"]
@@ -345,7 +345,7 @@ def hole_notes(
         (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
         for pin in sorted(pins, key=lambda pin: pin.diameter)
     )
-    making = MAKINGS[machine]
+    making = HOLE_PROCESSES[machine]
     fit = "lapped to its pins m6" if making.is_lapped and len(pins) > 1 else "H7"
     lines = [
         f"D{diameter:g} {fit}, from above {hole.depth:g} +-{hole.tolerance:g} deep, flat; "

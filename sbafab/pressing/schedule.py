@@ -47,7 +47,7 @@ from sbafab.pressing.dowels import (
 )
 
 
-def listed(words: Sequence[str]) -> str:
+def joined_words(words: Sequence[str]) -> str:
     """Return words as a list: one, two and three."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
@@ -69,7 +69,7 @@ def layers_in_words(layers: Sequence[int]) -> str:
             [f"{first} to {last}"] if last > first + 1 else map(str, range(first, last + 1))
         )
     ]
-    return f"layer{'s' if len(layers) > 1 else ''} {listed(words)}"
+    return f"layer{'s' if len(layers) > 1 else ''} {joined_words(words)}"
 
 
 # Warming of a cold plate between hot platens: a time-temperature line, first order.
@@ -181,10 +181,12 @@ def unstated_minutes(films: list[Film], press: PressSettings) -> str:
     if not films:
         return ""
     names = [f'"{film.said}"' for film in films]
-    stated = listed([f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for])
+    stated = joined_words(
+        [f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for]
+    )
     return (
         f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
-        f"{listed(names)}; try the bond on a sample at {press.temperature_c:g} C, set "
+        f"{joined_words(names)}; try the bond on a sample at {press.temperature_c:g} C, set "
         "press.temperature_c, press.pressure_kpa and the press minutes to what held, and name the "
         "film in press.minutes_for"
     )
@@ -539,7 +541,7 @@ def _instructions(part: AssemblyStep, count: int) -> str:
     """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
-    on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {listed(pins)}"
+    on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {joined_words(pins)}"
     if not part.adds:
         return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
     if part.bond == "full":
@@ -652,7 +654,7 @@ def warnings(
     if laminate.registration == "ears" and laminate.pins:
         yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
     pad = next(item.thickness_mm for item in steps[0].build_up if item.part == build_up.PAD)
-    if (pile := build_up.pieces(pad)) > 1:
+    if (pile := build_up.pad_sheets(pad)) > 1:
         yield (
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"
@@ -663,7 +665,7 @@ def warnings(
     if unsold and not press.pin_lengths:
         yield (
             f"{press.pin_standard} has no dowel pin of diameter "
-            f"{listed([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, or "
+            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, or "
             "make the pins and give their lengths in registration.pin_lengths"
         )
     for step, part in zip(steps, parts, strict=True):
@@ -699,7 +701,7 @@ def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
 
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     counts = Counter(laminate.layer(index).role for index in layers)
-    return listed([f"the {count} {role}s" for role, count in counts.items()])
+    return joined_words([f"the {count} {role}s" for role, count in counts.items()])
 
 
 # Registered sheets and their tacking; no bench has tried it.

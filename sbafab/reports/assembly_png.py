@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.shapes import RGB, colours, placed_surface
-from sbafab.reports.canvas import INK, Buffer, draw_length_bar, seen, view_of
+from sbafab.reports.canvas import INK, Buffer, draw_length_bar, rasterize, view_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -44,7 +44,7 @@ def assembly_pngs(
     size = width * ENLARGED, height * ENLARGED
     box = MARGIN * size[0], MARGIN * size[1], (1 - MARGIN) * size[0], (1 - MARGIN - FOOT) * size[1]
     view = view_of(surfaces, ELEVATION, AZIMUTH, box)
-    buffer = seen(surfaces, view, *size, _unit(LAMP))
+    buffer = rasterize(surfaces, view, *size, _unit(LAMP))
     paints = colours(assembled)
     picture = _coloured(buffer, [paints[placed.name] for placed in assembled.parts])
     picture = picture.reduce(ENLARGED)

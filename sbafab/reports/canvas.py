@@ -231,7 +231,7 @@ def view_of(
     return View(axes, scale, centre)
 
 
-def seen(
+def rasterize(
     surfaces: Sequence[Surface],
     view: View,
     width: int,

@@ -13,7 +13,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
 from sbafab.models.paper import counterparts_of_pose
-from sbafab.reports.canvas import AMBIENT, Buffer, View, seen
+from sbafab.reports.canvas import AMBIENT, Buffer, View, rasterize
 from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ GROUND = -0.06
 
 
 @dataclass(frozen=True)
-class PictureWish:
+class PictureRequest:
     """The request for a picture.
 
     ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, those not named 0; with "" for the
@@ -61,7 +61,7 @@ class PictureWish:
     frames: int = FRAMES
 
 
-def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
+def pose_of(laminate: Laminate, stack: Stack, wish: PictureRequest) -> Pose:
     """The pose that a wish names. Raises DesignError for a chamber that is not there."""
     if wish.volumes_ul is not None:
         volumes = _by_chamber(laminate, wish.volumes_ul)
@@ -89,7 +89,7 @@ def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float,
 def write_picture(
     laminate: Laminate,
     stack: Stack,
-    wish: PictureWish,
+    wish: PictureRequest,
     path: Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
@@ -111,7 +111,7 @@ def write_picture(
     return pose
 
 
-def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureWish) -> bytes:
+def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureRequest) -> bytes:
     """One pose, with a caption, as PNG."""
     parts = inflated(laminate, stack, pose)
     (image,) = _images([(pose, parts)], laminate, wish)
@@ -124,7 +124,7 @@ def animation(
     laminate: Laminate,
     stack: Stack,
     poses: Sequence[Pose],
-    wish: PictureWish,
+    wish: PictureRequest,
     ending: str = ".gif",
     progress: Callable[[int, int], None] | None = None,
 ) -> bytes:
@@ -166,7 +166,7 @@ def animation(
     return out.getvalue()
 
 
-def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
+def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
     """Poses of a moving picture, which ends where it began."""
     turns = [number / wish.frames * math.tau for number in range(wish.frames)]
     poses: list[Pose] = []
@@ -194,7 +194,7 @@ def _swell(cosine: float) -> float:
 def _images(
     shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
     laminate: Laminate,
-    wish: PictureWish,
+    wish: PictureRequest,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Image]:
     """All poses seen from one place at one scale."""
@@ -337,7 +337,7 @@ def rendered(
     size = width * ENLARGED, height * ENLARGED
     lamp = np.array(LAMP) / np.linalg.norm(LAMP)
     surfaces = [body.surface for body in bodies]
-    buffer = seen(surfaces, large, *size, lamp, [body.normals for body in bodies])
+    buffer = rasterize(surfaces, large, *size, lamp, [body.normals for body in bodies])
     palette = np.array([*(body.colour for body in bodies), PAPER], dtype=float)
     is_paper = buffer.body < 0
     share = (buffer.light - AMBIENT) / (1 - AMBIENT)

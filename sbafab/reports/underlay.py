@@ -18,7 +18,7 @@ from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.region import Region, coord, disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.pressing.schedule import listed
+from sbafab.pressing.schedule import joined_words
 from sbafab.reports.traveller.shapes import Bed, beds
 
 NAME = "underlay.pdf"
@@ -83,10 +83,10 @@ class Guide:
 
     @property
     def words(self) -> str:
-        materials = listed(self.films) + (", dashed" if self.is_mask else "")
+        materials = joined_words(self.films) + (", dashed" if self.is_mask else "")
         return (
-            f"{listed(self.patterns)} ({materials}): outer edge, press step"
-            f"{'s' if len(self.steps) > 1 else ''} {listed([str(n) for n in self.steps])}"
+            f"{joined_words(self.patterns)} ({materials}): outer edge, press step"
+            f"{'s' if len(self.steps) > 1 else ''} {joined_words([str(n) for n in self.steps])}"
         )
 
 

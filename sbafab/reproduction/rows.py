@@ -10,12 +10,12 @@ import numpy as np
 from sbafab.actuators import build, load_design
 from sbafab.models import paper, parabola, printed
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import bent, filled
-from sbafab.models.figures import Asked, Factors, Prediction
+from sbafab.models.elastic import pose_bent_by, time_to_fill
+from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
-from sbafab.models.rippled import risen
+from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
@@ -68,7 +68,9 @@ def predicted(
     template: str, factors: Factors | None = None, pressures: tuple[float, ...] = (10.0, 100.0)
 ) -> Prediction:
     """Return the prediction of a template."""
-    return predict(load_design(template), Asked(pressures, calibration=factors or Factors()))
+    return predict(
+        load_design(template), PredictionRequest(pressures, calibration=factors or Factors())
+    )
 
 
 # Manufacture, sizes, strokes by the paper's own models, other simulations.
@@ -370,7 +372,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
         f"the chambers films take in half as much again; {AVERAGED}",
     )
     for length in LENGTHS:
-        time, poses = filled(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
+        time, poses = time_to_fill(whole, paper.WATER_FLOW, paper.FULL_KPA, length)
         pressure = poses.pressures[0]
         yield Row(
             "time to 10 kPa, water, 35 ml/min",
@@ -448,7 +450,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
         yield Row("largest bend", paper.LARGEST_BEND, pose.bend, model, why.format(WORKSPACE))
     empty = whole.pose((0.0, 0.0, 0.0)).volumes[0]
     for time, angle in paper.BENDING:
-        pose_at = bent(whole, 1, angle.value)
+        pose_at = pose_bent_by(whole, 1, angle.value)
         assert pose_at is not None
         put_in = float(pose_at.volumes[0] - empty)
         yield Row(
@@ -563,8 +565,10 @@ def _calibrated_motion(three: Stack) -> Iterator[Row]:
     pressure.
     """
     full = paper.FULL_KPA
-    time, pose = filled(three, paper.WATER_FLOW, full, length=1e-3)
-    with_tubes = [filled(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)]
+    time, pose = time_to_fill(three, paper.WATER_FLOW, full, length=1e-3)
+    with_tubes = [
+        time_to_fill(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)
+    ]
     yield Row(
         f"height of the 3-DoF of 15 balloons ({HELD_OUT})",
         paper.FULL_HEIGHT,
@@ -612,7 +616,7 @@ def fuller() -> Iterator[Row]:
         )
         design = load_design("1dof-10mm")
         (balloon,) = set(balloons_of(design, build(design), factors))
-        shapes = risen(balloon, np.geomspace(0.01, 20.0, 60))
+        shapes = free_shapes(balloon, np.geomspace(0.01, 20.0, 60))
         for fluid, volume, error in paper.VALID:
             expected = float(printed.stroke(volume, paper.VALID_RADIUS))
             yield Row(

@@ -15,7 +15,7 @@ from sbafab.design.files import actuator_sha256, design_sha256, design_toml
 from sbafab.design.kits import kit_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.models.figures import Asked, Prediction
+from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST
 from sbafab.models.prediction import predict
@@ -208,7 +208,8 @@ def promised(design: Design) -> Build:
         method=registration.method,
         toml=design_toml(design),
         predicted=_predicted(
-            predict(design, Asked(pressures_kpa=(100.0,))), burst_pressure(design.form, laminate)
+            predict(design, PredictionRequest(pressures_kpa=(100.0,))),
+            burst_pressure(design.form, laminate),
         ),
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),

@@ -120,13 +120,13 @@ def _misfreed(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
     """Parts that the cuts free otherwise than designed."""
     for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
         room = TOLERANCE * sum(contour.length for contour in layer.profile.contours)
-        if part != layer.profile and apart(part, layer.profile) > room:
+        if part != layer.profile and mismatch_area(part, layer.profile) > room:
             state = "is still held after the second cut" if part.is_empty else "is cut otherwise"
             fault = f"layer {layer.index} ({layer.name}) {state} in the copy at {at(place)}"
             yield _Wrong(layer, place, f"{fault}; regenerate the sheets")
 
 
-def apart(region: Region, reference: Region) -> float:
+def mismatch_area(region: Region, reference: Region) -> float:
     """Area of the symmetric difference of two regions, mm2."""
     return sum(rest.area for rest in (region - reference, reference - region) if not rest.is_empty)
 

@@ -38,7 +38,7 @@ from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.meshing.surface import Surface, open_edges
-from sbafab.models.figures import Asked, Factors
+from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.nesting.records import NestPart, parts_of
 from sbafab.output.artefacts import (
@@ -316,7 +316,9 @@ def _prediction_problems(
         request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
         measured = request.pocket_loss, request.modulus_mpa
         factors = Factors(request.press_factor, request.contact_factor, *measured)
-        wish = Asked(request.pressures_kpa, request.flow_ml_min, request.volumes_ul, factors)
+        wish = PredictionRequest(
+            request.pressures_kpa, request.flow_ml_min, request.volumes_ul, factors
+        )
         written = fresh / "prediction"
         written.mkdir()
         settings = drawn_settings(checked.design, checked.waived, claims.curves)

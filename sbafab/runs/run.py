@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from sbafab.as_built.check import read_back
-from sbafab.as_built.expected import Meant, RunWork, refuse_coarse
+from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, refuse_coarse
 from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import TRUE_ARCS, Curves
@@ -43,7 +43,7 @@ from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, unheard
 from sbafab.rules.finding import Finding, Findings
-from sbafab.simulators.simulator import Name, Result, Wish, simulator
+from sbafab.simulators.simulator import Name, Result, SimulationRequest, simulator
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import MeshSettings
@@ -249,9 +249,9 @@ def verify_written(plan: Plan, folder: Path, tell: Progress) -> None:
     )
 
 
-def _work(plan: DesignPlan) -> RunWork:
+def _work(plan: DesignPlan) -> WrittenDesign:
     """Return what is expected of a design's files: its laminate, the beam's paths, the findings."""
-    return RunWork(Meant(plan.checked.laminate, plan.paths), plan.checked.findings)
+    return WrittenDesign(ExpectedLaminate(plan.checked.laminate, plan.paths), plan.checked.findings)
 
 
 def _first_failures(failed: Iterable[Finding]) -> str:
@@ -308,7 +308,7 @@ def result_json(result: Result) -> dict[str, Any]:
 def simulate(
     design: Design,
     name: Name,
-    wish: Wish,
+    wish: SimulationRequest,
     out: Path = Path("out"),
     progress: Progress | None = None,
     export: bool = False,

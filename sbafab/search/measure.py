@@ -16,7 +16,7 @@ from sbafab.design.files import checked as checked_record
 from sbafab.design.files import design_sha256, keys_of
 from sbafab.design.records import Design
 from sbafab.errors import SbafabError
-from sbafab.models.figures import Asked, Figure
+from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.output.checked import check, refuse_undoable
 from sbafab.rules.deck import AT_MOST
@@ -62,7 +62,7 @@ def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
         name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
         for name, rule in worst.items()
     }
-    prediction = predict(design, Asked(tuple(pressures)), checked.laminate)
+    prediction = predict(design, PredictionRequest(tuple(pressures)), checked.laminate)
     row["figures"] = named_figures(prediction.figures)
     if checked.failed:
         failed = [rule for rule in worst.values() if rule.verdict == "fail"]

@@ -25,14 +25,14 @@ from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import blocked
+from sbafab.models.elastic import blocked_force
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, counterpart
 from sbafab.models.paper import STACK as ELASTIC_STACK
-from sbafab.models.rippled import pressed, risen
+from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.search.quantity_names import QUANTITIES
 
@@ -63,7 +63,7 @@ HOW = (
 
 
 @dataclass(frozen=True)
-class AskedQuantity:
+class Quantity:
     """A quantity by name or dotted key; force and stroke with their pressure in kPa, force with its
     stroke in mm.
     """
@@ -89,7 +89,7 @@ class AskedQuantity:
         return self.name if "." in self.name else KEYS.get(self.name)
 
 
-def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
+def read_quantity(text: str, kpa: float | None = None) -> Quantity:
     """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
@@ -102,17 +102,17 @@ def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
         near = difflib.get_close_matches(name, names, 1)
         mends = f"did you mean {near[0]}?" if near else f"there are {listed(names)} and any key"
         raise DesignError(f"{shown(text)} is not a quantity; {mends}")
-    return AskedQuantity(name, UNPRESSURED.get(name, ""))
+    return Quantity(name, UNPRESSURED.get(name, ""))
 
 
-def safer(quantity: AskedQuantity, at_least: bool) -> AskedQuantity:
+def safer(quantity: Quantity, at_least: bool) -> Quantity:
     """The quantity to hold a limit against: of the inflated diameters the one that is safer."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
     return replace(quantity, name=REACHED if at_least else WIDEST)
 
 
-def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuantity:
+def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> Quantity:
     pressure: float | None = None
     stroke: float | None = None
     for place in places:
@@ -138,11 +138,11 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
             f"{shown(text)}: a force needs a stroke, and only a force takes one; {HOW}"
         )
     if pressure is None and name == "stroke":
-        return AskedQuantity(name, AT_PRESSURE[name])
+        return Quantity(name, AT_PRESSURE[name])
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
-    return AskedQuantity(name, AT_PRESSURE[name], pressure, stroke)
+    return Quantity(name, AT_PRESSURE[name], pressure, stroke)
 
 
 def named_pressure(texts: list[str]) -> float | None:
@@ -166,7 +166,7 @@ def _kilopascals(place: str) -> float | None:
     return float(match[1]) * KILOPASCALS[units[0]]
 
 
-def read_limit(quantity: AskedQuantity, text: str) -> float:
+def read_limit(quantity: Quantity, text: str) -> float:
     """Return the limit of a quantity, in its unit. Raises ValueError with the end of a sentence."""
     if quantity.name == "yield":
         return _share(text)
@@ -201,7 +201,7 @@ def _share(text: str) -> float:
     return limit
 
 
-def shown_value(quantity: AskedQuantity, value: float) -> str:
+def shown_value(quantity: Quantity, value: float) -> str:
     """A figure with its unit, as people read it."""
     if quantity.name == "force" and value < 0:
         return "none, it does not rise that far"
@@ -223,7 +223,7 @@ class Subject:
     def _keys(self) -> Mapping[str, Any]:
         return {key: value for key, value, _ in keys_of(self.design)}
 
-    def value(self, quantity: AskedQuantity, share_of_good: Callable[[], float]) -> float:
+    def value(self, quantity: Quantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
@@ -242,7 +242,7 @@ class Subject:
             return float(value)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
-    def _moved(self, quantity: AskedQuantity) -> float:
+    def _moved(self, quantity: Quantity) -> float:
         """A stroke, bend or force."""
         kpa = quantity.kpa
         if kpa is None:
@@ -287,7 +287,7 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        push = float(blocked(self._stack, kpa, stroke))
+        push = float(blocked_force(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
@@ -297,12 +297,12 @@ class Subject:
         _refuse_stretched(kinds, kpa, stroke)
         return form.pushing * push
 
-    def counterpart(self, quantity: AskedQuantity) -> Counterpart | None:
+    def counterpart(self, quantity: Quantity) -> Counterpart | None:
         """Return the paper's measured value where the model is off by over a quarter, or None."""
         name, model = self._figure(quantity)
         return counterpart(self.design.form, name, model)
 
-    def _figure(self, quantity: AskedQuantity) -> tuple[str, str]:
+    def _figure(self, quantity: Quantity) -> tuple[str, str]:
         """The name of the figure in ``predict``, and that of its model."""
         at = f"at {quantity.kpa or 0.0:g} kPa"
         if quantity.name == "height":
@@ -328,10 +328,10 @@ def free_height(kind: Balloon, kpa: float) -> float:
 
     The latter is less than it would rise by.
     """
-    shape = risen(kind, [kpa])
+    shape = free_shapes(kind, [kpa])
     if float(stretch(kind, shape)[0]) <= MOST_STRETCH:
         return float(shape.height[0])
-    shapes = risen(kind, SHARES * kpa)
+    shapes = free_shapes(kind, SHARES * kpa)
     return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
 
 
@@ -339,7 +339,7 @@ def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> No
     """Raises DesignError where a film would be stretched too far at a stroke in mm."""
     for kind in dict.fromkeys(kinds):
         height = stroke * kind.pocket / sum(balloon.pocket for balloon in kinds)
-        longer = float(stretch(kind, pressed(kind, [kpa], [max(height, 1e-3)]))[0])
+        longer = float(stretch(kind, compressed_shapes(kind, [kpa], [max(height, 1e-3)]))[0])
         if longer > MOST_STRETCH:
             raise DesignError(
                 f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
@@ -348,7 +348,7 @@ def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> No
             )
 
 
-def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:
+def refuse_unknown_key(quantity: Quantity, design: Design) -> None:
     """Raises DesignError for a key that the design does not have, with the one that is meant."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})

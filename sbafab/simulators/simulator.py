@@ -28,7 +28,7 @@ MOST_PRESSURE = 1000.0
 
 
 @dataclass(frozen=True)
-class Wish:
+class SimulationRequest:
     """Settings of a simulation; None where the simulator's default will do.
 
     ``pressure`` in kPa for every chamber that ``chambers`` does not name; ``minutes`` is the most
@@ -47,7 +47,7 @@ class Wish:
     volumes: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def given(self) -> list[str]:
+    def specific_fields(self) -> list[str]:
         """Names of the set fields that not every simulator reads."""
         names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
         return [name for name in names if getattr(self, name) not in (None, {})]
@@ -73,10 +73,12 @@ class Simulator(Protocol):
     def why_not(self, laminate: Laminate) -> str | None:
         """Return the reason why there can be no input for a laminate, or None."""
 
-    def export(self, laminate: Laminate, request: Wish, folder: Path) -> None:
+    def export(self, laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
         """Write the simulator's input, with all that it loads."""
 
-    def run(self, laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+    def run(
+        self, laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress
+    ) -> Result:
         """Write the input, run it, and read the results back."""
 
 
@@ -91,7 +93,7 @@ def users(field_name: str) -> list[str]:
 
 
 def chamber_pressures(
-    names: Sequence[str], request: Wish, default: float, most: float = MOST_PRESSURE
+    names: Sequence[str], request: SimulationRequest, default: float, most: float = MOST_PRESSURE
 ) -> dict[str, float]:
     """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 

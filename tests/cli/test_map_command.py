@@ -147,7 +147,7 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
 @pytest.mark.long
 def test_the_calibration_is_the_best_of_its_neighbours() -> None:
     from sbafab.models import paper
-    from sbafab.models.elastic import blocked
+    from sbafab.models.elastic import blocked_force
     from sbafab.models.figures import Factors
     from sbafab.models.stack import stack
     from sbafab.reproduction.rows import FITTED
@@ -156,7 +156,7 @@ def test_the_calibration_is_the_best_of_its_neighbours() -> None:
 
     def missed(loss: float) -> float:
         found = stack(design, factors=Factors(FITTED.press_factor, pocket_loss=loss))
-        return abs(float(blocked(found, paper.FORCE_KPA, 0.0)) - paper.FORCE_1DOF[0].value)
+        return abs(float(blocked_force(found, paper.FORCE_KPA, 0.0)) - paper.FORCE_1DOF[0].value)
 
     assert FITTED.modulus_mpa is None
     best = missed(FITTED.pocket_loss)

@@ -8,7 +8,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.elastic import filled
+from sbafab.models.elastic import time_to_fill
 from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
 from sbafab.models.stack import Stack
 
@@ -60,7 +60,7 @@ def test_a_pump_of_water_puts_in_what_it_delivers(three: Stack) -> None:
 
 
 def test_a_prediction_of_water_is_what_the_motion_does(three: Stack) -> None:
-    time, pose = filled(three, 35.0, 10.0)
+    time, pose = time_to_fill(three, 35.0, 10.0)
     motion = three.motion(line=Line(WATER))
     for _ in range(4):
         motion.step(time / 4, flows=(35e3 / 60 / 3,) * 3)

@@ -16,7 +16,13 @@ from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.film_elements import Elements, air_volume, bending, membrane
 from sbafab.models.rim_modes import EDGE, OVERTONES, PLACES, UP, R, Waves, Waving, Z, first_of
-from sbafab.models.rippled import height_ratio, pressed, resolved, rippled, risen
+from sbafab.models.rippled import (
+    compressed_shapes,
+    free_shapes,
+    height_ratio,
+    resolves_waves,
+    rippled,
+)
 
 WIDE = Balloon(5.0)
 INNER = Balloon(5.0, neck=1.27, bore=0.52)
@@ -142,9 +148,9 @@ def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
         replace(WIDE, wrinkles=False),
         replace(WIDE, mate=Balloon(5.0, thickness=0.05)),
     ):
-        assert not resolved(one)
-        assert risen(one, 1.0).height == inflate(one, 1.0).height
-    assert risen(WIDE, 30.0).height == inflate(WIDE, 30.0).height
+        assert not resolves_waves(one)
+        assert free_shapes(one, 1.0).height == inflate(one, 1.0).height
+    assert free_shapes(WIDE, 30.0).height == inflate(WIDE, 30.0).height
     with pytest.raises(DesignError, match="above 0 kPa"):
         rippled(WIDE, [1.0, 0.0])
 
@@ -152,10 +158,10 @@ def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
 def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
     """Of W(p, h), beside a smaller share of what waves themselves keep (see ``balloon_map``)."""
     p, h, step = np.array([0.4, 1.5, 6.0]), np.array([1.0, 2.0, 3.0]), 1e-4
-    found = pressed(WIDE, p, h)
+    found = compressed_shapes(WIDE, p, h)
 
     def potential(dp: float, dh: float) -> np.ndarray:
-        one = pressed(WIDE, p + dp, h + dh)
+        one = compressed_shapes(WIDE, p + dp, h + dh)
         return np.asarray(one.energy - (p + dp) * one.volume)
 
     force = -(potential(0, step) - potential(0, -step)) / (2 * step)
@@ -168,7 +174,7 @@ def test_free_heights_of_the_map_are_those_with_waves() -> None:
     p = np.array([0.5, 1.0, 3.0, 8.0])
     assert (height_ratio(INNER, p).share > 1.005).all()
     found = balloon_map(INNER, 50.0).free_height(p)
-    assert found == pytest.approx(risen(INNER, p).height, rel=0.015)
+    assert found == pytest.approx(free_shapes(INNER, p).height, rel=0.015)
 
 
 @pytest.mark.long

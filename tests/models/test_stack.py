@@ -13,8 +13,8 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.elastic import blocked
-from sbafab.models.rippled import risen
+from sbafab.models.elastic import blocked_force
+from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import (
     MOST_STEPS,
@@ -138,14 +138,14 @@ def test_one_chamber_is_its_balloons_in_series() -> None:
     for pressure, force in zip((10, 100), alone.force, strict=True):
         held = one.pose((pressure,), plate=one.flat_height + 6 * 0.5)
         assert held.force == pytest.approx(force / 1000, rel=0.02)
-        assert float(blocked(one, pressure, 6 * 0.5)) == pytest.approx(force / 1000, rel=0.02)
+        assert float(blocked_force(one, pressure, 6 * 0.5)) == pytest.approx(force / 1000, rel=0.02)
 
 
 def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
     sizes = [12.0, 9.0, 6.0]
     taper = sbafab.stack("1dof-10mm", {"chamber.diameter": sizes}, "stack.balloons=3")
     bound = 100e-3 * math.pi * 3.0**2
-    found = blocked(taper, 100.0, np.linspace(0, 3, 7))
+    found = blocked_force(taper, 100.0, np.linspace(0, 3, 7))
     assert (found <= bound).all()
     assert (np.diff(found) <= 1e-9).all()
     assert found[0] > 0.9 * bound
@@ -275,7 +275,7 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
     assert 10 < wide.most_pressure < 110
     with pytest.raises(DesignError, match="outside the balloon's map"):
         wide.pose((110,))
-    free = risen(wide.maps[0].balloon, 1.0)
+    free = free_shapes(wide.maps[0].balloon, 1.0)
     assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
 
 

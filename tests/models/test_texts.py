@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.models import elastic, paper
-from sbafab.models.elastic import blocked
+from sbafab.models.elastic import blocked_force
 from sbafab.models.stack import Stack
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -45,7 +45,7 @@ def test_shares_of_the_force_that_the_paper_measured(three: Stack) -> None:
     assert said
     full = paper.FULL_HEIGHT.value - three.flat_height
     for share, measured, value in zip(paper.HEIGHTS, paper.FORCE_3DOF, said.groups(), strict=True):
-        pushed = 3 * float(blocked(three, paper.FORCE_KPA, share * full))
+        pushed = 3 * float(blocked_force(three, paper.FORCE_KPA, share * full))
         assert float(value) == pytest.approx(measured.value / pushed, abs=0.051)
 
 

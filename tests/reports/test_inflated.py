@@ -19,12 +19,12 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, outline_diameter
 from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
-from sbafab.reports.inflated_picture import PictureWish, picture_png, pose_of, write_picture
+from sbafab.reports.inflated_picture import PictureRequest, picture_png, pose_of, write_picture
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
 TWO = {"chamber1": 5.0, "chamber2": 5.0}
-SMALL = PictureWish(TWO, width=160, height=128, frames=4)
+SMALL = PictureRequest(TWO, width=160, height=128, frames=4)
 
 
 @pytest.fixture(scope="module")
@@ -117,10 +117,10 @@ def test_chambers_that_no_volume_names_are_said_to_be_empty(
     laminate: Laminate, stack: Stack
 ) -> None:
     with pytest.raises(DesignError, match=r"empty: name chamber2 and chamber3$"):
-        pose_of(laminate, stack, PictureWish({}, {"chamber1": 900.0}))
+        pose_of(laminate, stack, PictureRequest({}, {"chamber1": 900.0}))
     every = {f"chamber{number}": 900.0 * (number == 1) for number in (1, 2, 3)}
     with pytest.raises(DesignError, match=r"nearer together$"):
-        pose_of(laminate, stack, PictureWish({}, every))
+        pose_of(laminate, stack, PictureRequest({}, every))
 
 
 def test_the_picture_shows_full_chambers_and_is_the_same_again(

@@ -11,14 +11,14 @@ from string import ascii_uppercase
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.assemblies.checks import runs
+from sbafab.assemblies.checks import supply_runs
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.shapes import colours
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.models.formulas import inflated_diameter, reached_diameter
 from sbafab.pressing.cycles import Runs
-from sbafab.pressing.schedule import listed
+from sbafab.pressing.schedule import joined_words
 from sbafab.reports.traveller import base_plate, bench, bill, units
 from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import Item
@@ -269,8 +269,8 @@ def _not_together(job: AssemblyJob) -> str:
         f"{design.name} {units.millimetres(design.work.laminate.thickness)}" for design in job.works
     ]
     return (
-        f"Not pressed together: {listed([design.name for design in job.works])}. Their stacks "
-        f"differ in height ({listed(sizes)}) and steps; the paper presses only like patterns at "
+        f"Not pressed together: {joined_words([design.name for design in job.works])}. Their stacks "
+        f"differ in height ({joined_words(sizes)}) and steps; the paper presses only like patterns at "
         "once, and glues these parts to each other."
     )
 
@@ -325,11 +325,11 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
         early = bool(lines) and carrier is not None
         actions = list(_ready(placed))
         if early:
-            actions = [Action(f"Take {placed.name} with {listed(lines)} in it.")]
+            actions = [Action(f"Take {placed.name} with {joined_words(lines)} in it.")]
         if carrier is not None:
             title += f", {_where(placed)} of {carrier.name}"
             if early and isinstance(carrier.part, Tube):
-                actions.append(Action(f"Lead {listed(lines)} through {carrier.name}."))
+                actions.append(Action(f"Lead {joined_words(lines)} through {carrier.name}."))
             actions += _fix(placed, carrier)
         actions += _supply(placed, carrier, assembled)
         if placed.part.note:
@@ -585,12 +585,14 @@ def _supply(
     if placed.made is None or not placed.made.laminate.inlets:
         return
     tie = "tie them there with a turn of thread, loose enough for tubes to slide"
-    tube_runs = runs(placed, assembled)
+    tube_runs = supply_runs(placed, assembled)
     if carrier is not None and tube_runs:
         away = "start" if placed.part.at == "end" else "end"
-        over = listed(list(dict.fromkeys(name for run in tube_runs for name in run.over)))
+        over = joined_words(list(dict.fromkeys(name for run in tube_runs for name in run.over)))
         past = f"; where one crosses {over}, leave it slack" if over else ""
-        places = listed([f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in tube_runs])
+        places = joined_words(
+            [f"{run.chamber} at {round(run.angle, 1) % 360:g}" for run in tube_runs]
+        )
         yield Action(
             f"Fold each tab back over the rim, round its tube and not flat, and lead the tubes "
             f"along the outside of {carrier.name} toward its {away}: {places} degrees{past}; {tie}."
@@ -661,7 +663,7 @@ def bought(assembled: Assembled, copies: int) -> list[Item]:
     glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:
         joints = [placed.name for placed in assembled.parts if _adhesive(placed) == glue]
-        items.append(Item("Adhesive", f"{glue}, for {listed(joints)}", "as needed"))
+        items.append(Item("Adhesive", f"{glue}, for {joined_words(joints)}", "as needed"))
     return items
 
 

@@ -6,14 +6,14 @@ from collections import Counter
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import plate_corner
-from sbafab.laminate.base_plate import MAKINGS, most_play
+from sbafab.laminate.base_plate import HOLE_PROCESSES, most_play
 from sbafab.laminate.laminate import Pin
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pieces
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import PinHole, pin_holes, push_out
 from sbafab.pressing.schedule import (
     Schedule,
     Step,
-    listed,
+    joined_words,
 )
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
@@ -89,7 +89,7 @@ def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
     """Return depth, push-out hole and pins of a hole, as the table has them."""
     if hole is None:
         return "not used", "", ""
-    lengths = listed([f"{length:g}" for length in hole.lengths])
+    lengths = joined_words([f"{length:g}" for length in hole.lengths])
     return f"{hole.depth:g} ± {hole.tolerance:g}", f"{hole.push_out:g}", f"{lengths} mm"
 
 
@@ -102,7 +102,7 @@ def plate_notes(work: Work) -> tuple[str, ...]:
     """Return how the plate's holes are made, how true they are, and what the rules count for it."""
     design = work.design
     registration = design.registration
-    making = MAKINGS[registration.plate_made_by]
+    making = HOLE_PROCESSES[registration.plate_made_by]
     several = len(work.laminate.pins) > 1
     counted = design.pin_error if several else design.lone_pin_error
     play = most_play(design.thickest_pin, registration.plate_made_by)
@@ -135,7 +135,7 @@ def _underlay_words(work: Work) -> str:
     steps = [step.step for step in work.schedule.steps if _has_underlay(step)]
     if not steps:
         return ""
-    which = listed([str(number) for number in steps])
+    which = joined_words([str(number) for number in steps])
     thick = units.millimetres(work.design.press.underlay_thickness)
     pins = ", which the pin heights allow for" if work.laminate.pins else ""
     return (
@@ -214,7 +214,7 @@ def items(work: Work) -> list[tuple[str, str, str]]:
     thick = {item.part: item for item in first.build_up}
     size = units.size(*first.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
-    sheets = pieces(pad.thickness_mm)
+    sheets = pad_sheets(pad.thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
     holes = (
         f"; stepped holes from {work.job.fixture} and the hole table"

@@ -21,7 +21,7 @@ from sbafab.pressing.schedule import (
     Heating,
     HeatPoint,
     Step,
-    listed,
+    joined_words,
 )
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.base_plate import punch
@@ -193,7 +193,7 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
-            f"back right; over it {film}. The print shows the edges of {listed(patterns)}{eye}."
+            f"back right; over it {film}. The print shows the edges of {joined_words(patterns)}{eye}."
         )
     ]
 
@@ -368,7 +368,7 @@ def film_words(works: Sequence[Work]) -> str:
     """Return which pressure-indicating film covers what the films get."""
     low, high = pressure_range(works)
     classes = film_classes(low, high)
-    names = listed(
+    names = joined_words(
         [f"{film.name} ({film.product}, {film.low:g} to {film.high:g} kPa)" for film in classes]
     )
     return (
@@ -428,7 +428,7 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
     if nominal:
         yield (
-            f"Kerf of {listed(nominal)} measured and the files generated again; or it is accepted "
+            f"Kerf of {joined_words(nominal)} measured and the files generated again; or it is accepted "
             "that edges are nominal (warning above)."
         )
     if any(film.warning for film in films):
@@ -484,8 +484,8 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         rows.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
     sizes = sorted({pin.diameter for laminate in laminates for pin in laminate.pins})
     if sizes:
-        diameters = listed([f"⌀{units.millimetres(size)}" for size in sizes])
-        thin = listed([f"⌀{units.millimetres(punch(size))}" for size in sizes])
+        diameters = joined_words([f"⌀{units.millimetres(size)}" for size in sizes])
+        thin = joined_words([f"⌀{units.millimetres(punch(size))}" for size in sizes])
         has_underlay = any(work.job.underlay is not None for work in works)
         pricked = "release film and underlay" if has_underlay else "the release film"
         rows += [

@@ -23,7 +23,7 @@ from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.formulas import sizes
-from sbafab.pressing.schedule import Schedule, listed
+from sbafab.pressing.schedule import Schedule, joined_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
@@ -247,7 +247,7 @@ class LayUpRow:
 def _lay_up(work: Work) -> list[LayUpRow]:
     """Return the layers bottom to top, rounds once."""
     pins_of = {
-        index: listed([pin.name for pin in pins]) if pins else BY_HAND
+        index: joined_words([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
     return [row for turn in rounds(work.laminate.layers) for row in _round_rows(pins_of, turn)]

@@ -11,7 +11,7 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
-from sbafab.pressing.schedule import listed
+from sbafab.pressing.schedule import joined_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import bench, process, units
 from sbafab.reports.traveller.bill import (
@@ -95,7 +95,8 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
     design, laminate = work.design, work.laminate
     pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
     ticks = tuple(
-        f"{listed([str(mask.index) for mask in masks])} on {film.index}" for film, masks in pairs
+        f"{joined_words([str(mask.index) for mask in masks])} on {film.index}"
+        for film, masks in pairs
     )
     tack = units.minutes(design.panel.tack_minutes)
     return [
@@ -160,7 +161,7 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
     step = page.step
     films = [pair for pair in _pairs(work.laminate) if pair[0].index in step.adds]
     ticks = tuple(
-        f"{film.index} with {listed([str(mask.index) for mask in masks])}"
+        f"{film.index} with {joined_words([str(mask.index) for mask in masks])}"
         if masks
         else str(film.index)
         for film, masks in films
@@ -353,8 +354,12 @@ def _tack_pins(work: Work) -> str:
     """Return the height of the corner pins for the tacks: far lower than for the whole stack."""
     tacking = work.schedule.tacking
     assert tacking is not None
-    stands = listed(list(dict.fromkeys(units.millimetres(pin.stands_mm) for pin in tacking.pins)))
-    lengths = listed(list(dict.fromkeys(units.millimetres(pin.length_mm) for pin in tacking.pins)))
+    stands = joined_words(
+        list(dict.fromkeys(units.millimetres(pin.stands_mm) for pin in tacking.pins))
+    )
+    lengths = joined_words(
+        list(dict.fromkeys(units.millimetres(pin.length_mm) for pin in tacking.pins))
+    )
     beneath = tacking.stack_mm + work.design.press.release_thickness
     out = units.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
     return (

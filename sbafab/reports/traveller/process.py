@@ -16,7 +16,7 @@ from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY
 from sbafab.pressing.cycles import Runs
-from sbafab.pressing.schedule import Step, listed
+from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import bench, units
@@ -282,7 +282,7 @@ def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
     there = inlets_in(laminate, layers)
     if not there:
         return ""
-    points = listed([f"{inlet.chamber} {units.toward(inlet)}" for inlet in there])
+    points = joined_words([f"{inlet.chamber} {units.toward(inlet)}" for inlet in there])
     return f"inlet tabs point as in the picture ({points}), "
 
 
@@ -366,7 +366,7 @@ def leak_test(work: Work) -> list[Action]:
     lumen = ["lumen"] if work.laminate.lumen else []
     alone = work.job.copies == 1
     where = "at the head of this traveller" if alone else "beside its serial number"
-    places = listed(["outline", "tab", "tube", "cap", *lumen])
+    places = joined_words(["outline", "tab", "tube", "cap", *lumen])
     several = (
         [
             Action(
@@ -462,7 +462,7 @@ def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
 
 def _punches(step: Step) -> str:
     sizes = sorted({(pin.diameter_mm, pin.seat_mm) for pin in step.pin_settings})
-    return listed(
+    return joined_words(
         [
             f"⌀{diameter:g} by {units.millimetres(seat)}, punch "
             f"⌀{units.millimetres(punch(diameter))}"

@@ -15,7 +15,7 @@ from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
 from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
 from sbafab.pressing.dowels import PinSetting, push_out
-from sbafab.pressing.schedule import Step, listed
+from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import units
@@ -659,7 +659,7 @@ def _section_pins(
 def pin_lines(step: Step) -> str:
     """Return names, size, depth of hole and heights over plate and stack, equal pins together."""
     return "; ".join(
-        f"{listed(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
+        f"{joined_words(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
         f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
         f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
         f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"

@@ -17,7 +17,7 @@ from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats.inp import write_inp
-from sbafab.simulators.simulator import Wish, chamber_pressures
+from sbafab.simulators.simulator import SimulationRequest, chamber_pressures
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -77,11 +77,11 @@ class DeckSettings:
 
 
 def deck_settings(
-    laminate: Laminate, request: Wish | None = None, procedure: Procedure = "dynamic"
+    laminate: Laminate, request: SimulationRequest | None = None, procedure: Procedure = "dynamic"
 ) -> DeckSettings:
     """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
-    pressures = chamber_pressures(names, request or Wish(), PAPER_PRESSURE)
+    pressures = chamber_pressures(names, request or SimulationRequest(), PAPER_PRESSURE)
     films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
     film = films.pop("TPE", TPE)
     return DeckSettings(pressures, procedure, film=film, others=films)

@@ -23,7 +23,7 @@ from sbafab.meshing.conforming.layup import Symmetry, images, sector
 from sbafab.meshing.conforming.mesh import CORNERS, FACES, Mesh
 from sbafab.meshing.formats.vtu import write_fields
 from sbafab.meshing.surface import Surface
-from sbafab.reports.canvas import AMBIENT, draw_length_bar, seen, view_of
+from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.spreadsheet import csv_text
@@ -313,7 +313,7 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     width, height = (side * ENLARGED for side in SIZE)
     edge, foot = MARGIN * ENLARGED, FOOT * ENLARGED
     view = view_of([surface], ELEVATION, AZIMUTH, (edge, edge, width - edge, height - edge - foot))
-    buffer = seen([surface], view, width, height, LAMP)
+    buffer = rasterize([surface], view, width, height, LAMP)
     stress = frame.von_mises
     most = float(stress.max()) or 1.0
     colours = _coloured(stress[surface.faces].mean(axis=1) / most)

@@ -38,7 +38,7 @@ from sbafab.simulators.simulator import (
     INTERRUPTED,
     OUT_OF_TIME,
     Result,
-    Wish,
+    SimulationRequest,
     program_path,
     run_program,
 )
@@ -234,13 +234,13 @@ def why_not(laminate: Laminate) -> str | None:
     return None
 
 
-def export(laminate: Laminate, request: Wish, folder: Path) -> None:
+def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
     """Write the deck, and the mesh that it includes."""
     mesh, settings = _settings(laminate, request)
     write_deck(deck_mesh(laminate, mesh), settings, folder)
 
 
-def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
     """Run the deck; the folder holds deck, results, table and pictures."""
     mesh, settings = _settings(laminate, request)
     history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, tell)
@@ -254,7 +254,7 @@ def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Resu
     return Result(tuple(rows), figures, history.stopped)
 
 
-def _settings(laminate: Laminate, request: Wish) -> tuple[MeshSettings, DeckSettings]:
+def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSettings, DeckSettings]:
     defaults = MeshSettings()
     mesh = MeshSettings(
         h=defaults.h if request.h is None else request.h,

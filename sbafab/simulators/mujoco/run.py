@@ -16,7 +16,14 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
 from sbafab.simulators.coarse.shell import PRESSURE
 from sbafab.simulators.mujoco.model import DATA, MODEL, SECTORS, why_no_model, write_model
-from sbafab.simulators.simulator import Result, Tip, Wish, chamber_pressures, refuse_time, tip_at
+from sbafab.simulators.simulator import (
+    Result,
+    SimulationRequest,
+    Tip,
+    chamber_pressures,
+    refuse_time,
+    tip_at,
+)
 
 SECONDS = 5.0
 RAMP = 1.0
@@ -229,13 +236,13 @@ def why_not(laminate: Laminate) -> str | None:
     return why_no_model(laminate)
 
 
-def export(laminate: Laminate, request: Wish, folder: Path) -> None:
+def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
     """The model and a script that inflates it."""
     refuse_time(SECONDS if request.seconds is None else request.seconds, LEAST_TIME)
     write_model(laminate, folder, _pressures(laminate, request))
 
 
-def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
     """Write the model and inflate it to the end."""
     pressures = _pressures(laminate, request)
     seconds = SECONDS if request.seconds is None else request.seconds
@@ -253,5 +260,5 @@ def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Resu
     return Result(tuple(rows), figures, result.stopped)
 
 
-def _pressures(laminate: Laminate, request: Wish) -> dict[str, float]:
+def _pressures(laminate: Laminate, request: SimulationRequest) -> dict[str, float]:
     return chamber_pressures([chamber.name for chamber in laminate.chambers], request, PRESSURE)

@@ -19,8 +19,8 @@ from sbafab.simulators.coarse.shell import PRESSURE, checked
 from sbafab.simulators.simulator import (
     Ended,
     Result,
+    SimulationRequest,
     Tip,
-    Wish,
     chamber_pressures,
     program_path,
     refuse_time,
@@ -348,13 +348,13 @@ def why_not(laminate: Laminate) -> str | None:
     return why_no_scene(laminate)
 
 
-def export(laminate: Laminate, request: Wish, folder: Path) -> None:
+def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
     """Write all the scenes."""
     refuse_time(USUAL.seconds if request.seconds is None else request.seconds, TIP_PERIOD)
     write_scenes(laminate, folder, _pressures(laminate, request), request.volumes or None)
 
 
-def run(laminate: Laminate, request: Wish, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
     """Write all the scenes and run one of them with runSofa."""
     if request.volumes and request.scene != "volume":
         raise DesignError("--volume is for --scene volume; the other scenes are told pressures")
@@ -383,5 +383,5 @@ def _reached(laminate: Laminate, result: SofaRun) -> list[tuple[str, float, str]
     return [*tip, ("tilt", result.last.tilt, "degrees"), ("drift in 1 s", drift, "mm")]
 
 
-def _pressures(laminate: Laminate, request: Wish) -> dict[str, float]:
+def _pressures(laminate: Laminate, request: SimulationRequest) -> dict[str, float]:
     return chamber_pressures([chamber.name for chamber in laminate.chambers], request, PRESSURE)
