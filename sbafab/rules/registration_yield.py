@@ -365,8 +365,8 @@ def picked(some: Bools) -> Indices:
 # Random builds in which every margin of an interface keeps its limit.
 #
 # Most builds are decided without the sum of a row: by the cuts alone where the films hardly move,
-# and by the length of all shifts together, the most that any normal loses. The rest is summed up row by
-# row, and the sum decides. All interfaces are queried at once, in arrays.
+# and by the length of all shifts together, the most that any normal loses. The rest is summed up
+# row by row, and the sum decides. All interfaces are queried at once, in arrays.
 
 
 SURE = 1e-9 - TOLERANCE
