@@ -647,7 +647,7 @@ class Discs:
 
 @dataclass(frozen=True)
 class Slots:
-    """Oblong pockets, alike in every balloon: half discs of ``width``, a straight ``run``; mm."""
+    """Oblong pockets of every balloon: half discs of ``width`` and a straight ``run``, mm."""
 
     width: float
     run: float

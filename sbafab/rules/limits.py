@@ -76,10 +76,10 @@ class Limits:
 
 def holds(measured: float, limit: float) -> bool:
     """True if a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
-    return measured >= least_held(limit)
+    return measured >= least_passing(limit)
 
 
-def least_held(limit: float) -> float:
+def least_passing(limit: float) -> float:
     """Return the least value that passes a least limit."""
     return limit - TOLERANCE - 1e-9
 

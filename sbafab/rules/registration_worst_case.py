@@ -15,7 +15,7 @@ import numpy as np
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom
-from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
+from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
 from sbafab.rules.measures import DistinctInterface, Measures, interface_name
 from sbafab.rules.rule import Explanation, Rule
@@ -65,7 +65,7 @@ def least_remaining(
     forms = measures.forms
     begins = forms.begins[:-1]
     drawn = forms.by_quantity(
-        {"bond": least_held(limits.bond_width), "overhang": least_held(limits.mask_overhang)}
+        {"bond": least_passing(limits.bond_width), "overhang": least_passing(limits.mask_overhang)}
     )
     # Both edges are cut: two contours, or one that is off on either side.
     cut = forms.nominal - 2 * limits.tolerances.cutting

@@ -269,9 +269,9 @@ def _not_together(job: AssemblyJob) -> str:
         f"{design.name} {units.millimetres(design.work.laminate.thickness)}" for design in job.works
     ]
     return (
-        f"Not pressed together: {joined_words([design.name for design in job.works])}. Their stacks "
-        f"differ in height ({joined_words(sizes)}) and steps; the paper presses only like patterns at "
-        "once, and glues these parts to each other."
+        f"Not pressed together: {joined_words([design.name for design in job.works])}. Their "
+        f"stacks differ in height ({joined_words(sizes)}) and steps; the paper presses only like "
+        "patterns at once, and glues these parts to each other."
     )
 
 

@@ -193,7 +193,8 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
-            f"back right; over it {film}. The print shows the edges of {joined_words(patterns)}{eye}."
+            f"back right; over it {film}. The print shows the edges of "
+            f"{joined_words(patterns)}{eye}."
         )
     ]
 
@@ -428,8 +429,8 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
     if nominal:
         yield (
-            f"Kerf of {joined_words(nominal)} measured and the files generated again; or it is accepted "
-            "that edges are nominal (warning above)."
+            f"Kerf of {joined_words(nominal)} measured and the files generated again; or it is "
+            "accepted that edges are nominal (warning above)."
         )
     if any(film.warning for film in films):
         yield "Laser's owner permits these films; exhaust tested (warning above)."
