@@ -10,10 +10,10 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     Runs,
-    copies_a_day,
     are_apart,
     batch_json,
     batch_times,
+    copies_a_day,
     press_runs,
     runs_of,
 )
