@@ -43,7 +43,10 @@ BUILTIN = {"map": "map_"}
 
 
 class CommandTable(MutableMapping[str, click.Command]):
-    """Commands by name; a command's module is imported when the command is first looked up."""
+    """Commands by name; a command's module is imported when the command is first looked up.
+
+    Commands import geometry, models and writers inside their functions, so that --help loads none.
+    """
 
     def __init__(self) -> None:
         self._loaded: dict[str, click.Command | None] = dict.fromkeys(NAMES)

@@ -358,14 +358,7 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
         return ""
     try:
         difference = _readers()[expected.suffix](actual, expected)
-    except (
-        OutputError,
-        ValueError,
-        LookupError,
-        ArithmeticError,
-        RecursionError,
-        csv.Error,
-    ) as error:
+    except (OutputError, *UNREADABLE) as error:
         difference = f"it cannot be read ({error})"
     return f"{name} is not what design.toml makes: {difference}" if difference else ""
 
