@@ -41,5 +41,5 @@ Counted = Callable[[int, int], None]
 """Called with the number done and the total."""
 
 
-def unheard(stage: str, done: int, total: int) -> None:
+def ignore_progress(stage: str, done: int, total: int) -> None:
     """Ignore progress."""

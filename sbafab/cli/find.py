@@ -284,7 +284,7 @@ def print_result(result: FoundDesign, origin: str, target: Path) -> None:
 
 
 def _counted_requirements(result: FoundDesign) -> str:
-    count = len(result.wanted.requirements)
+    count = len(result.problem.requirements)
     return (
         "the requirement" if count == 1 else f"all {count} requirements" if count else "all rules"
     )
@@ -292,26 +292,26 @@ def _counted_requirements(result: FoundDesign) -> str:
 
 def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
-    requirements = result.wanted.requirements
+    requirements = result.problem.requirements
     for requirement in requirements:
         value = result.best.value(requirement)
-        figure = f"  {requirement.quantity.said} {shown_value(requirement.quantity, value)}"
+        figure = f"  {requirement.quantity.label} {shown_value(requirement.quantity, value)}"
         is_met = requirement.holds(value)
         print_line(f"{figure}; {requirement.bound}{'' if is_met else ': MISSED'}")
         _print_measured(result, requirement.quantity)
-    goal = result.wanted.goal
-    label = goal.said if result.holds else goal.quantity.said
+    goal = result.problem.goal
+    label = goal.label if result.holds else goal.quantity.label
     print_line(f"  {label}: {shown_value(goal.quantity, result.best.value(goal))}")
-    if goal.quantity.said not in [requirement.quantity.said for requirement in requirements]:
+    if goal.quantity.label not in [requirement.quantity.label for requirement in requirements]:
         _print_measured(result, goal.quantity)
-    strokes = [quantity for quantity in result.wanted.quantities if quantity.name == "stroke"]
+    strokes = [quantity for quantity in result.problem.quantities if quantity.name == "stroke"]
     is_full = any(quantity.is_full_stroke for quantity in strokes)
     if strokes and not is_full and result.full_stroke is not None:
         print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
 
 
 def _print_measured(result: FoundDesign, quantity: Quantity) -> None:
-    measured = result.measured.get(quantity.said)
+    measured = result.measured.get(quantity.label)
     if measured is not None:
         print_wrapped(f"({measured.sentence()})", indent="    ")
 
@@ -338,7 +338,7 @@ def _print_miss(result: FoundDesign) -> None:
     """Print hints and the verdict of a search without success."""
     missed = {
         requirement.quantity.name
-        for requirement in result.wanted.requirements
+        for requirement in result.problem.requirements
         if not requirement.holds(result.best.value(requirement))
     }
     is_free = any(free.key == "inlet.tab_length" for free in result.free)

@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 
 QUIET, VERBOSE = "sbafab.quiet", "sbafab.verbose"
 FIRST_LINE_SECONDS = 5.0
@@ -67,7 +67,7 @@ def shown_progress(quiet: bool) -> Iterator[Progress]:
     On a terminal a live line; elsewhere plain lines, the first after some seconds.
     """
     if quiet or is_requested(QUIET):
-        yield unheard
+        yield ignore_progress
     elif sys.stderr.isatty() and not is_requested(VERBOSE):
         with live_line() as progress:
             yield progress

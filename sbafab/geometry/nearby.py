@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
+from typing import NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
+import numpy as np
+
+from sbafab.geometry.edges import EPSILON, Bounds, Edge, Line, Point, distance_to, left_normal
 
 MANY_BOXES = 500
 """Number from which comparing boxes in arrays outweighs loading NumPy."""
@@ -85,7 +88,6 @@ def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, i
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
     # Only large designs need it: reading a drawing must not load NumPy.
-    import numpy as np
 
     sides = np.array(boxes)
     order = np.argsort(sides[:, 0], kind="stable")
@@ -242,3 +244,74 @@ class EdgeIndex:
             if least <= margin or self.all_within(box):
                 return least
             margin = max(2 * margin, self.cell)
+
+
+ALONGSIDE = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+
+
+BESIDE = 1e-5
+"""Rounding: mm by which an edge may miss another's normals."""
+
+
+class Foot(NamedTuple):
+    """A point of an edge, and the unit normal into the material there."""
+
+    point: Point
+    normal: Point
+
+
+class BoundarySide:
+    """An edge of a boundary with values that the search uses repeatedly.
+
+    ``half`` is the distance of its ends from its middle, ``lean`` the sine of its half turn.
+    """
+
+    __slots__ = ("box", "edge", "half", "half_turn", "lean", "middle", "normal")
+
+    def __init__(
+        self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
+    ) -> None:
+        self.edge = edge
+        self.box = box
+        self.middle = middle
+        self.normal = left_normal(edge, middle)
+        self.half_turn = half_turn
+        self.half = half
+        self.lean = math.sin(min(half_turn, math.pi / 2))
+
+    def may_hold_feet(self, side: BoundarySide, within: float) -> bool:
+        """Return True if a normal of this edge may meet ``side`` no farther off than ``within``."""
+        x, y = self.middle
+        nx, ny = self.normal
+        aside = abs((side.middle[0] - x) * ny - (side.middle[1] - y) * nx)
+        return aside <= self.half + side.half + within * self.lean + BESIDE
+
+    def feet(self, p: Point) -> list[Foot]:
+        """Return the points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            x0, y0 = edge.start
+            x1, y1 = edge.end
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        cx, cy = edge.centre
+        r = edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
+        feet = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= least:
+                feet.append(Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return feet

@@ -14,7 +14,7 @@ from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.output.checked import limits
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 
@@ -72,7 +72,7 @@ class Advice:
         }
 
 
-def advise(design: Design, target: float, tell: Progress = unheard) -> Advice:
+def advise(design: Design, target: float, tell: Progress = ignore_progress) -> Advice:
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``.
 
     First both grow by the same amount above the rules' limits until the target is reached; then

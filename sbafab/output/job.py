@@ -23,7 +23,7 @@ from sbafab.output.artefacts import PLACES
 from sbafab.output.checked import Checked, DesignPlan, check, limits, stocks
 from sbafab.output.manifest import Schema
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding
 
@@ -92,7 +92,7 @@ def check_job(
     if isinstance(source, Design):
         return CheckedJob(SCHEMA, source.name, (check(source, progress),))
     if isinstance(source, Assembly):
-        return _check_assembly(source, progress or unheard)
+        return _check_assembly(source, progress or ignore_progress)
     _refuse_names([design.name for design in source], name)
     refuse_other_film(source)
     return CheckedJob(JOB_SCHEMA, name, tuple(check(design, progress) for design in source))

@@ -665,8 +665,8 @@ def warnings(
     if unsold and not press.pin_lengths:
         yield (
             f"{press.pin_standard} has no dowel pin of diameter "
-            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}: change the diameter, "
-            "or make the pins and give their lengths in registration.pin_lengths"
+            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}: change the "
+            "diameter, or make the pins and give their lengths in registration.pin_lengths"
         )
     for step, part in zip(steps, parts, strict=True):
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):

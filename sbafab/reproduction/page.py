@@ -16,9 +16,7 @@ from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
-Written by `sbafab reproduce`; this file, with a last section of its own, by
-`python -m docs.scripts.validate`, and a test holds that it is what the command writes. But for the
-section "Calibrated on the 1-DoF" no constant of a model is fitted. Where a number is itself a
+Written by `sbafab reproduce`. But for the section "Calibrated on the 1-DoF" no constant of a model is fitted. Where a number is itself a
 measurement of the paper (handling time, full height), the row says so. The residual is prediction
 minus paper; in parentheses, how many of the paper's own errors that is, where it gives one. A
 reason that we have not tested says "likely". Models and their ranges are in

@@ -63,7 +63,7 @@ from sbafab.output.checked import (
 from sbafab.output.folder import write_design, write_folder
 from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
 from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
-from sbafab.process import unheard
+from sbafab.process import ignore_progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.version import GENERATOR
@@ -141,7 +141,7 @@ def _job_problems(
             whole = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), checked)
         parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
         designs = [plan_design(design, parts, curves) for design in checked]
-        write_folder(plan_job(whole, designs, folder, unheard), fresh, unheard)
+        write_folder(plan_job(whole, designs, folder, ignore_progress), fresh, ignore_progress)
         problems.extend(_foreign_problems(job, file_names(fresh)))
         problems.extend(_file_problems(folder, fresh, job.files, job.generator))
     return problems
@@ -200,12 +200,12 @@ def _regenerate(
     parts_of_run |= {"press", "preview"} if has_page else set()
     sheets: list[SheetFile] = []
     if parts is not None:
-        nests = find_nests(parts, design, folder, unheard)
-        sheets = write_nested_sheets(nests, design, fresh, settings, unheard)
+        nests = find_nests(parts, design, folder, ignore_progress)
+        sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
     write_plates(checked, paths, fresh, settings)
     pressing = schedule_of(checked) if "press" in parts_of_run else None
     plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
-    return write_design(DesignFolder(plan, sheets, fresh, unheard, parts is not None))
+    return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, parts is not None))
 
 
 def _parts(files: Collection[str]) -> set[RunPart]:
@@ -325,7 +325,7 @@ def _prediction_problems(
         prediction = predict(checked.design, wish)
         plan = DesignPlan(checked, frozenset(("predict",)), settings, prediction=prediction)
         rows = [row for row in ARTEFACTS if row.part == "predict"]
-        write_artefacts(DesignFolder(plan, (), written, unheard), rows)
+        write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
     except (ValueError, OSError) as error:
         message = f"predict.json does not say what was asked for ({error})"
         return [_problem(message, claims.generator, is_done=False)]

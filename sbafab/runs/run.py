@@ -41,7 +41,7 @@ from sbafab.output.manifest import as_json, identity
 from sbafab.output.schema_ids import SIMULATE_SCHEMA
 from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
 from sbafab.simulators.simulator import Name, Result, SimulationRequest, simulator
 
@@ -159,7 +159,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     another design's, and DefectError where the cut files read back are not what was checked; the
     old folder is then whole.
     """
-    tell = progress or unheard
+    tell = progress or ignore_progress
     job = check_job(request.source, request.name, tell)
     target = request.out / job.name
     parts = _parts_to_write(request, job, target)
@@ -317,7 +317,7 @@ def simulate(
 
     Raises DesignError or OutputError for what it cannot do, if possible before it starts.
     """
-    tell = progress or unheard
+    tell = progress or ignore_progress
     result = Result((), {})
     with tempfile.TemporaryDirectory() as temporary:
         checked = check(design, tell)

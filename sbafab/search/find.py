@@ -30,7 +30,7 @@ from sbafab.design.records import Design, Free
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.paper import Counterpart
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
 from sbafab.search.page import front
 from sbafab.search.quantities import Subject, refuse_unknown_key, shown_value
@@ -83,7 +83,7 @@ class FoundDesign:
     stops. ``is_cut_short``: more tries might have led to a better one.
     """
 
-    wanted: SearchProblem
+    problem: SearchProblem
     best: Trial
     binds: tuple[Binding, ...]
     ends: tuple[RangeEnd, ...]
@@ -106,7 +106,7 @@ class FoundDesign:
     @property
     def missed(self) -> list[str]:
         """Requirements and rules that the best design breaks, a sentence each."""
-        return misses(self.wanted, self.best)
+        return misses(self.problem, self.best)
 
     @property
     def measured(self) -> dict[str, Counterpart]:
@@ -115,8 +115,8 @@ class FoundDesign:
             return {}
         subject = self._subject
         return {
-            quantity.said: counterpart
-            for quantity in self.wanted.quantities
+            quantity.label: counterpart
+            for quantity in self.problem.quantities
             if (counterpart := subject.counterpart(quantity)) is not None
         }
 
@@ -133,7 +133,7 @@ class FoundDesign:
     @property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
-        return Subject(self.wanted.design.with_(dict(self.best.values)), self.best.laminate)
+        return Subject(self.problem.design.with_(dict(self.best.values)), self.best.laminate)
 
     @property
     def broken_rules(self) -> list[str]:
@@ -202,7 +202,7 @@ def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
     return free
 
 
-def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
+def find(request: FindRequest, tell: Progress = ignore_progress) -> FoundDesign:
     """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
@@ -303,7 +303,7 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> list[Binding]
             continue
         trial = space.peek(neighbour)
         if _is_nearer(space, point, neighbour, trial, best):
-            broken = misses(space.wanted, space.with_rules(trial))
+            broken = misses(space.problem, space.with_rules(trial))
             if broken:
                 key = space.free[axis].key
                 constraints.append(Binding(key, trial.values[key], "; ".join(broken)))
@@ -358,7 +358,7 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     The best first, also where another one equals it in the goal, then in the order of the goal;
     where they are many the ends and some between. With it how many there are.
     """
-    problem = space.wanted
+    problem = space.problem
     sides = [
         requirement
         for requirement in problem.requirements
@@ -455,12 +455,12 @@ def found_toml(
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in data.items() if isinstance(value, dict)}
     limits = []
-    for requirement in result.wanted.requirements:
+    for requirement in result.problem.requirements:
         value = shown_value(requirement.quantity, result.best.value(requirement))
-        limits.append(f"# {requirement.quantity.said} = {value} ({requirement.bound})")
-    goal = result.wanted.goal
+        limits.append(f"# {requirement.quantity.label} = {value} ({requirement.bound})")
+    goal = result.problem.goal
     value = shown_value(goal.quantity, result.best.value(goal))
-    best = f"# {goal.quantity.said} = {value} (the goal)"
+    best = f"# {goal.quantity.label} = {value} (the goal)"
     keys = keys_said(result.best.values)
     measured = [f"# {name}: {value.sentence()}" for name, value in result.measured.items()]
     head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *limits, best, *measured]

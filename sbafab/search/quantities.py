@@ -79,7 +79,7 @@ class Quantity:
         return self.name == "stroke" and self.kpa is None
 
     @property
-    def said(self) -> str:
+    def label(self) -> str:
         at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
         return f"{self.name}{at}{f'@{self.kpa:g}kPa' if self.kpa is not None else ''}"
 

@@ -266,14 +266,14 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
 
 
 def _name(search: SearchSpace) -> str:
-    requirements = [requirement.said for requirement in search.wanted.requirements]
+    requirements = [requirement.label for requirement in search.problem.requirements]
     keys = [f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}" for free in search.free]
-    design = search.wanted.design
+    design = search.problem.design
     return "; ".join(
         [
             f"{design.name} {design_sha256(design)[:12]}",
             *requirements,
-            search.wanted.goal.said,
+            search.problem.goal.label,
             *keys,
         ]
     )

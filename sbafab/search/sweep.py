@@ -18,7 +18,7 @@ from sbafab.design.files import KIT, OUTLINE, design_sha256, kit_names, plain_ta
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
-from sbafab.process import Progress, unheard
+from sbafab.process import Progress, ignore_progress
 from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
 from sbafab.search.page import sweep_html
 from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
@@ -91,7 +91,7 @@ def designs_of(request: SweepRequest) -> list[Values]:
     return list(latin_hypercube(varied, request.samples, request.seed))
 
 
-def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDesigns:
+def sweep(request: SweepRequest, out: Path, tell: Progress = ignore_progress) -> SweptDesigns:
     """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
 
     What an earlier run measured there counts, as long as design, values and program are the same.

@@ -52,8 +52,8 @@ class Requirement:
         return f"{most} {self.limit:.10g} {self.quantity.unit}".strip()
 
     @property
-    def said(self) -> str:
-        return f"{self.quantity.said} {self.bound}"
+    def label(self) -> str:
+        return f"{self.quantity.label} {self.bound}"
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Goal:
         return -value if self.more else value
 
     @property
-    def said(self) -> str:
-        return f"{'most' if self.more else 'least'} {self.quantity.said}"
+    def label(self) -> str:
+        return f"{'most' if self.more else 'least'} {self.quantity.label}"
 
 
 GOOD_IF_MORE = ("stroke", "bend", "force", "yield", "lumen")
@@ -162,7 +162,7 @@ class Trial:
 
     def value(self, requirement: Requirement | Goal) -> float:
         """The figure that a requirement or the goal is about, in its unit."""
-        return self.figures[requirement.quantity.said]
+        return self.figures[requirement.quantity.label]
 
 
 @dataclass(frozen=True)
@@ -200,11 +200,11 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
         message = " ".join(str(error).split())
         return Trial(values, missed=IMPOSSIBLE, refused=message)
     missed = sum(
-        -min(0.0, requirement.margin(figures[requirement.quantity.said]) + CLOSE)
+        -min(0.0, requirement.margin(figures[requirement.quantity.label]) + CLOSE)
         for requirement in problem.requirements
     )
     missed += sum(_short(requirement) for requirement in (rules or {}).values())
-    cost = problem.goal.cost(figures[problem.goal.quantity.said])
+    cost = problem.goal.cost(figures[problem.goal.quantity.label])
     return Trial(values, figures, rules, missed, cost, _mass(laminate), laminate=laminate)
 
 
@@ -233,7 +233,7 @@ def _figures(
         return yield_margin.measured
 
     return {
-        quantity.said: subject.value(quantity, share_of_good) for quantity in problem.quantities
+        quantity.label: subject.value(quantity, share_of_good) for quantity in problem.quantities
     }
 
 
@@ -242,7 +242,7 @@ def misses(problem: SearchProblem, trial: Trial) -> list[str]:
     if trial.refused:
         return [trial.refused]
     broken = [
-        f"{row.quantity.said} {shown_value(row.quantity, trial.value(row))}, not {row.bound}"
+        f"{row.quantity.label} {shown_value(row.quantity, trial.value(row))}, not {row.bound}"
         for row in problem.requirements
         if not row.holds(trial.value(row))
     ]
@@ -286,7 +286,7 @@ class SearchSpace:
     def __init__(
         self, problem: SearchProblem, free: tuple[Free, ...], tries: int, tell: Progress
     ) -> None:
-        self.wanted = problem
+        self.problem = problem
         self.free = free
         self.tries = self.limit = tries
         self.lows = [0] * len(free)
@@ -354,7 +354,7 @@ class SearchSpace:
         """
         if point not in self.trials:
             self._tell(PROGRESS_LABEL, len(self.trials), self.tries)
-            candidate = evaluated(self.wanted, self.values(point))
+            candidate = evaluated(self.problem, self.values(point))
             so_far = min(
                 (trial.rank for trial in self.trials.values() if trial.rules), default=None
             )
@@ -369,7 +369,7 @@ class SearchSpace:
 
     def peek(self, point: GridPoint) -> Trial:
         """Return the candidate at a point, also out of range; it does not count as a try."""
-        return self.trials.get(point) or evaluated(self.wanted, self.values(point))
+        return self.trials.get(point) or evaluated(self.problem, self.values(point))
 
     def is_excluded(self, axis: int, point: GridPoint) -> bool:
         """Return True if a requirement on the key itself excludes its value at the point."""
@@ -377,14 +377,14 @@ class SearchSpace:
         at = self.number(axis, point)
         return any(
             requirement.quantity.key == key and not requirement.holds(at)
-            for requirement in self.wanted.requirements
+            for requirement in self.problem.requirements
         )
 
     def with_rules(self, trial: Trial) -> Trial:
         """Return the candidate with its rules checked, unless they are known or it was refused."""
         if trial.rules is not None or trial.refused:
             return trial
-        return evaluated(self.wanted, trial.values, with_rules=True)
+        return evaluated(self.problem, trial.values, with_rules=True)
 
     def best(self) -> tuple[GridPoint, Trial]:
         """Return the best candidate, rules checked; where they make it worse, the next is tried."""

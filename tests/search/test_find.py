@@ -32,8 +32,8 @@ def _made_up(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool 
         return Trial(values, missed=1e6, refused="too small")
     figures = {"stroke@50kPa": 0.4 * d * n, "mass": d * d * n / 1000, "width": d + 1.5}
     figures["force@5mm@50kPa"] = max(0.0, 0.04 * d * d * (1 - 5 / (0.4 * d * n)))
-    missed = sum(-min(0.0, one.margin(figures[one.quantity.said])) for one in wanted.requirements)
-    cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
+    missed = sum(-min(0.0, one.margin(figures[one.quantity.label])) for one in wanted.requirements)
+    cost = wanted.goal.cost(figures[wanted.goal.quantity.label])
     return Trial(values, figures, {} if with_rules else None, missed, cost)
 
 
