@@ -22,6 +22,7 @@ def test_time_left_is_that_of_the_pace_so_far() -> None:
         "designs: 100 of 200, 2 per second"
     )
     assert Pace("designs", 100, 400, 5000.0, 5000.0).text.endswith("about 4 h 10 min left")
+    assert Pace("designs", 99, 100, 6.0, 6.0).text.endswith("6 s elapsed, less than 1 s left")
     # Nothing done yet, too early to tell, or nobody knows of how many.
     for done, total, in_stage in ((0, 100, 50.0), (3, 100, 0.5), (0, 0, 50.0)):
         assert Pace("designs", done, total, 60.0, in_stage).remaining is None
@@ -51,7 +52,9 @@ def test_a_stage_begins_where_less_is_done_or_the_total_is_another() -> None:
 
 def test_plain_lines_come_now_and_then_and_verbose_ones_at_every_stage() -> None:
     for verbose, wanted in ((False, [5, 15, 25]), (True, [0, *range(1, 10), *range(10, 30)])):
-        clock, lines, at = Clock(), [], []
+        clock = Clock()
+        lines: list[str] = []
+        at: list[float] = []
 
         def put(
             text: str, lines: list[str] = lines, at: list[float] = at, c: Clock = clock
