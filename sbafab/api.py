@@ -154,7 +154,7 @@ def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
 def resolved(design: Design | Assembly) -> dict[str, Any]:
     """Return the tables of a design or assembly with every default written out; lengths are mm."""
     from sbafab.assemblies.files import plain_tables
-    from sbafab.design.files import resolved as written_out
+    from sbafab.design.records import resolved as written_out
 
     return written_out(design) if isinstance(design, Design) else plain_tables(design)
 

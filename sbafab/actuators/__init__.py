@@ -20,10 +20,9 @@ from sbafab.design.files import (
     open_what_fits,
     override,
     read_toml,
-    start_where_the_user_stands,
-    validated,
+    suggest_from_user_folder,
 )
-from sbafab.design.records import Design
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
@@ -115,7 +114,7 @@ def load_design(
     changes = list(changes)
     data = add_waivers(override(read_toml(path), changes), waivers)
     data.setdefault("name", path.stem)
-    start_where_the_user_stands(data, changes)
+    suggest_from_user_folder(data, changes)
     open_what_fits(data, changes)
     return validated(data, records(), path.parent)
 

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from sbafab.design.files import AnyDesign
-from sbafab.design.records import Design
+from sbafab.design.records import AnyDesign, Design
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError

@@ -32,9 +32,10 @@ from sbafab.actuators.stacking import (
     stacked,
     tab_and_strip,
 )
-from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Drawn, Form, Free, Inlet, Slots, Stack, Wrap
+from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap
 from sbafab.design.section import Section
+from sbafab.design.sections import Chamber as ChamberSection
+from sbafab.design.sections import Inlet, Stack
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point

@@ -21,9 +21,9 @@ from sbafab.actuators.ears import (
     with_tails,
 )
 from sbafab.design.files import listed, shown
-from sbafab.design.records import Bore as BoreSection
-from sbafab.design.records import Chamber as ChamberSection
 from sbafab.design.records import Design, Discs, Drawn, Free
+from sbafab.design.sections import Bore as BoreSection
+from sbafab.design.sections import Chamber as ChamberSection
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point

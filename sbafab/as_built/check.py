@@ -46,8 +46,8 @@ from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
-from sbafab.design.files import design_sha256, validated
-from sbafab.design.records import Design
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, SheetPanel

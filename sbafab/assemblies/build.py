@@ -15,15 +15,15 @@ from sbafab.design.files import (
     ASSEMBLY,
     add_waivers,
     design_path,
-    design_sha256,
     kit_names,
     listed,
     override,
     read_toml,
     shown,
-    validated,
 )
-from sbafab.design.records import Design, RuleName
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, validated
+from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector

@@ -15,20 +15,19 @@ from sbafab.assemblies.records import KINDS, AnyPart, Assembly, CheckName
 from sbafab.design.files import (
     ASSEMBLY,
     Change,
-    actuator_sha256,
     add_waivers,
     changed_keys,
     checked,
     design_path,
-    design_sha256,
     listed,
     override,
     read_toml,
     shown,
     toml_tables,
-    validated,
 )
-from sbafab.design.records import Design, RuleName
+from sbafab.design.identity import actuator_sha256, design_sha256
+from sbafab.design.records import Design, validated
+from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
 
 

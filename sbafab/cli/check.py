@@ -136,7 +136,7 @@ def _run_check(request: CheckRequest) -> bool:
 
 def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
     """Print sizes, kit, notes and findings, and last the verdict."""
-    from sbafab.design.kits import cited
+    from sbafab.design.identity import cited
 
     if outcome.kind == "as-built":
         print_line(f"as built: {outcome.name}")

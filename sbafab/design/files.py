@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
-import json
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,10 +14,8 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from sbafab.design.films import UNCALIBRATED, LayerFilms, without_other_products
-from sbafab.design.records import Acceptance, Design, Inlet, Order, Press, Registration, RuleName
+from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
 
 
 def listed(values: Iterable[object]) -> str:
@@ -43,7 +39,7 @@ def shown(value: object) -> str:
 def sentence(
     error: ValidationError,
     record: type[BaseModel],
-    families: Mapping[str, type[Design]],
+    families: Mapping[str, type[BaseModel]],
     prefix: str,
 ) -> str:
     problems = error.errors(include_url=False)
@@ -118,7 +114,7 @@ def _allowed(problem: Any) -> str:
 
 
 def _unknown_key(
-    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[Design]]
+    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[BaseModel]]
 ) -> str:
     field = ".".join(where)
     families_with_key = [name for name, model in families.items() if field in key_paths(model)]
@@ -159,7 +155,6 @@ OUTLINE = "chamber.outline"
 DIAMETER = "chamber.diameter"
 KIT = "kit"
 AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
-AnyDesign = TypeVar("AnyDesign", bound=Design)
 MOST_BYTES = 1_000_000
 ASSEMBLY = "assembly"
 """The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
@@ -308,7 +303,7 @@ def _set(table: dict[str, Any], key: str, value: Any) -> None:
         table[parts[-1]] = list(value) if isinstance(value, tuple) else value
 
 
-def start_where_the_user_stands(data: dict[str, Any], changes: Iterable[Change]) -> None:
+def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) -> None:
     """Make the paths of drawings and kits that a change names relative to the working directory."""
     keys = set(changed_keys(changes))
     if OUTLINE in keys:
@@ -325,25 +320,6 @@ def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
     fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
     if fits and isinstance(chamber, dict):
         chamber.pop("diameter", None)
-
-
-def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
-    """Return the design with changes made to its keys. Raises DesignError with one sentence."""
-    from sbafab.design.kits import under_kit, without_kit
-
-    changes = list(changes)
-    data = plain_tables(design)
-    if KIT in changed_keys(changes):
-        data = without_kit(data, design)
-    films = override({"films": {}}, changes).get("films")
-    if isinstance(films, dict):
-        data["films"] = without_other_products(data.get("films", {}), films)
-    data = override(data, changes)
-    start_where_the_user_stands(data, changes)
-    open_what_fits(data, changes)
-    data = under_kit(data, design.folder)
-    family = type(design)
-    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
 
 
 def add_waivers(
@@ -383,34 +359,10 @@ def _value(text: str) -> Any:
         return text
 
 
-def validated(
-    data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
-) -> Design:
-    """Return the design record of the family that ``data`` names.
-
-    Raises DesignError with one sentence: field, value, allowed values, remedy.
-    """
-    family = data.get("family")
-    if family is None:
-        raise DesignError(f"family is missing; add family = one of {listed(families)}")
-    if family == ASSEMBLY:
-        raise DesignError(
-            f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
-            "with generate, check, predict and studio, and other commands take one of its designs"
-        )
-    if not isinstance(family, str) or family not in families:
-        near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
-    from sbafab.design.kits import under_kit
-
-    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
-
-
 def checked(
     record: type[AnyRecord],
     data: Mapping[str, Any],
-    families: Mapping[str, type[Design]],
+    families: Mapping[str, type[BaseModel]],
     prefix: str = "",
 ) -> AnyRecord:
     """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
@@ -424,180 +376,6 @@ def checked(
 
 
 FITS = "fits"
-LATER: Mapping[str, Sequence[str]] = {
-    "order": ("success_rate", "certainty", "shift_hours"),
-    "laser": ("hold_tpe", "hold_ptfe"),
-    "panel": ("carrier_adhesive", "carrier_limit_c"),
-}
-"""Keys that came after the first hashes, which have none of them."""
-FIRST_SPARES = 2
-"""What ``order.spares`` was by default, of masks alone; today's default keeps its hash."""
-
-
-def resolved(design: Design) -> dict[str, Any]:
-    """Return the design with every default written out, as plain TOML values."""
-    return _tables(design.completed())
-
-
-def plain_tables(design: Design) -> dict[str, Any]:
-    """The design as tables of a TOML file, defaults that depend on other values left open."""
-    tables = _tables(design)
-    if design.is_solved:
-        del tables["chamber"]["diameter"]
-    return tables
-
-
-def _tables(design: Design) -> dict[str, Any]:
-    tables = _without_none(design.model_dump(mode="json"))
-    if not tables.get(FITS):
-        # Nothing is asked for: an empty table would say nothing.
-        tables.pop(FITS, None)
-    return tables
-
-
-def _without_none(table: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: _without_none(value) if isinstance(value, dict) else value
-        for key, value in table.items()
-        if value is not None
-    }
-
-
-def keys_of(design: Design) -> list[tuple[str, object, object]]:
-    """Return dotted key, value and default of every key, the default only if the value differs."""
-    plain = type(design).model_validate({"name": design.name, "family": design.family})
-    usual = dict(dotted(resolved(plain)))
-    return [
-        (key, value, usual.get(key) if usual.get(key) != value else None)
-        for key, value in dotted(resolved(design))
-    ]
-
-
-def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Yield dotted key and value of every key of nested tables."""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from dotted(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
-
-
-def design_toml(design: Design) -> str:
-    """Return the text of ``design.toml`` of an output folder."""
-    import tomli_w
-
-    return tomli_w.dumps(resolved(design))
-
-
-def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the kit's hash for its path, and without later keys that have their defaults.
-
-    A design that names no kit and no layup keeps the hash that it had before there were any.
-    """
-    from sbafab.design.kits import DEFAULT, kit_of
-
-    table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
-    if design.layup == LayerFilms():
-        table["layup"] = None
-    if design.inlet.adhesive == Inlet().adhesive:
-        table["inlet"]["adhesive"] = None
-    # What came later, where it says what was always so.
-    if design.acceptance == Acceptance():
-        table["acceptance"] = None
-    for key in ("minutes_for", "time_constant"):
-        if getattr(design.press, key) == getattr(Press(), key):
-            table["press"][key] = None
-    tpe = design.films.tpe
-    if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
-        table["films"]["tpe"] |= {"modulus": None, "poisson": None}
-    _as_first_ordered(table, design)
-    table["registration"]["pin_error"] = design.pin_error
-    for name, key, usual in (
-        ("registration", "plate_made_by", Registration().plate_made_by),
-        ("press", "underlay_thickness", Press().underlay_thickness),
-    ):
-        if table[name][key] == usual:
-            table[name][key] = None
-    return _without_none(table)
-
-
-def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
-    """Remove later keys that have their defaults, and keys that only permit a method."""
-    table["registration"].pop("experimental")
-    has_usual_spares = all(
-        getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
-    )
-    if has_usual_spares:
-        table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
-    for section, keys in LATER.items():
-        current = getattr(design, section)
-        default = type(current)()
-        for key in keys:
-            if getattr(current, key) == getattr(default, key):
-                table[section][key] = None
-
-
-def design_sha256(design: Design) -> str:
-    """Return the hash of all that decides the output; a drawn outline counts by its content."""
-    return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
-
-
-def actuator_sha256(design: Design) -> str:
-    """Return the hash of an actuator of the design, however many are made, and on which tools.
-
-    It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
-    registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
-    Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
-    """
-    table = _with_drawing(resolved(design), design)
-    for section in NO_ACTUATOR:
-        table.pop(section, None)
-    films = _films(design)
-    table["layup"] = {role: films.get(name) for role, name in table["layup"].items()}
-    table["bore"] = {"diameter": design.bore.diameter}
-    method = design.registration.method
-    table["registration"] = [
-        method,
-        *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
-    ]
-    table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
-    table["press"] = [getattr(design.press, key) for key in BONDED]
-    return _sha256(table)
-
-
-NO_ACTUATOR = (
-    *("name", "kit", "films", "laser", "sheets", "order", "rules", "acceptance"),
-    FITS,
-)
-"""Sections that do not make another actuator; of films and laser the layup says what counts."""
-PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
-BRIDGED = ("bridge_width", "stub", "tack_minutes")
-BONDED = (
-    *("temperature_c", "pressure_kpa", "platen_width", "platen_length", "flash_bottom_minutes"),
-    *("bond_bottom_minutes", "flash_middle_minutes", "bond_all_minutes"),
-)
-
-
-def _films(design: Design) -> dict[str, list[object]]:
-    """Films by table name: kind, product, thickness, and True if the kerf is measured."""
-    kerfs = {name: film.kerf for name, film in design.films.others.items()}
-    kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
-    return {
-        name: [film.kind, film.product, film.thickness, kerfs[name] != UNCALIBRATED]
-        for name, film in design.films.stock.items()
-    }
-
-
-def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the drawn outline's content in place of its path."""
-    if design.drawing is not None:
-        table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
-    return table
-
-
-def _sha256(table: dict[str, Any]) -> str:
-    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 # The designs and kits that ship, and files that start from them.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,25 +21,22 @@ from sbafab.design.files import (
     checked,
     kit_names,
     listed,
-    plain_tables,
     read_toml,
-    resolved,
     shown,
     templates_folder,
     write_copy,
 )
 from sbafab.design.films import Films, LayerFilms, without_other_products
-from sbafab.design.records import (
+from sbafab.design.section import Section, writable
+from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
-    Design,
     Laser,
     Press,
     Registration,
     Rules,
     Sheets,
 )
-from sbafab.design.section import Section, writable
 from sbafab.design.units import Length, millimetres
 from sbafab.errors import DesignError
 
@@ -47,8 +44,6 @@ DEFAULT = "paper"
 SCHEMA = "sbafab/kit@1"
 FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
-OTHER_TUBE = "tubing of your choice"
-"""What a tube is called whose name stands for another size in the kit."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = (*("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),)
 """Sections of a design that a kit fills in."""
@@ -83,7 +78,7 @@ class Adhesive(Section):
     """Hours until it holds."""
 
 
-class _File(Section):
+class KitFile(Section):
     """All tables of a kit's file, sources taken out."""
 
     schema_name: Literal["sbafab/kit@1"] = Field(alias="schema")
@@ -155,7 +150,7 @@ def read_kit(path: Path) -> Kit:
         if name in _table(plain, section):
             raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
     try:
-        record = checked(_File, plain, {})
+        record = checked(KitFile, plain, {})
     except DesignError as error:
         message = str(error).replace("a design file", "a kit").replace("the design file", "the kit")
         raise DesignError(f"{path}: {message}") from None
@@ -178,14 +173,9 @@ def _shipped(path: Path) -> Kit:
     return read_kit(path)
 
 
-def _kit(kit: object, folder: Path) -> Kit:
+def load_kit(kit: object, folder: Path) -> Kit:
     path = kit_path(kit, folder)
     return _shipped(path) if kit in kit_names() else read_kit(path)
-
-
-def kit_of(design: Design) -> Kit:
-    """Return the kit that a design names. Raises DesignError."""
-    return _kit(design.kit, design.folder)
 
 
 def _without_sources(
@@ -233,7 +223,7 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
     Raises DesignError where there is no such kit, it is faulty, or it lacks the tube.
     """
-    kit = _kit(data.get("kit", DEFAULT), folder)
+    kit = load_kit(data.get("kit", DEFAULT), folder)
     filled = {**data}
     for section, kit_table in kit.tables.items():
         design_table = data.get(section, {})
@@ -245,7 +235,7 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         )
     inlet = data.get("inlet", {})
     if isinstance(inlet, dict):
-        filled["inlet"] = {**_inlet(kit, inlet, "kit" in data), **inlet}
+        filled["inlet"] = {**inlet_of_kit(kit, inlet, "kit" in data), **inlet}
     return filled
 
 
@@ -258,7 +248,7 @@ def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
     return merged
 
 
-def _inlet(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
+def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
     """Kit's tube and adhesive: the first of each, or the size of the tube that the inlet names."""
     values: dict[str, Any] = {}
     if kit.adhesives:
@@ -276,93 +266,9 @@ def _inlet(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]
     return values
 
 
-def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """Return a design's tables without values that its kit or a default gives: another kit may."""
-    kit = kit_of(design)
-    kit_values = {**kit.tables, "inlet": _inlet(kit, {}, False)}
-    usual = type(design).model_validate({"name": "x", "family": design.family, **kit_values})
-    tables = {key: table for key, table in data.items() if isinstance(table, dict)}
-    return {**data, **{key: {} for key in tables}, **_less(tables, plain_tables(usual))}
-
-
-def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that differ from the usual ones; tables that become empty are removed."""
-    rest: dict[str, Any] = {}
-    for key, value in data.items():
-        inner = usual.get(key)
-        difference = (
-            _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
-        )
-        if difference not in (inner, {}):
-            rest[key] = difference
-    return rest
-
-
-def departures(design: Design) -> list[str]:
-    """Return the dotted keys that a design sets otherwise than its kit."""
-    kit = kit_of(design)
-    values, kit_values = resolved(design), dict(_values(kit))
-    keys = [key for key, value in kit_values.items() if _at(values, key) != value]
-    tube = kit.tubes.get(design.inlet.tube)
-    if kit.tubes and tube is None:
-        keys.append("inlet.tube")
-    elif tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
-        keys.append("inlet.tube_outer_diameter")
-    if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
-        keys.append("inlet.adhesive")
-    return keys
-
-
-def tube_name(design: Design) -> str:
-    """Return the design's tubing, unless a tube of that name has another size in the kit."""
-    tube = kit_of(design).tubes.get(design.inlet.tube)
-    if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
-        return OTHER_TUBE
-    return design.inlet.tube
-
-
-def _values(kit: Kit) -> Iterator[tuple[str, object]]:
-    """Every key that a kit gives, and its value as a design would have it."""
-    record = checked(_File, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
-    usual = record.model_dump(mode="json")
-    for key in _dotted(kit.tables):
-        yield key, _at(usual, key)
-
-
-def _dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}"
-
-
-def _at(table: Any, key: str) -> object:
-    for part in key.split("."):
-        table = table.get(part) if isinstance(table, dict) else None
-    return table
-
-
 def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
     table = tables.get(section)
     return table if isinstance(table, dict) else {}
-
-
-def citation(design: Design) -> dict[str, Any]:
-    """Return the kit's entry in manifest and checks: name, version, hash, departures."""
-    kit = kit_of(design)
-    return {
-        "name": kit.name,
-        "version": kit.version,
-        "sha256": kit.sha256,
-        "departures": departures(design),
-    }
-
-
-def cited(design: Design) -> str:
-    """Return the kit's name, version and hash in words."""
-    kit = kit_of(design)
-    return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"
 
 
 def write_kit(file: Path) -> Path:

@@ -21,10 +21,10 @@ from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
-from sbafab.design.files import design_sha256, design_toml, kit_names
+from sbafab.design.files import kit_names
+from sbafab.design.identity import design_sha256, kit_of
 from sbafab.design.kits import FILE as KIT_FILE
-from sbafab.design.kits import kit_of
-from sbafab.design.records import Design
+from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate

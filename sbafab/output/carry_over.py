@@ -8,8 +8,8 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.design.files import dotted, resolved, shown
-from sbafab.design.records import Design
+from sbafab.design.files import shown
+from sbafab.design.records import Design, dotted, resolved
 from sbafab.errors import OutputError
 from sbafab.output.artefacts import ARTEFACTS, tops_of
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity

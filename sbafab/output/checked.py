@@ -12,10 +12,10 @@ from sbafab.actuators.stacking import used_films
 from sbafab.cutting.files import compensated_paths
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.cutting.sheets import Machine
-from sbafab.design.files import design_sha256
 from sbafab.design.films import KerfWidth, Sheet, material
-from sbafab.design.kits import citation
-from sbafab.design.records import NOT_MEASURED, Design, named_film
+from sbafab.design.identity import citation, design_sha256
+from sbafab.design.records import Design
+from sbafab.design.sections import NOT_MEASURED, named_film
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import Kerf
 from sbafab.geometry.region import Region

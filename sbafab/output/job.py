@@ -14,7 +14,8 @@ from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import CutSettings
-from sbafab.design.records import NAME_PATTERN, Design
+from sbafab.design.records import Design
+from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import from_dict, nest

@@ -20,8 +20,7 @@ from sbafab.cutting.lightburn import projects
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.files import design_sha256
-from sbafab.design.kits import citation
+from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import Film, Material

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from sbafab.design.records import Design, named_film
+from sbafab.design.records import Design
+from sbafab.design.sections import named_film
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.laminate.assembly import PLATE_MARGIN, AssemblyStep, assembly
 from sbafab.laminate.laminate import Laminate

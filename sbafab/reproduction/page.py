@@ -16,10 +16,11 @@ from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
-Written by `sbafab reproduce`. But for the section "Calibrated on the 1-DoF" no constant of a model is fitted. Where a number is itself a
-measurement of the paper (handling time, full height), the row says so. The residual is prediction
-minus paper; in parentheses, how many of the paper's own errors that is, where it gives one. A
-reason that we have not tested says "likely". Models and their ranges are in
+Written by `sbafab reproduce`. But for the section "Calibrated on the 1-DoF" no constant of a model
+is fitted. Where a number is itself a measurement of the paper (handling time, full height), the row
+says so. The residual is prediction minus paper; in parentheses, how many of the paper's own errors
+that is, where it gives one. A reason that we have not tested says "likely". Models and their
+ranges are in
 [prediction.md](prediction.md), the paper's inputs (films, widths, temperatures, errors of cutting
 and pins) in [paper.md](paper.md).
 

@@ -12,7 +12,8 @@ from typing import Any
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.files import assembly_sha256, load
 from sbafab.cutting.calibration import table_text
-from sbafab.design.files import Change, design_sha256
+from sbafab.design.files import Change
+from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.results.records import (

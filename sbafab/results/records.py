@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_toml
-from sbafab.design.files import actuator_sha256, design_sha256, design_toml
-from sbafab.design.kits import kit_of
-from sbafab.design.records import Design
+from sbafab.design.identity import actuator_sha256, design_sha256, kit_of
+from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError
 from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.formulas import burst_pressure

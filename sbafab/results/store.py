@@ -19,8 +19,9 @@ from pathlib import Path
 
 from sbafab.actuators import build as laminate_of
 from sbafab.actuators import records
-from sbafab.design.files import ASSEMBLY, actuator_sha256, validated
-from sbafab.design.records import Design
+from sbafab.design.files import ASSEMBLY
+from sbafab.design.identity import actuator_sha256
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.output.checked import limits
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked

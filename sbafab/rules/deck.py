@@ -10,7 +10,7 @@ from dataclasses import replace
 from importlib import import_module
 from typing import get_args
 
-from sbafab.design.records import RuleName
+from sbafab.design.sections import RuleName
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding

@@ -20,13 +20,12 @@ from sbafab.design.files import (
     OUTLINE,
     changed_keys,
     design_path,
-    keys_of,
     kit_names,
     override,
     read_toml,
-    start_where_the_user_stands,
+    suggest_from_user_folder,
 )
-from sbafab.design.records import Design, Free
+from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.paper import Counterpart
@@ -450,7 +449,7 @@ def found_toml(
     """Return the design file of a result, its figures as comments."""
     path = design_path(source)
     data = override(read_toml(path), [*assignments, dict(result.best.values), {"name": name}])
-    start_where_the_user_stands(data, assignments)
+    suggest_from_user_folder(data, assignments)
     _from_anywhere(data, path.parent, set(changed_keys(assignments)))
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in data.items() if isinstance(value, dict)}

@@ -13,8 +13,8 @@ from typing import Any, Literal, NamedTuple
 import sbafab
 from sbafab.actuators import records
 from sbafab.design.files import checked as checked_record
-from sbafab.design.files import design_sha256, keys_of
-from sbafab.design.records import Design
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, keys_of
 from sbafab.errors import SbafabError
 from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.prediction import predict

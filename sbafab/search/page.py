@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE

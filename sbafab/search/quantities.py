@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from sbafab.design.files import key_paths, keys_of, listed, shown
+from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.pressure_units import KILOPASCALS
-from sbafab.design.records import Design, Slots
+from sbafab.design.records import Design, Slots, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, film_mass

@@ -12,7 +12,7 @@ import random
 from collections.abc import Sequence
 from typing import Any
 
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
 from sbafab.search.trial import IMPOSSIBLE, GridPoint, SearchSpace
 

@@ -14,8 +14,9 @@ from typing import IO, Any
 
 from filelock import FileLock, Timeout
 
-from sbafab.design.files import KIT, OUTLINE, design_sha256, kit_names, plain_tables
-from sbafab.design.records import Design
+from sbafab.design.files import KIT, OUTLINE, kit_names
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, plain_tables
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sbafab.actuators import build
-from sbafab.design.files import keys_of, shown
-from sbafab.design.records import Design, Free
+from sbafab.design.files import shown
+from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.output.checked import Checked, limits, refuse_undoable

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
-from sbafab.design.files import key_paths, keys_of, override, shown
-from sbafab.design.records import Design, Free
+from sbafab.design.files import key_paths, override, shown
+from sbafab.design.records import Design, Free, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 from sbafab.search.trial import numbers_of

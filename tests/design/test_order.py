@@ -10,8 +10,8 @@ from scipy.stats import binom
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load_assembly
-from sbafab.design.files import design_sha256
-from sbafab.design.records import builds_for, probability_of
+from sbafab.design.identity import design_sha256
+from sbafab.design.sections import builds_for, probability_of
 from sbafab.errors import DesignError
 
 

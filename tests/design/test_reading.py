@@ -10,16 +10,14 @@ import pytest
 from sbafab.actuators import build, load_design, records
 from sbafab.design.files import (
     ASSEMBLY,
-    design_sha256,
-    design_toml,
     read_toml,
-    resolved,
     template_names,
     template_summaries,
     templates_folder,
     write_new,
 )
-from sbafab.design.records import Design
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 

@@ -11,7 +11,8 @@ from pydantic import BaseModel
 from sbafab.actuators import FAMILIES, build
 from sbafab.assemblies.files import assembly_of
 from sbafab.assemblies.records import KINDS
-from sbafab.design.files import key_paths, read_toml, templates_folder, validated
+from sbafab.design.files import key_paths, read_toml, templates_folder
+from sbafab.design.records import validated
 from sbafab.errors import DesignError
 from sbafab.reports.layers_svg import layers_svg
 

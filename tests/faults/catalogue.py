@@ -11,7 +11,7 @@ from filelock import FileLock
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import read_folder
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor

@@ -11,7 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.output.checked import Checked
 from sbafab.output.manifest import Manifest
 from sbafab.runs import check_folder as derived

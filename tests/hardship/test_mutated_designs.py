@@ -17,8 +17,8 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_toml, load
-from sbafab.design.files import design_toml, template_names, templates_folder
-from sbafab.design.records import Design
+from sbafab.design.files import template_names, templates_folder
+from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
 from sbafab.output.job import check_job
 

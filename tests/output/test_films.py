@@ -11,7 +11,8 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.design.kits import kit_of, write_kit
+from sbafab.design.identity import kit_of
+from sbafab.design.kits import write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.output.checked import press_settings

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output import artefacts
 from sbafab.runs.check_folder import check_folder

@@ -10,7 +10,7 @@ import sbafab
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import assembly_sha256, assembly_toml, load
 from sbafab.assemblies.records import Assembly
-from sbafab.design.files import design_toml
+from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
 from sbafab.reports.traveller.page import record_text
 from sbafab.results.recording import found_by

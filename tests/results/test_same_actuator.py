@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.design.files import actuator_sha256, design_sha256
+from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.errors import DesignError
 from sbafab.results.recording import found_by
 from sbafab.results.records import Build, LabResult, Record, promised

@@ -9,7 +9,7 @@ from typing import NamedTuple, get_args
 
 import pytest
 
-from sbafab.design.records import RuleName
+from sbafab.design.sections import RuleName
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate

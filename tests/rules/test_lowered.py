@@ -6,7 +6,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.actuators.one_dof import OneDofDesign
-from sbafab.design.records import Laser, Rules
+from sbafab.design.sections import Laser, Rules
 from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits, lowered

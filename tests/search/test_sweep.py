@@ -14,7 +14,7 @@ import pytest
 
 import sbafab
 from sbafab.cli.sweep import _as_json
-from sbafab.design.files import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.errors import OutputError
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured

@@ -18,7 +18,7 @@ from sbafab.cutting.properties import (
     ENGRAVE,
     REFERENCE,
 )
-from sbafab.design.kits import tube_name
+from sbafab.design.identity import tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.pressing.cycles import batch_times
 from sbafab.reports.drawing import layer_numbers

@@ -17,7 +17,7 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.kits import cited, departures, tube_name
+from sbafab.design.identity import cited, departures, tube_name
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material

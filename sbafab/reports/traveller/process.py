@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
-from sbafab.design.kits import kit_of, tube_name
+from sbafab.design.identity import kit_of, tube_name
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
