@@ -28,7 +28,7 @@ def speed(record: Record) -> str:
     versions, commands = record.tables["versions"], record.tables["commands"]
     generate = f"{float(versions.cell('generate 3dof-15mm', 'now')):.2g}"
     return (
-        "On one core of an idle 2-core virtual machine, imports included, "
+        "On one core of a 2-core virtual machine, imports included, "
         f"{statistic(versions)} processor time of several rounds:\n"
         f"`sbafab generate 3dof-15mm` takes {generate} s, `sbafab --help` "
         f"{seconds(commands, 'sbafab --help')} s ([benchmarks](docs/benchmarks.md))."

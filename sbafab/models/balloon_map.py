@@ -447,8 +447,9 @@ def nearest_admissible(point: Array, rows: Array, least: Array) -> Array | None:
         mean = float(slack @ push) / len(rows)
         if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
             return x
-        matrix = np.eye(len(x)) + (rows * (push / slack)[:, None]).T @ rows
-        inverse = np.linalg.inv(matrix)
+        weighted = rows * np.sqrt(push / slack)[:, None]
+        # A matrix times its own transpose: BLAS does half of the work.
+        inverse = np.linalg.inv(np.eye(len(x)) + weighted.T @ weighted)
 
         def step(target: Array) -> tuple[Array, Array, Array]:
             ahead = inverse @ (((-target - push * gap) / slack) @ rows - off)  # noqa: B023
