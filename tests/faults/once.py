@@ -24,7 +24,9 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     """
     deck, write = as_built._run_deck, derived._regenerate
     measured = _remembered(deck, _asked_of_deck)
-    meant_by = _remembered(as_built.meant_by, lambda d, curves: f"{design_sha256(d)} {curves}")
+    expected = _remembered(
+        as_built.expected_laminate, lambda d, curves: f"{design_sha256(d)} {curves}"
+    )
     run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
     made: dict[str, Any] = {}
 
@@ -45,7 +47,7 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     def context() -> Iterator[None]:
         with (
             patch.object(as_built, "_run_deck", lambda b: (measured if b.is_expected else deck)(b)),
-            patch.object(as_built, "expected_laminate", meant_by),
+            patch.object(as_built, "expected_laminate", expected),
             patch.object(as_built, "run_deck", run_deck),
             patch.object(derived, "_regenerate", write_once),
         ):
