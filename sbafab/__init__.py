@@ -7,8 +7,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 from sbafab.version import __version__ as __version__
 
 # The module of this name takes longer to load than what is below; a type checker knows it anyway.
@@ -30,6 +28,8 @@ def __getattr__(name: str) -> Any:
     runs through this module.
     """
     if name == "__all__" or not name.startswith("_"):
+        from importlib import import_module
+
         api = import_module("sbafab.api")
         functions = [public for public in api.__all__ if public.islower()]
         if name == "__all__":

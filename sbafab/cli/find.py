@@ -13,8 +13,6 @@ from sbafab.cli.options import json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError
-from sbafab.search.find import FoundDesign
-from sbafab.search.quantities import Quantity, shown_value
 from sbafab.search.quantity_names import quantity_lines
 
 if TYPE_CHECKING:
@@ -22,7 +20,7 @@ if TYPE_CHECKING:
 
     from sbafab.process import Progress
     from sbafab.search.find import FindRequest, FoundDesign
-    from sbafab.search.quantities import Quantity
+    from sbafab.search.quantities import RequestedQuantity
     from sbafab.search.trial import Goal, Requirement, Trial
 
 HELP = """Find the best design that meets requirements.
@@ -292,6 +290,8 @@ def _counted_requirements(result: FoundDesign) -> str:
 
 def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
+    from sbafab.search.quantities import shown_value
+
     requirements = result.problem.requirements
     for requirement in requirements:
         value = result.best.value(requirement)
@@ -310,7 +310,7 @@ def _print_quantities(result: FoundDesign) -> None:
         print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
 
 
-def _print_measured(result: FoundDesign, quantity: Quantity) -> None:
+def _print_measured(result: FoundDesign, quantity: RequestedQuantity) -> None:
     measured = result.measured.get(quantity.label)
     if measured is not None:
         print_wrapped(f"({measured.sentence()})", indent="    ")

@@ -8,10 +8,22 @@ import click
 
 from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
 from sbafab.cli.run import run_parts
-from sbafab.meshing.formats.table import CONFORMING_ENDINGS
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import Element, Symmetry
+
+
+class MeshEnding(click.Choice[str]):
+    """The endings of mesh formats, read from their table when first used, not by ``--help``."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
+        from sbafab.meshing.formats.table import CONFORMING_ENDINGS
+
+        return CONFORMING_ENDINGS
 
 
 def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
@@ -69,7 +81,7 @@ def _fill(
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(CONFORMING_ENDINGS),
+    type=MeshEnding(),
     multiple=True,
     help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
 )
@@ -91,5 +103,5 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
     from sbafab.runs.run import Conforming
 
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
-    conforming = Conforming(settings, formats or CONFORMING_ENDINGS)
+    conforming = Conforming(settings, formats or MeshEnding().choices)
     run_parts(request, ("mesh",), conforming=conforming)

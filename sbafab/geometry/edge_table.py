@@ -6,16 +6,18 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import chain
 from operator import mul
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge
 from sbafab.geometry.nearby import ALONGSIDE, BESIDE, BoundarySide
+from sbafab.geometry.on_demand import np
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Bools = NDArray[np.bool_]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.intp]
+    Bools = NDArray[np.bool_]
 
 
 FEW = 20_000

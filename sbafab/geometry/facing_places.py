@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from sbafab.geometry.cache import cached_batch
 from sbafab.geometry.edge_table import (
     SideTable,
@@ -19,6 +17,7 @@ from sbafab.geometry.edge_table import (
     touching_in_parts,
 )
 from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import ASIDE, TOUCH, Gathered, Width, boundary_of, least_of, search
 
@@ -80,9 +79,6 @@ class FacingPlaces(NamedTuple):
         return FacingPlaces(self.start[:, some], self.end[:, some], self.value[some])
 
 
-NOWHERE = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
-
-
 FacingQuery = tuple[Region, float, float, Width | None]
 """Region, slack (mm), sharp angle (degrees), and least width if measured already."""
 
@@ -95,7 +91,8 @@ def facing_places_of(queries: Sequence[FacingQuery]) -> Sequence[FacingPlaces]:
     square on each other these are samples along edges that run nearly alongside: where a layer
     turns, those may become the narrowest.
     """
-    results = [NOWHERE] * len(queries)
+    nowhere = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
+    results = [nowhere] * len(queries)
     searched: dict[int, Gathered] = {}
     for number, (region, slack, sharp, least_width) in enumerate(queries):
         boundary = boundary_of(region, sharp)

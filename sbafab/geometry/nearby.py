@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
-import numpy as np
-
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Line, Point, distance_to, left_normal
 
 MANY_BOXES = 500
@@ -88,6 +86,7 @@ def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, i
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
     # Only large designs need it: reading a drawing must not load NumPy.
+    import numpy as np
 
     sides = np.array(boxes)
     order = np.argsort(sides[:, 0], kind="stable")

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from sbafab.errors import SbafabError
 from sbafab.geometry.contour import Contour, run_chords, ticks
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.offset import grow
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
 from sbafab.nesting.records import (
     TURNS,
@@ -32,7 +30,12 @@ from sbafab.nesting.records import (
 )
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
     from spyrrow import Item, PlacedItem
+
+    Cells = NDArray[np.bool_]
+    Counts = NDArray[np.intp]
+    Numbers = NDArray[np.float64]
 
 MANY = 600
 """Number of parts from which only the first few ways to fill a sheet are tried."""
@@ -239,10 +242,6 @@ class _Free:
 # Every cell that a region reaches into by more than ``TOUCH`` is set, so parts whose cells are
 # disjoint are disjoint themselves. Rows count upward (y), columns to the right (x).
 
-
-Cells = NDArray[np.bool_]
-Counts = NDArray[np.intp]
-Numbers = NDArray[np.float64]
 
 AT_ONCE = 1_000_000
 """Pairs of runs that are compared at once, which bounds the memory."""

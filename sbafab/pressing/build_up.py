@@ -66,7 +66,7 @@ class BuildUpPart:
 
 
 @dataclass(frozen=True)
-class Footprint:
+class StackShape:
     """Shape of the stacks under the pad: their height, area and length of rim, mm.
 
     ``below`` is how much lower the lowest bond is than the highest: by the masks over it.
@@ -103,7 +103,7 @@ def gent_modulus(shore_a: float) -> float:
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
 
 
-def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> Footprint:
+def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> StackShape:
     """Return the footprint of a stack of layers, given by index, or of the registered sheets that
     they are part of.
 
@@ -119,7 +119,7 @@ def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> F
         role: sum(layer.film.thickness for layer in films if layer.role == role)
         for role in ("chamber-mask", "separator-mask")
     }
-    return Footprint(
+    return StackShape(
         sum(layer.film.thickness for layer in films),
         together * widest.area,
         together * sum(contour.length for contour in widest.outers),
@@ -127,7 +127,7 @@ def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> F
     )
 
 
-def column_modulus(pad: Pad, thickness: float, under: Footprint) -> float:
+def column_modulus(pad: Pad, thickness: float, under: StackShape) -> float:
     """Return the pad's modulus in kPa against the height of a stack.
 
     A sponge gives way column by column. Solid rubber keeps its volume and must flow aside: E (1 +
@@ -142,7 +142,7 @@ def column_modulus(pad: Pad, thickness: float, under: Footprint) -> float:
 
 
 def pressures(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: Footprint
+    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: StackShape
 ) -> Pressures:
     """Return the pressures on a stack by that on the whole platen, in equilibrium with the force.
 
@@ -166,7 +166,7 @@ def pressures(
 
 
 def pad_thickness(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, stacks: Sequence[Footprint]
+    platen_kpa: float, platen: tuple[float, float], pad: Pad, stacks: Sequence[StackShape]
 ) -> float:
     """Return the pad's thickness in mm: the setting's, or the thinnest sold, or pile, that is even
     enough.
@@ -207,7 +207,7 @@ def pad_thickness(
 
 
 def _refusal(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: Footprint
+    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: StackShape
 ) -> str:
     """Return the reason why a pad cannot give the pressure, and a remedy; empty where it can."""
     estimate = pressures(platen_kpa, platen, pad, thickness, under)
@@ -232,7 +232,7 @@ def _refusal(
 
 
 def pressure_basis(
-    platen_kpa: float, pad: Pad, thickness: float, under: Footprint, estimate: Pressures
+    platen_kpa: float, pad: Pad, thickness: float, under: StackShape, estimate: Pressures
 ) -> str:
     """Return the sentence that explains the estimated pressures."""
     return (

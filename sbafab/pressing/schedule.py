@@ -32,8 +32,8 @@ from sbafab.pressing.build_up import (
     RELEASE,
     UNDERLAY,
     BuildUpPart,
-    Footprint,
     Pad,
+    StackShape,
 )
 from sbafab.pressing.dowels import (
     PinHole,
@@ -457,7 +457,7 @@ class _Setting(NamedTuple):
 
     pad: float
     plate: float
-    under: Footprint
+    under: StackShape
     pins: tuple[PinSetting, ...]
     underlay: float
     heating: Heating

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-import numpy as np
-
 from sbafab.geometry.cache import cached, cached_batch
 from sbafab.geometry.edge_table import (
     CellOrder,
@@ -26,6 +24,7 @@ from sbafab.geometry.edge_table import (
 )
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, left_normal
 from sbafab.geometry.facing_places import facing_places_of, sampled
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Interface, Laminate, Pin

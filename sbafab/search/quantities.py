@@ -63,7 +63,7 @@ HOW = (
 
 
 @dataclass(frozen=True)
-class Quantity:
+class RequestedQuantity:
     """A quantity by name or dotted key; force and stroke with their pressure in kPa, force with its
     stroke in mm.
     """
@@ -89,7 +89,7 @@ class Quantity:
         return self.name if "." in self.name else KEYS.get(self.name)
 
 
-def read_quantity(text: str, kpa: float | None = None) -> Quantity:
+def read_quantity(text: str, kpa: float | None = None) -> RequestedQuantity:
     """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
@@ -102,17 +102,17 @@ def read_quantity(text: str, kpa: float | None = None) -> Quantity:
         near = difflib.get_close_matches(name, names, 1)
         mends = f"did you mean {near[0]}?" if near else f"there are {listed(names)} and any key"
         raise DesignError(f"{shown(text)} is not a quantity; {mends}")
-    return Quantity(name, UNPRESSURED.get(name, ""))
+    return RequestedQuantity(name, UNPRESSURED.get(name, ""))
 
 
-def safer(quantity: Quantity, at_least: bool) -> Quantity:
+def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
     """The quantity to hold a limit against: of the inflated diameters the one that is safer."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
     return replace(quantity, name=REACHED if at_least else WIDEST)
 
 
-def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> Quantity:
+def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
     pressure: float | None = None
     stroke: float | None = None
     for place in places:
@@ -138,11 +138,11 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
             f"{shown(text)}: a force needs a stroke, and only a force takes one; {HOW}"
         )
     if pressure is None and name == "stroke":
-        return Quantity(name, AT_PRESSURE[name])
+        return RequestedQuantity(name, AT_PRESSURE[name])
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
-    return Quantity(name, AT_PRESSURE[name], pressure, stroke)
+    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke)
 
 
 def named_pressure(texts: list[str]) -> float | None:
@@ -166,7 +166,7 @@ def _kilopascals(place: str) -> float | None:
     return float(match[1]) * KILOPASCALS[units[0]]
 
 
-def read_limit(quantity: Quantity, text: str) -> float:
+def read_limit(quantity: RequestedQuantity, text: str) -> float:
     """Return the limit of a quantity, in its unit. Raises ValueError with the end of a sentence."""
     if quantity.name == "yield":
         return _share(text)
@@ -201,7 +201,7 @@ def _share(text: str) -> float:
     return limit
 
 
-def shown_value(quantity: Quantity, value: float) -> str:
+def shown_value(quantity: RequestedQuantity, value: float) -> str:
     """A figure with its unit, as people read it."""
     if quantity.name == "force" and value < 0:
         return "none, it does not rise that far"
@@ -223,7 +223,7 @@ class Subject:
     def _keys(self) -> Mapping[str, Any]:
         return {key: value for key, value, _ in keys_of(self.design)}
 
-    def value(self, quantity: Quantity, share_of_good: Callable[[], float]) -> float:
+    def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
@@ -242,7 +242,7 @@ class Subject:
             return float(value)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
-    def _moved(self, quantity: Quantity) -> float:
+    def _moved(self, quantity: RequestedQuantity) -> float:
         """A stroke, bend or force."""
         kpa = quantity.kpa
         if kpa is None:
@@ -297,12 +297,12 @@ class Subject:
         _refuse_stretched(kinds, kpa, stroke)
         return form.pushing * push
 
-    def counterpart(self, quantity: Quantity) -> Counterpart | None:
+    def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
         """Return the paper's measured value where the model is off by over a quarter, or None."""
         name, model = self._figure(quantity)
         return counterpart(self.design.form, name, model)
 
-    def _figure(self, quantity: Quantity) -> tuple[str, str]:
+    def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
         """The name of the figure in ``predict``, and that of its model."""
         at = f"at {quantity.kpa or 0.0:g} kPa"
         if quantity.name == "height":
@@ -348,7 +348,7 @@ def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> No
             )
 
 
-def refuse_unknown_key(quantity: Quantity, design: Design) -> None:
+def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:
     """Raises DesignError for a key that the design does not have, with the one that is meant."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})

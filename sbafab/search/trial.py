@@ -17,7 +17,7 @@ from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
 from sbafab.search.measure import RuleMargin, margins
 from sbafab.search.quantities import (
-    Quantity,
+    RequestedQuantity,
     Subject,
     named_pressure,
     read_limit,
@@ -33,7 +33,7 @@ CLOSE = 1e-9
 class Requirement:
     """A quantity with its lower or upper limit."""
 
-    quantity: Quantity
+    quantity: RequestedQuantity
     limit: float
     at_least: bool
 
@@ -60,7 +60,7 @@ class Requirement:
 class Goal:
     """The quantity to maximise (``more``) or minimise."""
 
-    quantity: Quantity
+    quantity: RequestedQuantity
     more: bool
 
     def cost(self, value: float) -> float:
@@ -178,7 +178,7 @@ class SearchProblem:
         return any(quantity.name == "yield" for quantity in self.quantities)
 
     @property
-    def quantities(self) -> list[Quantity]:
+    def quantities(self) -> list[RequestedQuantity]:
         """The quantities to evaluate: those of the requirements first, then the goal's."""
         return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 

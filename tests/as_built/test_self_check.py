@@ -161,7 +161,7 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
 
     with (
-        patch("sbafab.nesting.engines.bottom_left", moved),
+        patch("sbafab.nesting.nest.bottom_left", moved),
         pytest.raises(DefectError, match=said),
     ):
         generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))

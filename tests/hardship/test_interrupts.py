@@ -133,4 +133,5 @@ def test_the_door_loads_nothing_before_it_is_guarded() -> None:
         "sbafab",
         "sbafab.entry",
         "sbafab.errors",
+        "sbafab.version",
     }

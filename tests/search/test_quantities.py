@@ -9,7 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import Quantity, Subject, read_limit, read_quantity
+from sbafab.search.quantities import RequestedQuantity, Subject, read_limit, read_quantity
 from sbafab.search.trial import read_all
 
 
@@ -21,19 +21,19 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("mass", Quantity("mass", "g")),
-        ("overall-diameter", Quantity("overall_diameter", "mm")),
-        ("stroke@0.5bar", Quantity("stroke", "mm", 50.0)),
-        ("Stroke", Quantity("stroke", "mm")),
-        ("bend", Quantity("bend", "deg", 10.0)),
-        ("stroke@50KPA", Quantity("stroke", "mm", 50.0)),
-        ("stroke@0.1MPa", Quantity("stroke", "mm", 100.0)),
-        ("force@12.5mm@50kPa", Quantity("force", "N", 50.0, 12.5)),
-        ("force@50 kPa@0.5 in", Quantity("force", "N", 50.0, 12.7)),
-        ("chamber.diameter", Quantity("chamber.diameter", "")),
+        ("mass", RequestedQuantity("mass", "g")),
+        ("overall-diameter", RequestedQuantity("overall_diameter", "mm")),
+        ("stroke@0.5bar", RequestedQuantity("stroke", "mm", 50.0)),
+        ("Stroke", RequestedQuantity("stroke", "mm")),
+        ("bend", RequestedQuantity("bend", "deg", 10.0)),
+        ("stroke@50KPA", RequestedQuantity("stroke", "mm", 50.0)),
+        ("stroke@0.1MPa", RequestedQuantity("stroke", "mm", 100.0)),
+        ("force@12.5mm@50kPa", RequestedQuantity("force", "N", 50.0, 12.5)),
+        ("force@50 kPa@0.5 in", RequestedQuantity("force", "N", 50.0, 12.7)),
+        ("chamber.diameter", RequestedQuantity("chamber.diameter", "")),
     ],
 )
-def test_a_quantity_is_read(text: str, found: Quantity) -> None:
+def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
     assert read_quantity(text) == found
 
 
