@@ -15,6 +15,8 @@ from sbafab.geometry.edges import Line
 from sbafab.geometry.region import wound
 from sbafab.output import checked
 
+pytestmark = pytest.mark.long
+
 if TYPE_CHECKING:
     from conftest import Ended, Output, Runs
 

@@ -89,6 +89,7 @@ def test_the_written_design_builds_the_same_assembly(brace: Run) -> None:
     assert assembly_sha256(again) == brace.manifest["design_sha256"]
 
 
+@pytest.mark.long
 def test_the_same_assembly_gives_the_same_bytes(standing: Run, tmp_path: Path) -> None:
     again = generate(RunRequest(load_assembly("standing", SMALL), tmp_path))
     assert file_hashes(again.folder) == file_hashes(standing.folder)
@@ -138,6 +139,7 @@ def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> No
     assert failed == {"tube-match"}
 
 
+@pytest.mark.long
 def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
     keys = [*BRACE, "parts.arm.set.bond.width=0.4"]
     run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
@@ -146,6 +148,7 @@ def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
     assert not list(run.folder.rglob("*.dxf"))
 
 
+@pytest.mark.long
 def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> None:
     whole = load_assembly("aperture", ["parts.arm.set.stack.balloons=2", *OFF], ["seat"])
     run = generate(RunRequest(whole, tmp_path))
@@ -157,6 +160,7 @@ def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> N
     assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
 
 
+@pytest.mark.long
 def test_lowered_limits_of_parts_and_checks_are_said(tmp_path: Path) -> None:
     keys = ["parts.arm.set.stack.balloons=2", "parts.arm.set.rules.bond_width=0.7"]
     whole = load_assembly("aperture", [*keys, "rules.seat_share=0.1"])
@@ -193,6 +197,7 @@ def claims_failed(folder: Path) -> str:
     return " / ".join(f"{f.rule}: {f.message}" for f in failed)
 
 
+@pytest.mark.long
 def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     folder = doctored(standing, tmp_path)
     path = folder / "manifest.json"
@@ -203,6 +208,7 @@ def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     assert said == "manifest-claims: parts or their places are not those of design.toml"
 
 
+@pytest.mark.long
 def test_another_design_file_is_found(standing: Run, tmp_path: Path) -> None:
     folder = doctored(standing, tmp_path)
     path = folder / "design.toml"

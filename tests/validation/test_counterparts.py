@@ -205,6 +205,7 @@ def test_the_studio_s_answers_hold_them(predictions: dict[str, Prediction], tmp_
         assert words in (folder / script).read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_assemblies_hold_them() -> None:
     found = sbafab.predict_assembly("standing")
     told = {figure.name: figure.measured for figure in found.figures}
