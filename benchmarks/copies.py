@@ -15,7 +15,7 @@ SHEET = 900
 def nested_and_cut(copies: int, turn: int) -> float:
     """Seconds from the design to its findings, layer files and film sheets, all read back."""
     from sbafab.actuators import load_design
-    from sbafab.output.run import generate
+    from sbafab.runs.run import RunRequest, generate
 
     sheets = [
         f"sheets.{film}.{side}={SHEET}" for film in ("tpe", "ptfe") for side in ("width", "length")
@@ -23,4 +23,4 @@ def nested_and_cut(copies: int, turn: int) -> float:
     another = f"chamber.diameter={5 + turn / 1000}"
     design = load_design(DESIGN, [f"order.copies={copies}", another, *sheets])
     with tempfile.TemporaryDirectory() as name:
-        return own_seconds(lambda: generate(design, Path(name), ("cut",)))
+        return own_seconds(lambda: generate(RunRequest(design, Path(name), ("cut",))))

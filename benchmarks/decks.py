@@ -22,7 +22,7 @@ def other_height(template: str, turn: int) -> float:
 def checked(template: str, turn: int, *settings: str) -> float:
     """Seconds from a design to its findings: laminate, interfaces and all rules."""
     from sbafab.actuators import build, load_design
-    from sbafab.output.settings import limits
+    from sbafab.output.checked import limits
     from sbafab.rules.deck import run_deck
 
     key, first = VARIED[template]

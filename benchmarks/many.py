@@ -26,7 +26,7 @@ class Reached(NamedTuple):
 def measured(designs: int) -> Iterator[Reached]:
     """Builds and checks designs of other sizes and heights; seeded, so the same every time."""
     from sbafab.actuators import build, load_design
-    from sbafab.output.settings import limits
+    from sbafab.output.checked import limits
     from sbafab.process import prepare
     from sbafab.rules.deck import run_deck
 

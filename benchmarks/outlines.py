@@ -60,7 +60,7 @@ def built_and_checked(edges: int, turn: int) -> float:
     Each turn has an outline of its own: what is asked again of the same one is remembered.
     """
     from sbafab.actuators import build, load_design
-    from sbafab.output.settings import limits
+    from sbafab.output.checked import limits
     from sbafab.rules.deck import run_deck
 
     with tempfile.TemporaryDirectory() as name:

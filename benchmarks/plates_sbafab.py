@@ -8,10 +8,8 @@ from pathlib import Path
 from benchmarks.task import FILLET, Plate, file_name, plates
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.boolean import union
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc, union
 
 
 def profile(plate: Plate) -> Region:

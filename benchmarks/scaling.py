@@ -15,7 +15,7 @@ def rules_and_cut_files(balloons: int, turn: int) -> float:
     """Seconds from the design to its findings and cut files, without the copies' share."""
     from sbafab.actuators import build, load_design
     from sbafab.cutting.files import compensated_paths, write_layer_files
-    from sbafab.output.settings import cut_settings, limits
+    from sbafab.output.checked import cut_settings, limits
     from sbafab.rules.deck import run_deck
 
     another = f"chamber.diameter={5 + turn / 1000}"

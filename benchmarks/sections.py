@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from benchmarks import (
     checking,
-    compiled,
     copies,
     decks,
     many,
@@ -30,7 +29,6 @@ from benchmarks.timing import (
     exponent,
     sizes_by_turns,
 )
-from benchmarks.versions import compared
 
 RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
@@ -53,7 +51,6 @@ def sections(asked: Asked, only: Container[str] = ()) -> Iterator[Section]:
     every: dict[str, Callable[[], Section]] = {
         "plates": lambda: plates(asked.rivals, rounds),
         "decks": lambda: rule_decks(rounds),
-        "compiled": lambda: compiled_beside_plain(rounds),
         "processes": lambda: side_by_side(rounds),
         "memory": lambda: many_designs(asked.designs),
         "balloons": lambda: stacks(rounds),
@@ -122,36 +119,6 @@ def rule_decks(rounds: int) -> Section:
         taken = [decks.other_height(template, turn) for turn in range(BATCH * rounds)]
         rows.append(Row(f"{template}, other heights", taken, rate(taken, "designs")))
     return Section("decks", "A design built, and all rules", rows)
-
-
-def compiled_beside_plain(rounds: int) -> Section:
-    """What the wheel gains that has geometry and rules compiled."""
-    key, title = "compiled", "With geometry and rules compiled, beside plain Python"
-    with tempfile.TemporaryDirectory() as place:
-        folder = compiled.made(Path(place))
-        if folder is None:
-            return Section(key, title, [], ["skipped: no compiler, or no mypyc"])
-        found = compared(ROOT, rounds, folder, compiled.WORKS)
-        decks = {name: _decks_by_turns(folder, name, 8 * rounds) for name in compiled.DECKS}
-    rows = []
-    for one in found:
-        plain = median(one.before)
-        told = f"{plain:.4f} plain, {1 - median(one.now) / plain:.0%} less"
-        rows.append(Row(one.name, one.now, told))
-    for name, (before, now) in decks.items():
-        told = f"{rate(now, 'designs')}, {1 / median(before):.0f} plain"
-        rows.append(Row(f"{name}, built and all rules", now, told))
-    return Section(key, title, rows)
-
-
-def _decks_by_turns(folder: Path, template: str, rounds: int) -> tuple[list[float], list[float]]:
-    """Times of a deck, plain and of the folder."""
-    taken = [
-        (compiled.deck_time(ROOT, template), compiled.deck_time(folder, template))
-        for _ in range(rounds)
-    ]
-    plain, other = zip(*taken, strict=True)
-    return list(plain), list(other)
 
 
 def side_by_side(rounds: int) -> Section:

@@ -29,7 +29,7 @@ def sofa() -> Stepped | None:
     if shutil.which("runSofa") is None:
         return None
     from sbafab.simulators.sofa.run import USUAL, SofaJob, simulate
-    from sbafab.simulators.sofa.shell_scene import DT
+    from sbafab.simulators.sofa.scenes import DT
 
     laminate = sbafab.build(DESIGN)
     pressures = {chamber.name: KPA for chamber in laminate.chambers}

@@ -7,87 +7,33 @@
 
 from __future__ import annotations
 
+from sbafab.version import __version__ as __version__
+
 # The module of this name takes longer to load than what is below; a type checker knows it anyway.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from sbafab.api import (
-        assemble,
-        build,
-        check,
-        check_folder,
-        checking,
-        cut,
-        dimensions,
-        drawing,
-        find,
-        generate,
-        grip,
-        kerf,
-        load,
-        loads,
-        mesh,
-        motion,
-        nest,
-        predict,
-        predict_assembly,
-        press,
-        record,
-        report,
-        resolved,
-        schema,
-        simulate,
-        solid,
-        stack,
-        sweep,
-        template,
-        templates,
-    )
-
-__version__ = "0.1.0"
-__all__ = [
-    "assemble",
-    "build",
-    "check",
-    "check_folder",
-    "checking",
-    "cut",
-    "dimensions",
-    "drawing",
-    "find",
-    "generate",
-    "grip",
-    "kerf",
-    "load",
-    "loads",
-    "mesh",
-    "motion",
-    "nest",
-    "predict",
-    "predict_assembly",
-    "press",
-    "record",
-    "report",
-    "resolved",
-    "schema",
-    "simulate",
-    "solid",
-    "stack",
-    "sweep",
-    "template",
-    "templates",
-]
+    from sbafab.api import *  # noqa: F403
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return [*__getattr__("__all__"), "__version__"]
 
 
 def __getattr__(name: str) -> Any:
-    # The functions are fetched when first asked for, so that `sbafab --help` loads no geometry.
-    if name in __all__:
-        from sbafab import api
+    """Return a function of ``sbafab.api``, which is loaded when first asked for one.
 
-        return getattr(api, name)
+    Loaded so and not by a statement, ``sbafab --help`` loads no geometry, and no circle of imports
+    runs through this module.
+    """
+    if name == "__all__" or not name.startswith("_"):
+        from importlib import import_module
+
+        api = import_module("sbafab.api")
+        functions = [public for public in api.__all__ if public.islower()]
+        if name == "__all__":
+            return functions
+        if name in functions:
+            return getattr(api, name)
     raise AttributeError(f"module 'sbafab' has no attribute '{name}'")

@@ -1,7 +1,7 @@
-"""The door of the ``sbafab`` command, which Ctrl-C ends plainly from the first moment on.
+"""The entry point of the ``sbafab`` command, where Ctrl-C ends the process at once.
 
-Until a command runs there is nothing to tidy up, and an interrupt that is raised amid imports may
-be lost in them or come out as another error: so it ends the process there and then.
+An interrupt raised during imports may be lost or become another error, and before a command runs
+there is nothing to tidy up.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ SIGINT = 2
 
 
 def main() -> None:
-    """Runs the command line with the arguments of the process."""
+    """Run the command line with the arguments of the process."""
     try:
         import signal
 
-        # Where it is ignored (nohup), it stays so.
+        # An ignored signal (nohup) stays ignored.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, stop_at_once)
         from sbafab.process import prepare
@@ -35,7 +35,7 @@ def main() -> None:
 
 
 def stop_at_once(number: int, frame: FrameType | None) -> None:
-    """Says so and ends the process, without a way back."""
+    """Print "stopped" and end the process."""
     try:
         os.write(2, b"sbafab: stopped\n")
     finally:

@@ -1,16 +1,16 @@
-"""Errors a user can act on: each is one sentence that names the remedy."""
+"""Errors with messages for the user: one sentence with place, limit and remedy."""
 
 from __future__ import annotations
 
 BY_SIGNAL = 128
 """Added to a signal's number, as shells do: the exit code of a command that it stopped."""
 ERROR_SCHEMA = "sbafab/error@1"
-"""Id of what a command prints of an error for programs."""
-STOPPED = "stopped; the output folder is whole, as it was before or as the run made it"
+"""Schema id of an error as JSON."""
+STOPPED = "stopped; the output folder is complete: either the earlier one or the new one"
 
 
 class Stopped(KeyboardInterrupt):
-    """An interrupt with a sentence of its own about what it has ended; then the signal's number."""
+    """An interrupt with a sentence about the work that it stopped, and the number of the signal."""
 
     def __init__(self, sentence: str, *number: object) -> None:
         super().__init__(*number)
@@ -18,20 +18,31 @@ class Stopped(KeyboardInterrupt):
 
 
 class SbafabError(Exception):
-    """Base of every error whose message is meant for the user."""
+    """Base of all errors with a message for the user."""
 
 
 class DesignError(SbafabError, ValueError):
-    """A design that cannot be built: field, value, what is allowed, what would fix it."""
+    """A design that cannot be built: field, value, permitted values, remedy."""
 
 
 class TooLargeError(DesignError):
-    """A part that does not fit the film it is cut from: it ends as a failed rule does."""
+    """A part that is larger than its film; the exit code is that of a failed rule."""
 
 
 class OutputError(SbafabError, OSError):
-    """Files that could not be written or read back as they should be."""
+    """Files that cannot be written, or read back as written."""
 
 
 class DefectError(SbafabError):
-    """Files that the program wrote and that are not what it was asked for: a defect of its own."""
+    """Files that the program wrote and that differ from the design: a defect of the program."""
+
+
+# Errors of geometry.
+
+
+class GeometryError(SbafabError, ArithmeticError):
+    """An operation on regions with an inconsistent result; the message names the place."""
+
+
+class InconsistentError(ArithmeticError):
+    """Two paths to a face with different results; the argument is the point where they meet."""

@@ -1,4 +1,4 @@
-"""Text in XML, escaped as ``xml.sax.saxutils`` does, whose import fetches the whole of HTTP."""
+"""Escaping of text in XML as in ``xml.sax.saxutils``, whose import loads all of HTTP."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ SPACES = {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 
 
 def escape(text: str) -> str:
-    """The text between two tags."""
+    """Return text escaped for a place between tags."""
     return html_escape(text, quote=False)
 
 
 def quoteattr(text: str) -> str:
-    """The text as the value of an attribute, with its quotes."""
+    """Return text as the value of an attribute, in quotes."""
     for space, code in {"&": "&amp;", ">": "&gt;", "<": "&lt;", **SPACES}.items():
         text = text.replace(space, code)
     if '"' not in text:

@@ -1,25 +1,26 @@
-"""What a process that runs one command is told before it loads anything else."""
+"""Settings of a process that runs a command, its processors, and the type of progress."""
 
 from __future__ import annotations
 
 import atexit
 import gc
 import os
+from collections.abc import Callable
 
 YOUNG = 200_000
-"""Records after which they are looked through for rings that nothing holds: a run makes many
-records, keeps them to its end and makes hardly any ring, and looking takes a tenth of its time.
+"""Objects before a garbage collection: a run keeps most of its objects and has few cycles, and
+collecting at the default threshold takes a tenth of its time.
 """
 
 
 def prepare() -> None:
-    """Settings that hold for the whole process; asked for twice, they are the same."""
-    # Plugins of pydantic, which have no part in this, are looked for in every package there is.
+    """Set environment and garbage collection of the process; a second call changes nothing."""
+    # pydantic searches all installed packages for plugins; none is used.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    # Matrices here are small: more threads take longer, and may sum in another order elsewhere.
+    # Matrices are small: more threads are slower, and may change the order of sums.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
-    # What is left when the process ends goes with it: looking for rings takes 0.05 s and more.
+    # A last collection when the process ends would take 0.05 s or more.
     atexit.register(gc.freeze)
 
 
@@ -29,3 +30,16 @@ def processors() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:
         return os.cpu_count() or 1
+
+
+# Progress of long work.
+
+
+Progress = Callable[[str, int, int], None]
+"""Called with the stage, the amount done and the total."""
+Counted = Callable[[int, int], None]
+"""Called with the number done and the total."""
+
+
+def ignore_progress(stage: str, done: int, total: int) -> None:
+    """Ignore progress."""

@@ -1,4 +1,4 @@
-"""Tables for spreadsheets: CSV in which no text is taken for a formula."""
+"""CSV for spreadsheets, in which no text is read as a formula."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 from io import StringIO
 from typing import IO, Any
 
-# What begins a formula (CWE-1236; OWASP ASVS 5.0, 1.2.10), also in the wide forms of CJK fonts, and
-# where a cell begins: at the start, or past what another locale takes for the end of a cell.
+# The start of a formula (CWE-1236; OWASP ASVS 5.0, 1.2.10), also in the wide forms of CJK fonts,
+# where a cell begins: at the start, or after the separator of another locale.
 _FORMULA = re.compile(r"(^|[;\t\n])([^\S\t\n]*)(?=([=+\-@\uff1d\uff0b\uff0d\uff20][^;\t\n]*))")
 _NUMBER = re.compile(r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|inf|nan)\s*", re.ASCII | re.I)
 TEXT_MARK = "'"
-"""Stands before a text that a spreadsheet would take for a formula."""
+"""Written before a text that a spreadsheet would read as a formula."""
 
 
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:
@@ -37,7 +37,7 @@ def _cell(value: Any) -> Any:
 
 
 def plain_text(text: str) -> str:
-    """Return the text with TEXT_MARK before what a spreadsheet would take for a formula.
+    """Return the text with TEXT_MARK before what a spreadsheet would read as a formula.
 
     Its lines end with a line feed: Python 3.11 writes a lone carriage return without quotes.
     """

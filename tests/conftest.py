@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
+from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -26,3 +29,36 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = [item for item in items if (item.get_closest_marker("long") is not None) != LONG]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in set(left_out)]
+
+
+READERS = ("klayout", "meerk40t", "pyogrio")
+"""Packages of the extra ``interop`` without which ``tests/interop`` is not collected."""
+INSTALL = 'python -m pip install -e ".[dev,interop]"'
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Leave ``tests/interop`` out where a reader of cut files is not installed."""
+    if collection_path == Path(__file__).parent / "interop" and _missing_readers():
+        return True
+    return None
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name what was skipped, and for want of what, at the end."""
+    if hasattr(terminalreporter.config, "workerinput"):
+        return
+    reasons = Counter(
+        report.longrepr[2].removeprefix("Skipped: ") if isinstance(report.longrepr, tuple) else ""
+        for report in terminalreporter.stats.get("skipped", [])
+    )
+    missing = _missing_readers()
+    if missing:
+        terminalreporter.write_line(
+            f"not run: tests/interop, which needs {', '.join(missing)}; install with {INSTALL}"
+        )
+    for reason, count in sorted(reasons.items()):
+        terminalreporter.write_line(f"skipped {count}: {reason}")
+
+
+def _missing_readers() -> list[str]:
+    return [name for name in READERS if find_spec(name) is None]

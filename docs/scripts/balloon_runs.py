@@ -1,4 +1,4 @@
-"""Holds the elastic balloon against CalculiX and writes the table into docs/prediction.md.
+"""Holds the elastic balloon against CalculiX and writes docs/measured/balloons.csv.
 
 ``python -m docs.scripts.balloon_runs`` needs ccx and the extra "mesh": seconds for the sections through
 the axis, a minute or two for each ripple's sector, some minutes of processor time for each solid mesh.
@@ -16,18 +16,19 @@ from typing import NamedTuple
 import numpy as np
 
 import sbafab
+from docs.scripts import measured as tables_of_pages
 from docs.scripts.ripple_sector import Sector, sector_states
+from docs.scripts.tables import FOLDER, Table, table
 from sbafab.actuators import load_design
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
-from sbafab.models.rippled import resolved, rippled, risen
+from sbafab.models.rippled import free_shapes, resolves_waves, rippled
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
-from sbafab.simulators.calculix.job import simulate
-from sbafab.simulators.calculix.settings import deck_settings
+from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.calculix.run import simulate
 
-PAGE = Path(__file__).parents[1] / "prediction.md"
-BEGIN, END = "<!-- written by docs.scripts.balloon_runs -->", "<!-- to here -->"
+PATH = FOLDER / "balloons.csv"
 PRESSURES = (0.5, 2.0, 6.0, 10.0)
 """kPa."""
 HOUR = 3600.0
@@ -114,10 +115,10 @@ CASES = (
 def elastic(case: Case) -> Found:
     """What the elastic balloon says."""
     one = case.balloon
-    if case.waves and resolved(one):
+    if case.waves and resolves_waves(one):
         found = rippled(one, case.pressures, case.waves).shapes
     else:
-        found = risen(one, case.pressures)
+        found = free_shapes(one, case.pressures)
     return found.height, found.volume
 
 
@@ -186,50 +187,51 @@ def apart(own: np.ndarray, other: np.ndarray) -> str:
     return ", ".join(f"{share:+.1f}" for share in 100 * (own / other - 1))
 
 
-def row(case: Case) -> str:
-    """The row of a case."""
+def row(case: Case) -> list[str]:
+    """Return the cells of a case."""
     (stroke, air), (mesh_stroke, mesh_air) = elastic(case), measured(case)
-    kilopascals = ", ".join(f"{pressure:g}" for pressure in case.pressures)
-    cells = [
+    return [
         case.name,
-        kilopascals,
+        ", ".join(f"{pressure:g}" for pressure in case.pressures),
         listed(stroke, 3),
         listed(mesh_stroke, 3),
         apart(stroke, mesh_stroke),
+        listed(air, 2),
+        listed(mesh_air, 2),
+        apart(air, mesh_air),
     ]
-    cells += [listed(air, 2), listed(mesh_air, 2), apart(air, mesh_air)]
-    return "| " + " | ".join(cells) + " |"
 
 
 def listed(values: np.ndarray, digits: int) -> str:
     return ", ".join(f"{value:.{digits}f}" for value in values)
 
 
-def known(text: str) -> dict[str, str]:
-    """The rows of the page by name."""
-    rows = (line for line in text.splitlines() if line.startswith("| d = "))
-    return {line.split("|")[1].strip(): line for line in rows}
+def known() -> dict[str, list[str]]:
+    """Return the recorded rows by name."""
+    return {cells[0]: list(cells) for cells in table("balloons").rows}
 
 
 def main() -> None:
-    asked = sys.argv[1:]
-    run = {}
+    parts = sys.argv[1:]
+    rows = known()
     for case in CASES:
-        if not asked or any(part in case.name for part in asked):
-            run[case.name] = row(case)
-            print(run[case.name], flush=True)
-    head, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    body, _, tail = rest.partition(END)
-    found = known(body) | run
-    rows = [found[case.name] for case in CASES if case.name in found]
-    text = "\n".join([*HEADS, *rows])
-    PAGE.write_text(f"{head}{BEGIN}\n\n{text}\n\n{END}{tail}", encoding="utf-8", newline="\n")
+        if not parts or any(part in case.name for part in parts):
+            rows[case.name] = row(case)
+            print(*rows[case.name], sep=" | ", flush=True)
+    recorded = [rows[case.name] for case in CASES if case.name in rows]
+    PATH.write_text(Table(COLUMNS, recorded).csv, encoding="utf-8", newline="\n")
+    tables_of_pages.main()
 
 
-HEADS = (
-    "| balloon | kPa | stroke, mm: elastic | CalculiX | apart, % | air, ul: elastic | CalculiX "
-    "| apart, % |",
-    "|---|---|---|---|---|---|---|---|",
+COLUMNS = (
+    "balloon",
+    "kPa",
+    "stroke of the model, mm",
+    "of CalculiX",
+    "difference, %",
+    "air of the model, ul",
+    "of CalculiX",
+    "difference, %",
 )
 
 if __name__ == "__main__":

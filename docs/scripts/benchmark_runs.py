@@ -17,7 +17,8 @@ from benchmarks.__main__ import python_of
 from benchmarks.sections import MODULES, RIVALS, Asked, importable, sections
 from benchmarks.timing import ROOT, Row, Section, keep_to_one_core
 from benchmarks.versions import Compared, compared
-from docs.scripts.measured import Record, Table, keep, record, versions
+from docs.scripts.measured import Record, keep, record, versions
+from docs.scripts.tables import Table
 from sbafab.process import prepare
 
 COMMAND = "python -m docs.scripts.benchmark_runs --before FOLDER"
@@ -32,14 +33,13 @@ AIMS = {
 """Seconds that were aimed at."""
 GROWN = ("balloons", "chambers", "edges", "copies")
 """Sections whose growth is told, in one table."""
-RATES = ("decks", "compiled", "processes", "poses")
+RATES = ("decks", "processes", "poses")
 """Tables that tell rates: each has what another program took in the same run."""
 ONCE = ("memory",)
 """Tables of one long run."""
 TABLES = (
     "plates",
     "decks",
-    "compiled",
     "processes",
     "memory",
     "poses",

@@ -14,13 +14,14 @@ from pathlib import Path
 import numpy as np
 
 import sbafab
-from docs.scripts.measured import Record, Table, keep, record
-from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.reports.chart import ChartCurve, Panel, chart_svg
+from docs.scripts.measured import Record, keep, record
+from docs.scripts.tables import Table
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.axisymmetric import axisymmetric_strokes
-from sbafab.simulators.calculix.history import State
-from sbafab.simulators.calculix.job import simulate
-from sbafab.simulators.calculix.settings import deck_settings
+from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.calculix.results import State
+from sbafab.simulators.calculix.run import simulate
 
 COMMAND = "python -m docs.scripts.calculix_runs"
 PICTURE = Path(__file__).parents[1] / "images" / "calculix.svg"

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import sbafab
-from sbafab.assemblies.reading import load
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
+from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design
-from sbafab.design.templates import template_names, templates_folder
 from sbafab.errors import DesignError
 from sbafab.models.figures import Prediction
 from sbafab.reports.assembly_png import assembly_png
@@ -25,45 +26,63 @@ FIGURES = (
     ("blocked force at 10 kPa, flat", "blocked force at 10 kPa", 2),
     ("blocked force at 10 kPa, flat, at most", "blocked force at 10 kPa at most", 2),
     ("bend at 10 kPa in one chamber, the others empty", "bend at 10 kPa in one chamber", 0),
+    ("inflated diameter", "inflated", 1),
+    ("deflated diameter", "deflated", 1),
 )
 """Figures of the prediction, what they are called here, and their decimals."""
 
+NUMBERS = (
+    ("outline diameter", "inflated diameter"),
+    ("full stroke", "deflated height"),
+    (
+        "bend at 10 kPa in one chamber, the others empty",
+        "blocked force at 10 kPa, flat",
+        "blocked force at 10 kPa, flat, at most",
+        "deflated diameter",
+    ),
+)
+"""Figures of a card: of each row the first that the prediction has."""
+
 HEAD = """# Gallery
 
-Designs that no rule fails, drawn and predicted by the build of this site. Each picture shows the flat actuator, heights
-enlarged as it says; the file below it makes the actuator. Predictions have the trust that
-[prediction](../prediction.md) states; what the paper measured stands beside what is off by more than a quarter. Nobody has
-built the designs of the second part.
+Designs that pass every rule, drawn and predicted by the build of this site. Pictures show the flat actuator, heights
+enlarged as stated. How far each number is trusted: [prediction](../prediction.md). *Model / paper 1.58*: on the paper's own actuator the
+model gives 1.58 times the measured value. A range is the interval of a drawn pocket.
 
-## Designs that ship
+## Templates
 
 `sbafab new NAME` writes the commented file.
 """
 BEYOND = """
-## Beyond the paper
+## Other designs
 
-Files to start from: save one and run the command below it.
+Nobody has built these. Save a file and run `sbafab generate FILE`.
 """
 
 
 def write_gallery(folder: Path) -> None:
-    """The page, its pictures and copies of its design files. Raises where a design fails a rule."""
+    """Write the page, its pictures and copies of its design files.
+
+    Raises DesignError where a design fails a rule.
+    """
     target = folder / "gallery"
     target.mkdir()
     for drawing in DESIGNS.glob("*.svg"):
         (target / drawing.name).write_bytes(drawing.read_bytes())
-    parts = [HEAD]
-    parts += ["\n".join(_entry(name, target)) for name in template_names()]
-    parts.append(BEYOND)
-    parts += ["\n".join(_entry(str(path), target)) for path in sorted(DESIGNS.glob("*.toml"))]
+    templates = [_card(name, target) for name in template_names()]
+    others = [_card(str(path), target) for path in sorted(DESIGNS.glob("*.toml"))]
+    parts = [HEAD, _grid(templates), BEYOND, _grid(others)]
     (folder / "gallery.md").write_text("\n".join(parts), encoding="utf-8")
 
 
-def _entry(source: str, target: Path) -> Iterator[str]:
-    """Heading, words, picture, figures, file and command of one design."""
+def _grid(cards: Sequence[str]) -> str:
+    return "\n".join(["::::{container} cards", *cards, "::::", ""])
+
+
+def _card(source: str, target: Path) -> str:
+    """Return the card of a design: picture, name, one sentence, three numbers, file."""
     found = load(source)
-    is_template = not source.endswith(".toml")
-    path = templates_folder() / f"{source}.toml" if is_template else Path(source)
+    path = Path(source) if source.endswith(".toml") else templates_folder() / f"{source}.toml"
     findings = sbafab.check(source)
     if findings.failed:
         raise DesignError(f"{found.name} of the gallery fails: {findings.failed[0].message}")
@@ -71,29 +90,55 @@ def _entry(source: str, target: Path) -> Iterator[str]:
     (target / picture).write_bytes(_picture(found, source))
     (target / path.name).write_bytes(path.read_bytes())
     text = path.read_text(encoding="utf-8")
-    yield f"\n### {found.name}\n"
-    yield f"{_first_sentence(text)}\n"
-    yield f"![{found.name}, flat](gallery/{picture}){{width=600px}}\n"
-    held = counted(findings)
     if isinstance(found, Design):
-        yield _told(f"{', '.join(figures_of(sbafab.predict(found), found))}; {held}.")
+        prediction = sbafab.predict(found)
+        numbers = list(_numbers(prediction))
+        every = "; ".join(figures_of(prediction, found))
     else:
-        yield _told(f"An assembly of {', '.join(found.parts)}; {held}.")
-    argument = found.name if is_template else path.name
-    yield f"    sbafab generate {argument}\n"
-    yield _file(path.name, text)
+        assembled = sbafab.assemble(source)
+        numbers = list(_counts(found, assembled))
+        every = ", ".join(found.parts)
+    rows = "\n".join(f"* **{value}** {name}{aside}" for name, value, aside in numbers)
+    return f""":::{{container}} card
+![{found.name}, flat](gallery/{picture})
+
+**{found.name}**. {_first_sentence(text)}
+
+{rows}
+
+{{download}}`{path.name} <gallery/{path.name}>`
+
+<details><summary>All figures</summary>
+
+{every}. {counted(findings)}.
+
+</details>
+:::
+"""
 
 
-def _told(words: str) -> str:
-    """A paragraph in the style of key figures."""
-    return f"{{.key-figures}}\n{words}\n"
+def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
+    """Yield the three numbers of an actuator, each with its interval or the model's known error."""
+    known = {figure.name: figure for figure in prediction.figures}
+    called = {name: (words, digits) for name, words, digits in FIGURES}
+    for choices in NUMBERS:
+        figure = next((known[name] for name in choices if name in known), None)
+        if figure is None:
+            continue
+        words, digits = called[figure.name]
+        value = f"{figure.value:.{digits}f} {figure.unit}"
+        if figure.between is not None:
+            low, high = figure.between
+            value += f" ({low:.{digits}f} to {high:.{digits}f})"
+        aside = "" if figure.measured is None else f" (model / paper {figure.measured.ratio:.2f})"
+        yield words, value, aside
 
 
-def _file(name: str, text: str) -> str:
-    return (
-        f"<details><summary>{name}</summary>\n\n```toml\n{text.rstrip()}\n```\n\n</details>\n\n"
-        f"{{download}}`{name} <gallery/{name}>`\n"
-    )
+def _counts(found: Assembly, assembled: Assembled) -> Iterator[tuple[str, str, str]]:
+    actuators = sum(part.kind == "sba" for part in found.parts.values())
+    counts = {"part": len(found.parts), "actuator": actuators, "design": len(assembled.designs)}
+    for name, count in counts.items():
+        yield (name if count == 1 else f"{name}s"), str(count), ""
 
 
 def _first_sentence(text: str) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules.limits import Tolerances
 from sbafab.rules.registration_yield import simulate
 

@@ -14,7 +14,8 @@ from tempfile import TemporaryDirectory
 import pyogrio
 from hypothesis import HealthCheck, Phase, given, settings
 
-from docs.scripts.measured import Record, Table, keep, texts, versions
+from docs.scripts.measured import Record, keep, texts, versions
+from docs.scripts.tables import Table
 from sbafab.actuators import build, load_design
 from tests.interop.judging import Compared, areas, overhang, widths
 from tests.properties.designs import Draft, valid

@@ -5,7 +5,14 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from docs.scripts import reference_cli, reference_formats, reference_keys, reference_rules
+from docs.scripts import (
+    measured,
+    reference_cli,
+    reference_formats,
+    reference_keys,
+    reference_rules,
+    tables,
+)
 from docs.scripts.gallery import write_gallery
 from docs.scripts.steps import write_steps
 
@@ -20,3 +27,5 @@ def write_all(folder: Path) -> None:
     reference_rules.write(folder)
     write_gallery(folder)
     write_steps(folder)
+    tables.write(folder)
+    measured.write(folder)

@@ -1,8 +1,9 @@
 """Figures that were measured once: docs/measured/NAME.json holds them, the pages show them.
 
 A page names a table between ``<!-- measured: NAME TABLE -->`` and ``<!-- end -->``, and ``how`` in
-place of a table says when and with what it was measured; what ``rates`` words of a record stands in
-a page likewise. ``python -m docs.scripts.measured`` writes all of them anew; scripts that measure do so themselves. A test holds pages and records together.
+place of a table says when and with what it was measured; a sentence of ``rates`` or a summary of
+``tables`` stands in a page likewise. ``python -m docs.scripts.measured`` writes all of them; scripts
+that measure do so themselves. A test compares pages and records.
 """
 
 from __future__ import annotations
@@ -15,31 +16,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from docs.scripts.rates import WORDS
+from docs.scripts.tables import SUMMARIES, Table
 
 DOCS = Path(__file__).parents[1]
 README = DOCS.parent / "README.md"
 FOLDER = DOCS / "measured"
-BLOCK = re.compile(r"(<!-- measured: (\w+) ([\w-]+) -->\n).*?(\n<!-- end -->)", re.DOTALL)
+BLOCK = re.compile(r"(<!-- measured: (\w+) ([\w-]+) -->)(?:(?!<!--).)*(<!-- end -->)", re.DOTALL)
 SPLIT = re.compile(r",\s*\n\s*")
 HOW = "how"
-
-
-class Table(NamedTuple):
-    """A table as its page shows it: texts, a line a row."""
-
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-    @property
-    def markdown(self) -> str:
-        """The table as a page has it."""
-        rule = ["---"] * len(self.columns)
-        return "\n".join("| " + " | ".join(row) + " |" for row in (self.columns, rule, *self.rows))
-
-    def cell(self, row: str, column: str) -> str:
-        """One cell, by the first cell of its row and its column's head."""
-        (found,) = (cells for cells in self.rows if cells[0] == row)
-        return found[list(self.columns).index(column)]
 
 
 class Record(NamedTuple):
@@ -86,10 +70,12 @@ def pages() -> Iterator[Path]:
 
 def filled(text: str) -> str:
     """A page's text with every block as the records have it."""
-    return BLOCK.sub(lambda m: f"{m[1]}{_said(m[2], m[3])}{m[4]}", text)
+    return BLOCK.sub(lambda m: f"{m[1]}\n{_said(m[2], m[3])}\n{m[4]}", text)
 
 
 def _said(name: str, table: str) -> str:
+    if (name, table) in SUMMARIES:
+        return f"\n{SUMMARIES[name, table]().markdown}\n"
     found = record(name)
     if table == HOW:
         text = found.how
@@ -99,6 +85,16 @@ def _said(name: str, table: str) -> str:
         text = found.tables[table].markdown
     # Blank lines part a table from the remarks round it, as Markdown asks.
     return f"\n{text}\n"
+
+
+def write(folder: Path) -> None:
+    """Write a page with all tables of all records, which no sidebar lists."""
+    parts = ["---\norphan: true\n---\n\n# Measured tables\n"]
+    for path in sorted(FOLDER.glob("*.json")):
+        found = record(path.stem)
+        parts.append(f"## {path.stem}\n\n{found.how}\n")
+        parts += [f"**{name}**\n\n{table.markdown}\n" for name, table in found.tables.items()]
+    (folder / "measured-tables.md").write_text("\n".join(parts), encoding="utf-8")
 
 
 def versions(**distributions: str) -> dict[str, str]:

@@ -12,7 +12,8 @@ from functools import cache
 from pathlib import Path
 
 import sbafab
-from docs.scripts.measured import Record, Table, keep, record, texts, versions
+from docs.scripts.measured import Record, keep, record, texts, versions
+from docs.scripts.tables import Table
 from sbafab.simulators.mujoco.run import MujocoRun, simulate
 
 COMMAND = "python -m docs.scripts.mujoco_runs"

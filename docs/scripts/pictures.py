@@ -16,9 +16,9 @@ from PIL import Image
 
 import sbafab
 from sbafab.reports.assembly_png import assembly_png
-from sbafab.reports.inflated_picture import PictureWish, write_picture
+from sbafab.reports.charts import relation_svg
+from sbafab.reports.inflated_picture import PictureRequest, write_picture
 from sbafab.reports.layers_svg import layers_svg
-from sbafab.reports.relation_svg import relation_svg
 from sbafab.reports.solid_png import solid_png
 from sbafab.reports.stack_svg import stack_svg
 
@@ -53,9 +53,9 @@ def force() -> None:
 def inflated() -> None:
     """The actuator bent by two of its chambers, and with pressure going round all three."""
     laminate, stack = sbafab.build(ARM), sbafab.stack(ARM)
-    bent = PictureWish({"chamber1": 5.0, "chamber2": 5.0}, width=1200, height=900)
+    bent = PictureRequest({"chamber1": 5.0, "chamber2": 5.0}, width=1200, height=900)
     write_picture(laminate, stack, bent, IMAGES / "inflated.png")
-    round_all = PictureWish({"": 5.0}, width=480, height=384, motion="circle", frames=36)
+    round_all = PictureRequest({"": 5.0}, width=480, height=384, motion="circle", frames=36)
     write_picture(laminate, stack, round_all, IMAGES / "moving.webp")
 
 

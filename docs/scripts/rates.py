@@ -1,17 +1,16 @@
-"""Sentences of the pages that tell how fast sbafab is, in the figures of the record.
+"""The sentence of README on processor times, from the record.
 
 ``measured`` puts them where a page names them; which statistic they give, the table's head says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from docs.scripts.measured import Record, Table
-
-RIVALS = {"foldable": "foldable_robotics", "build123d": "build123d"}
+    from docs.scripts.measured import Record
+    from docs.scripts.tables import Table
 
 
 def statistic(table: Table) -> str:
@@ -25,44 +24,15 @@ def seconds(table: Table, row: str) -> str:
 
 
 def speed(record: Record) -> str:
-    """Return README's paragraph on commands and on plates, with the other programs' times."""
-    versions, commands, plates = (record.tables[n] for n in ("versions", "commands", "plates"))
+    """Return README's sentence on two commands, the statistic named."""
+    versions, commands = record.tables["versions"], record.tables["commands"]
     generate = f"{float(versions.cell('generate 3dof-15mm', 'now')):.2g}"
-    others = " and ".join(
-        f"{seconds(plates, row[0])} s in {RIVALS[row[0]]}"
-        for row in plates.rows
-        if row[0] in RIVALS
-    )
     return (
-        "On one core of an idle 2-core virtual machine, imports included, "
+        "On one core of a 2-core virtual machine, imports included, "
         f"{statistic(versions)} processor time of several rounds:\n"
-        "`sbafab generate 3dof-15mm`, all of the above but meshes and decks for simulators, takes "
-        f"{generate} s, `sbafab --help`\n{seconds(commands, 'sbafab --help')} s. Forty lobed "
-        "plates, each built anew and written as one DXF, take "
-        f"{seconds(plates, 'sbafab')} s, and in the same run\n{others}."
+        f"`sbafab generate 3dof-15mm` takes {generate} s, `sbafab --help` "
+        f"{seconds(commands, 'sbafab --help')} s ([benchmarks](docs/benchmarks.md))."
     )
-
-
-def poses(record: Record) -> str:
-    """Return README's sentence on equilibria a second, the slowest named."""
-    table = record.tables["poses"]
-    rates = {row[0]: _rate(row) for row in table.rows if row[0].endswith("at random")}
-    least = min(rates, key=lambda name: rates[name])
-    return (
-        "The stack also answers in real time, also under a tip load, gravity or a level plate. "
-        f"Poses from nothing,\nat random, by the {statistic(table)} time of several rounds on one core: "
-        f"{rates['no load, at random']:,} a second without a load, {rates[least]:,} in the slowest "
-        f"case\n({_case(least)}):"
-    )
-
-
-def _case(name: str) -> str:
-    load = name.removesuffix(", at random")
-    return "tip load and gravity" if load == "both" else load
-
-
-def _rate(row: Sequence[str]) -> int:
-    return int(row[-1].split()[0].replace(",", ""))
 
 
 def _cells(table: Table, row: str) -> list[str]:
@@ -70,5 +40,5 @@ def _cells(table: Table, row: str) -> list[str]:
     return cells
 
 
-WORDS: Mapping[str, Callable[[Record], str]] = {"speed": speed, "poses-a-second": poses}
+WORDS: Mapping[str, Callable[[Record], str]] = {"speed": speed}
 """What a page may name in place of a table of the record ``benchmarks``."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.cli.formats import FORMATS, schema_of
+from sbafab.output.artefacts import ARTEFACTS
 
 HEAD = """# File formats
 
-What a program may rely on. Each of these but a design file and the list of templates carries the id
-of its format as `schema`; additions keep the id, a change that would break a reader gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests hold what is written and printed against them.
+Each format but a design file and the list of templates carries its id as `schema`; additions keep the id, an
+incompatible change gets a new number. `sbafab schema NAME` prints these schemas (JSON Schema 2020-12), and tests
+validate what is written and printed.
 
 | name | id | what it describes | schema |
 |---|---|---|---|
@@ -40,15 +42,12 @@ conforming meshes as VTU, legacy VTK, Gmsh MSH 2.2 and Abaqus INP with named set
 
 ## A folder
 
-| file | what it is |
-|---|---|
-| `manifest.json` | the index: every file with its SHA-256, layers, interfaces, sheets, bores, films |
-| `design.toml` | the design with every default written out; it makes the folder again |
-| `checks.json` | what the rules found |
-| `press.json`, `press.csv` | the press schedule; minutes and their totals are `null` (an empty cell) where nobody stated any for the film |
-| `predict.json` | from `sbafab predict`: every figure with model and trust |
-| `calculix/result.json`, `sofa/`, `mujoco/` likewise | from `sbafab simulate`: what the simulator found, in which units |
+| file | what it is | format |
+|---|---|---|
+| `manifest.json` | the index: every file with its SHA-256, layers, interfaces, sheets, bores, films | `sbafab/manifest@1` |
+"""
 
+TAIL = """
 The other JSON files serve the program itself and may change: `sheets/nest.json` (where parts lie) and what a simulator's
 folder holds beside its `result.json`.
 """
@@ -57,9 +56,14 @@ folder holds beside its `result.json`.
 def write(folder: Path) -> None:
     """The page, and beside it the schemas as files."""
     rows = []
-    for name, (identity, said) in SCHEMAS.items():
+    for name, (identity, said, _) in FORMATS.items():
         text = json.dumps(schema_of(name), indent=1) + "\n"
         (folder / f"{name}.schema.json").write_text(text, encoding="utf-8")
         link = f"{{download}}`{name}.schema.json`"
         rows.append(f"| `{name}` | `{identity}` | {said} | {link} |")
-    (folder / "formats.md").write_text(HEAD + "\n".join(rows) + "\n" + CUT, encoding="utf-8")
+    files = "".join(
+        f"| `{file.path}` | {file.about} | {f'`{file.schema}`' if file.schema else ''} |\n"
+        for file in ARTEFACTS
+    )
+    page = HEAD + "\n".join(rows) + "\n" + CUT + files + TAIL
+    (folder / "formats.md").write_text(page, encoding="utf-8")

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from docs.scripts.rule_pictures import pair
+from docs.scripts.rule_pictures import PICTURED, pair
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, Explanation
 
-HEAD = """# Rules, right and wrong
+HEAD = """# Rules in pictures
 
-Every rule of the deck with a laminate that it passes and one that it fails. The pictures are drawn from the faulty
-laminates of the tests, each of which one rule alone catches; the sentence below a picture is what the rule says of it.
-TPE is blue, PTFE masks are orange, the ring marks the place that is named. `sbafab explain RULE` prints the same words.
-How each is measured: [the rule deck](../rules.md).
+Every rule with a laminate that passes and one that fails, drawn from the tests; the sentence below is the rule's
+message. TPE is blue, PTFE orange, a ring marks the place. `sbafab explain RULE` prints the same words. Measures and
+limits: [rules and limits](../rules.md).
 """
 
 
@@ -23,10 +22,13 @@ def write(folder: Path) -> None:
     pictures.mkdir()
     parts = [HEAD, "\n## On a design\n"]
     for name, one in DECK.items():
+        parts += [f"\n### {name}\n", _words(one)]
+        if name not in PICTURED:
+            continue
         drawn = pair(name)
         for which, text in (("right", drawn.right), ("wrong", drawn.wrong)):
             (pictures / f"{name}-{which}.svg").write_text(text, encoding="utf-8")
-        parts += [f"\n### {name}\n", _words(one), _figure(name), f"> {_plain(drawn.said)}\n"]
+        parts += [_figure(name), f"> {_plain(drawn.said)}\n"]
     parts.append("\n## Between the parts of an assembly\n")
     parts += [_short(BETWEEN_PARTS)]
     parts.append("\n## On a folder\n\nThe rules above are run on what the files will cut, and:\n")

@@ -7,10 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import MASKS, STRUCTURAL, Ink, ink
+from sbafab.geometry.region import Region, coord, disc, path_data, rectangle
+from sbafab.laminate.films import MASKS, STRUCTURAL, Ink, ink
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
@@ -23,21 +21,6 @@ from tests.rules.test_deck import EARS, EXACT, FAULTS, ONE
 WIDE = 260
 """Pixels of a picture."""
 RED = "#c1121f"
-
-CHOSEN = {
-    "bond-width": "narrow neck ring",
-    "mask-overhang": "separator grown too little",
-    "facing-films": "mask no larger than the smaller neighbour",
-    "sealing": "strip between two chambers",
-    "channel-clear": "narrow bore in a mask",
-    "tube-fit": "strip with a narrow place",
-    "piece-count": "mask island in the waste",
-    "pin-holes": "sheet without a tooling hole",
-    "film-limits": "slit in a mask",
-    "registration-nominal": "neck ring off its axis",
-}
-"""The fault of the tests' catalogue that shows a rule best."""
-
 
 ZOOM = {"bond-width": 1.7, "mask-overhang": 1.7, "tube-fit": 2.5, "film-limits": 1.7}
 """Rules whose pictures show this many mm round the place only: what is wrong is small."""
@@ -69,7 +52,7 @@ def _found(rule: str, laminate: Laminate, limits: Limits = EXACT) -> Finding:
 
 
 def _of_fault(rule: str) -> Pair:
-    fault = FAULTS[CHOSEN[rule]]
+    fault = next(fault for fault in FAULTS.values() if fault.rule == rule)
     good = built(*fault.design)
     profile = fault.change(good.layer(fault.layer).profile)
     bad = spoiled(good, fault.layer, profile, fault.pieces)
@@ -116,23 +99,23 @@ def svg(shapes: Iterable[Shape], box: Bounds, mark: Point | None = None) -> str:
     low_x, low_y, high_x, high_y = box
     margin = 0.06 * max(high_x - low_x, high_y - low_y)
     width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
-    view = " ".join(map(number, (low_x - margin, -high_y - margin, width, height)))
+    view = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
     line = max(width, height) / WIDE
     ring = ""
     if mark is not None:
         ring = (
-            f'<circle cx="{number(mark[0])}" cy="{number(mark[1])}" r="{number(14 * line)}" '
-            f'fill="none" stroke="{RED}" stroke-width="{number(2.5 * line)}"/>'
+            f'<circle cx="{coord(mark[0])}" cy="{coord(mark[1])}" r="{coord(14 * line)}" '
+            f'fill="none" stroke="{RED}" stroke-width="{coord(2.5 * line)}"/>'
         )
     paths = "".join(
         f'<path d="{path_data(one.region)}" fill="{one.colours.fill}" '
-        f'stroke="{one.colours.line}" fill-opacity="{number(one.opacity)}"/>'
+        f'stroke="{one.colours.line}" fill-opacity="{coord(one.opacity)}"/>'
         for one in shapes
     )
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{view}" width="{WIDE}" '
-        f'height="{number(WIDE * height / width)}"><g transform="scale(1 -1)" fill-rule="evenodd" '
-        f'stroke-width="{number(line)}">{paths}{ring}</g></svg>\n'
+        f'height="{coord(WIDE * height / width)}"><g transform="scale(1 -1)" fill-rule="evenodd" '
+        f'stroke-width="{coord(line)}">{paths}{ring}</g></svg>\n'
     )
 
 

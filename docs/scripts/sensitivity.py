@@ -1,28 +1,40 @@
-"""What the calibrated figures hang on: the same stack with one assumption changed at a time.
+"""Sensitivity of the calibrated figures: the same stack with one assumption changed at a time.
 
-``section`` is the last one of docs/validation.md, which ``python -m docs.scripts.validate`` writes.
+``table`` is docs/measured/sensitivity.csv, which ``python -m docs.scripts.validate`` writes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from docs.scripts.tables import Table
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.models import paper
 from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
-from sbafab.models.series import blocked
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.models.stacked import bent
-from sbafab.reproduction.mechanics import FITTED
+from sbafab.reproduction.rows import FITTED
 
+COLUMNS = (
+    "section",
+    "assumption",
+    "force flat, N",
+    "at 25 %",
+    "at 75 %",
+    "bent 30 deg",
+    "bent 60 deg",
+    "bent 90 deg",
+    "height, mm",
+    "bend, deg",
+)
 OWN_LOSS = 0.18
 """Pocket loss in mm that makes the flat 3-DoF's force right, in steps of 0.01."""
 STIFFER = 20.0
@@ -105,7 +117,7 @@ def _wider(found: Stack, by: float) -> Stack:
 
 def _straight(found: Stack, full: float) -> list[float]:
     strokes = np.array(paper.HEIGHTS) * (full - found.flat_height)
-    force = found.chambers * blocked(found, paper.FORCE_KPA, strokes)
+    force = found.chambers * blocked_force(found, paper.FORCE_KPA, strokes)
     return [float(value) for value in force]
 
 
@@ -113,7 +125,7 @@ def _bent(found: Stack, one: Variant) -> Iterator[float]:
     rest = paper.FORCE_KPA if one.all_push else 0.0
     pressed = [paper.FORCE_KPA] * one.pushing + [rest] * (found.chambers - one.pushing)
     for angle, _ in paper.FORCE_BENT:
-        pose = bent(found, one.pushing, angle)
+        pose = pose_bent_by(found, one.pushing, angle)
         yield math.nan if pose is None else _held(found, pose, pressed, one.sticks)
 
 
@@ -158,23 +170,22 @@ def fitted_modulus() -> Factors:
     return replace(FITTED, pocket_loss=loss, modulus_mpa=float(modulus))
 
 
-def section() -> str:
-    """The section of the page."""
-    fitted = fitted_modulus()
-    found = dict(rows(fitted))
-    measured = [value.value for value in MEASURED]
-    measured += [paper.FULL_HEIGHT.value, paper.LARGEST_BEND.value]
-    lines = [HEAD]
-    for name, values in [("**measured**", measured), *found.items()]:
-        cells = ["none" if math.isnan(value) else f"{value:.2f}" for value in values[:6]]
-        cells += [f"{value:.1f}" for value in values[6:]]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    lines.append(ONE_HEAD)
-    measured = [value.value for value in paper.FORCE_1DOF]
-    for name, values in [("**measured**", measured), *column()]:
-        cells = ["none" if math.isnan(value) else f"{value:.2f}" for value in values]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join([*lines, READ, ""])
+def table() -> Table:
+    """Return docs/measured/sensitivity.csv: the 3-DoF's variants, then the 1-DoF's."""
+    wanted = [value.value for value in MEASURED]
+    wanted += [paper.FULL_HEIGHT.value, paper.LARGEST_BEND.value]
+    lines = [_cells("3-DoF", "**measured**", wanted)]
+    lines += [_cells("3-DoF", name, values) for name, values in rows(fitted_modulus())]
+    wanted = [value.value for value in paper.FORCE_1DOF]
+    lines.append(_cells("1-DoF, a column of six", "**measured**", wanted))
+    lines += [_cells("1-DoF, a column of six", name, values) for name, values in column()]
+    return Table(COLUMNS, lines)
+
+
+def _cells(section: str, name: str, values: Sequence[float]) -> list[str]:
+    cells = ["none" if math.isnan(value) else f"{value:.2f}" for value in values[:6]]
+    cells += [f"{value:.1f}" for value in values[6:]]
+    return [section, name, *cells, *[""] * (len(COLUMNS) - 2 - len(cells))]
 
 
 def column() -> Iterator[tuple[str, list[float]]]:
@@ -199,33 +210,3 @@ def _leaning(found: Stack, full: float, sticks: bool) -> Iterator[float]:
             yield found.pose([paper.FORCE_KPA], plate=plate).force
         except DesignError:
             yield math.nan
-
-
-HEAD = """
-## What the misses hang on
-
-The calibrated 3-DoF with one assumption changed at a time: force in N at 100 kPa, straight and bent,
-height at 10 kPa in all chambers and bend at 10 kPa in two. "None": no balance was found. Nothing here
-is fitted to the 3-DoF but where the row says so, and no row is taken for a prediction.
-
-| | flat | 25 % | 75 % | 30 deg | 60 deg | 90 deg | height, mm | bend, deg |
-|---|---|---|---|---|---|---|---|---|"""
-ONE_HEAD = """
-The calibrated 1-DoF, a column of six, likewise:
-
-| | flat | 25 % | 75 % |
-|---|---|---|---|"""
-READ = """
-* **Force at 75 %.** At 10 kPa the height asks for 10 to 12 MPa, at 100 kPa the force at 75 % for twice that. One
-  modulus does not serve both, and fitting it to the 1-DoF's forces serves none of the held-out rows. So the film
-  is likely stiffer where 100 kPa stretch it. The burst pressure says so too: with 10 MPa and Hencky's law a balloon
-  would burst below 100 kPa, and the paper's held 367. A full height of 20 mm for 17.5 would be half of the miss.
-* **1-DoF above flat.** A plate that leans takes nothing off as long as the tip sticks to it, and a column that slides
-  out from under it keeps a tenth. So neither alone is the reason: likely a column that gives way in part, and a film that
-  is stiffer than 10 MPa, as the 3-DoF asks for.
-* **Bend.** Two chambers bend as measured. Pockets that lost as little as the 3-DoF's own flat force asks for bend by 86
-  degrees, and that actuator is 16 % too high at 10 kPa. Necks that the same molten film had widened would bend far less
-  and stand far lower: they did not.
-* **Forces when bent.** What was measured lies between the rows for every angle. At 30 degrees it is as much as two chambers
-  have when flat (two thirds of 4.87 N are 3.25 N), so that a third one likely helped, or the tip slid; at 60 degrees the
-  tip of a column that may slide gives way. The paper says neither which chambers push nor what holds the tip."""

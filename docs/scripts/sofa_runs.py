@@ -17,10 +17,12 @@ from pathlib import Path
 from unittest import mock
 
 import sbafab
-from docs.scripts.measured import Record, Table, keep
+from docs.scripts.measured import Record, keep
+from docs.scripts.tables import Table
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
-from sbafab.simulators.coarse.actuator import CoarseActuator
-from sbafab.simulators.sofa import files, shell
+from sbafab.simulators.coarse.shell import CoarseActuator
+from sbafab.simulators.sofa import scenes as scene_files
+from sbafab.simulators.sofa import shell
 from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
 
 COMMAND = "python -m docs.scripts.sofa_runs"
@@ -173,7 +175,7 @@ def _stack(made: CoarseActuator, **other: object) -> CoarseActuator:
 
 def _changed(change: Callable[[CoarseActuator], CoarseActuator]) -> mock._patch[object]:
     make = shell.round_actuator
-    return mock.patch.object(files, "round_actuator", lambda *given: change(make(*given)))
+    return mock.patch.object(scene_files, "round_actuator", lambda *given: change(make(*given)))
 
 
 def row(*cells: object) -> list[str]:

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import sbafab
-from sbafab.cutting.svg_write import STROKE
+from sbafab.cutting.sheets import STROKE
 
 HAIRLINE = f'stroke-width="{STROKE:g}"'
 ROOM = 8.0

@@ -1,4 +1,4 @@
-"""Actuator families: each module holds a family's design record and builds its laminate."""
+"""Actuator families by name: each module holds a family's design record and builds its laminate."""
 
 from __future__ import annotations
 
@@ -12,22 +12,21 @@ from pydantic import BaseModel
 
 from sbafab.actuators import lobed, one_dof, radial
 from sbafab.actuators.fits import Fits, refuse_unfit
-from sbafab.design.reading import (
+from sbafab.design.files import (
+    FITS,
     Change,
     add_waivers,
     design_path,
     open_what_fits,
     override,
     read_toml,
-    start_where_the_user_stands,
-    validated,
+    suggest_from_user_folder,
 )
-from sbafab.design.records import Design
-from sbafab.design.writing import FITS
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 
-Found = TypeVar("Found")
+Item = TypeVar("Item")
 
 
 class Family(NamedTuple):
@@ -46,14 +45,14 @@ PLUGINS = "sbafab.families"
 """Entry points by which an installed package adds families, each a ``Family``."""
 
 
-class _AsAsked(Mapping[str, Found]):
-    """What is here by name; the rest is looked for when another name is asked for, or all are."""
+class _LazyMapping(Mapping[str, Item]):
+    """A mapping that calls ``every`` only for names that are not ``here``, or for all names."""
 
-    def __init__(self, here: Mapping[str, Found], every: Callable[[], Mapping[str, Found]]) -> None:
+    def __init__(self, here: Mapping[str, Item], every: Callable[[], Mapping[str, Item]]) -> None:
         self.here = here
         self.every = every
 
-    def __getitem__(self, name: str) -> Found:
+    def __getitem__(self, name: str) -> Item:
         return self.here[name] if name in self.here else self.every()[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -71,7 +70,7 @@ def _every() -> Mapping[str, Family]:
     """
     from importlib.metadata import entry_points
 
-    found = dict(FAMILIES)
+    families = dict(FAMILIES)
     for entry in sorted(entry_points(group=PLUGINS), key=lambda entry: entry.name):
         try:
             family = entry.load()
@@ -80,31 +79,33 @@ def _every() -> Mapping[str, Family]:
                 f"family {entry.name} of the installed package {entry.value.partition(':')[0]} "
                 f"cannot be loaded ({error}); repair or uninstall that package"
             ) from error
-        if entry.name in found:
+        if entry.name in families:
             raise DesignError(
                 f"family {entry.name} is there already; uninstall one of the packages that add it"
             )
-        found[entry.name] = family
-    return found
+        families[entry.name] = family
+    return families
 
 
 def families() -> Mapping[str, Family]:
-    """All families by name. Installed packages are looked through when one that is not here, or
-    all of them, are asked for: that may raise DesignError.
+    """Return all families by name.
+
+    Installed packages are searched only for a name that is not built in, or for all names: that may
+    raise DesignError.
     """
-    return _AsAsked(FAMILIES, _every)
+    return _LazyMapping(FAMILIES, _every)
 
 
 def records() -> Mapping[str, type[Design]]:
-    """The design record of every family, likewise."""
+    """Return the design record of every family, likewise."""
     here = {name: family.record for name, family in FAMILIES.items()}
-    return _AsAsked(here, lambda: {name: family.record for name, family in _every().items()})
+    return _LazyMapping(here, lambda: {name: family.record for name, family in _every().items()})
 
 
 def load_design(
     source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
 ) -> Design:
-    """A design from a template's name or a TOML file, with changes made to its keys.
+    """Return a design from a template's name or a TOML file, with changes made to its keys.
 
     ``waivers`` are rule names added to those that the file waives. Raises DesignError with one
     sentence where it cannot be built.
@@ -113,15 +114,15 @@ def load_design(
     changes = list(changes)
     data = add_waivers(override(read_toml(path), changes), waivers)
     data.setdefault("name", path.stem)
-    start_where_the_user_stands(data, changes)
+    suggest_from_user_folder(data, changes)
     open_what_fits(data, changes)
     return validated(data, records(), path.parent)
 
 
 def build(design: Design) -> Laminate:
-    """The laminate of a design of any family. Raises DesignError where parts do not fit.
+    """Return the laminate of a design of any family. Raises DesignError where parts do not fit.
 
-    Its notes say what size a drawn outline was understood to have, and that it fits what it must.
+    Its notes state the size of a drawn outline, and that the actuator fits ``fits``.
     """
     laminate = families()[design.family].build(design)
     fits = getattr(design, FITS, None)
@@ -132,15 +133,15 @@ def build(design: Design) -> Laminate:
         return laminate
     from sbafab.design.outline import understood
 
-    said = understood(design.drawing).said
-    return replace(laminate, notes=(said, *laminate.notes))
+    note = understood(design.drawing).description
+    return replace(laminate, notes=(note, *laminate.notes))
 
 
-def schema(*others: type[BaseModel]) -> dict[str, Any]:
-    """JSON schema of a design file of any family, or of ``others`` (draft 2020-12)."""
+def schema(*more: type[BaseModel]) -> dict[str, Any]:
+    """The JSON schema of a design file of any family, or of ``more`` records (draft 2020-12)."""
     from pydantic.json_schema import models_json_schema
 
-    every = [*records().values(), *others]
+    every = [*records().values(), *more]
     _, definitions = models_json_schema([(record, "validation") for record in every])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -1,26 +1,24 @@
-"""Ears: tooling holes outside the outline that register a layer in every press step.
+"""Ears and tails: tooling holes outside the outline that register a layer in every press step.
 
-TPE layers and separator masks have ears of their own, on pins of their own: where a mask lay
-flush with a film's tooling hole, film would melt round the pin. Beyond its root a TPE ear is
-therefore free of mask, and bonds; all ears are snipped off after pressing. The two ears of a part
-stand at unequal distances, so that it goes on its pins in one position only.
+TPE layers and separator masks have ears of their own, on pins of their own: at a mask flush with a
+film's tooling hole, film would melt round the pin. Beyond its root a TPE ear is therefore free of
+mask, and bonds; all ears are snipped off after pressing. The two ears of a part stand at unequal
+distances, so that it goes on its pins in one position only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import Literal
 
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
-from sbafab.laminate.laminate import Pin
+from sbafab.geometry.region import Region, disc, strip, union
+from sbafab.laminate.laminate import Inlet, Pin
 
 Holder = Literal["film", "mask", "sheet"]
 Named = tuple[str, Region]
@@ -38,7 +36,7 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Ray:
-    """Where an ear may stand: it starts inside the part and runs outward.
+    """Ray of an ear: it starts inside the part and runs outward.
 
     ``long`` is the second ear of its part. A mask ear that starts beside its mask is joined to it
     from ``joint``, a point of the mask.
@@ -84,7 +82,7 @@ class Ear:
 
 
 def film_setback(design: Design) -> float:
-    """How far bores and lumen of the TPE stand back from those of the masks.
+    """Return the setback of the TPE's bores and lumen from those of the masks, mm.
 
     With channel pins all share the pin's edge; without, every mask overhangs.
     """
@@ -92,11 +90,11 @@ def film_setback(design: Design) -> float:
 
 
 def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:
-    """Ears on their rays, their roots clear of ``body``: all that is cut, without ears.
+    """Return ears on their rays, their roots clear of ``body``: all that is cut, without ears.
 
-    ``plates`` are the films that masks keep apart; their fillets beside the ears end at the root
-    too. Raises DesignError where a film ear starts outside the films, where two ears come nearer to
-    each other than one overhang, or where fillets fill all the room beside an ear.
+    ``plates`` are the films that masks separate; their fillets beside the ears end at the root too.
+    Raises DesignError where a film ear starts outside the films, where two ears come nearer to each
+    other than one overhang, or where fillets fill all the room beside an ear.
     """
     overhang, radius = design.mask.overhang, design.fillet.radius
     for ray in rays:
@@ -140,7 +138,7 @@ def _longer(ray: Ray) -> float:
 
 
 def _reach(ray: Ray, body: Region, design: Design) -> float:
-    """How far out along a ray the body stands in the way of an ear and the mask round it."""
+    """Reach of the body along a ray, in the way of an ear and the mask round it, mm."""
     width = design.registration.hole_diameter + 2 * design.bond.width
     band = strip(ray.start, ray.at(FAR), width + 4 * design.mask.overhang) & body
     return max((edge.farthest_along(ray.start, ray.direction) for edge in band.edges), default=0.0)
@@ -150,9 +148,9 @@ def with_film_ears(outline: Region, ears: Sequence[Ear], radius: float) -> Regio
     """A TPE outline with its ears, their concave corners filleted; every piece by itself."""
     if not ears:
         return outline
-    own = [ear for ear in ears if ear.ray.holder == "film"]
+    film_ears = [ear for ear in ears if ear.ray.holder == "film"]
     return union(
-        fillet(union([piece, *(e.strip for e in own if piece.contains(e.ray.start))]), radius)
+        fillet(union([piece, *(e.strip for e in film_ears if piece.contains(e.ray.start))]), radius)
         for piece in outline.pieces
     )
 
@@ -168,8 +166,8 @@ def film_holes(ears: Sequence[Ear]) -> Region:
 
 
 def _holes(ears: Sequence[Ear], holder: Holder) -> Region:
-    own = [ear for ear in ears if ear.ray.holder == holder]
-    return union(disc(ear.pin.centre, ear.pin.hole / 2) for ear in own) if own else Region()
+    holders = [ear for ear in ears if ear.ray.holder == holder]
+    return union(disc(ear.pin.centre, ear.pin.hole / 2) for ear in holders) if holders else Region()
 
 
 def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region:
@@ -181,9 +179,9 @@ def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region
         for ear in ears
         if ear.ray.holder == "film"
     ]
-    own = [ear for ear in ears if ear.ray.holder == "mask"]
-    bars = [strip(e.ray.joint, e.ray.start, e.width) for e in own if e.ray.joint]
-    eared = union([mask - union(beyond), *(ear.strip for ear in own), *bars])
+    mask_ears = [ear for ear in ears if ear.ray.holder == "mask"]
+    bars = [strip(e.ray.joint, e.ray.start, e.width) for e in mask_ears if e.ray.joint]
+    eared = union([mask - union(beyond), *(ear.strip for ear in mask_ears), *bars])
     if bars:
         # No slot is left between a bar and the mask.
         eared = fillet(eared, overhang) - union(beyond)
@@ -192,16 +190,16 @@ def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region
 
 def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region:
     """The sheet of a radial laminate with its own ears and their holes."""
-    own = [ear.strip for ear in ears if ear.ray.holder == "sheet"]
-    return fillet(union([sheet, *own]), radius) - _holes(ears, "sheet") if own else sheet
+    strips = [ear.strip for ear in ears if ear.ray.holder == "sheet"]
+    return fillet(union([sheet, *strips]), radius) - _holes(ears, "sheet") if strips else sheet
 
 
 def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
     """Raises DesignError where two parts come nearer to each other than one overhang."""
-    for (name, part), (other, neighbour) in pairs:
+    for (name, part), (name_b, neighbour) in pairs:
         if not (grow(part, overhang) & neighbour).is_empty:
             raise DesignError(
-                f"{name} and {other} meet; make the chambers larger or registration.pin_diameter "
+                f"{name} and {name_b} meet; make the chambers larger or registration.pin_diameter "
                 'smaller, or use registration.method = "channel-pin"'
             )
 
@@ -209,3 +207,94 @@ def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
 def _outer(ear: Ear) -> Region:
     """The part of an ear that lies beyond its root."""
     return strip(ear.ray.at(ear.root), ear.ray.at(ear.end), ear.width)
+
+
+# Tails: inlet strips run on past the tabs' ends to tooling holes, where ears register the layers.
+#
+# With its channel pin the tail's one pin holds the bottom balloon's mask; a single balloon has no
+# bores, and its tail two holes. They stand off the strip's axis, so that no mask goes on its pins
+# flipped. The tails are snipped off after pressing; the masks stay in their pockets.
+
+
+ASIDE = 0.3
+"""Share of the pin's diameter by which holes stand off the axis: flipped, they miss by 0.6."""
+
+
+@dataclass(frozen=True)
+class Tail:
+    """The end of an inlet strip: it widens to a ``head``, which lies clear of all film."""
+
+    name: str
+    strip: Region
+    head: Region
+    pins: tuple[Pin, ...]
+
+
+def tails(
+    inlets: Sequence[Inlet],
+    outline: Region,
+    ears: Sequence[Ear],
+    design: Design,
+    under: Region | None = None,
+) -> tuple[Tail, ...]:
+    """Return a tail for every inlet; none without ears.
+
+    ``outline`` is that of all plates together, ``under`` other cut parts. Raises DesignError where
+    a tail comes nearer than one overhang to an ear or to another tail.
+    """
+    if not ears:
+        return ()
+    body = filleted(outline, ears, design.fillet.radius)
+    if under is not None:
+        body = body | under
+    result = [_tail(number, inlet, body, design) for number, inlet in enumerate(inlets, start=1)]
+    heads = [(tail.name, tail.head) for tail in result]
+    near_ears = product(heads, [(ear.name, ear.strip) for ear in ears])
+    check_apart([*near_ears, *combinations(heads, 2)], design.mask.overhang)
+    return tuple(result)
+
+
+def head_reach(design: Design) -> float:
+    """Return the reach of a tail's head to the side from its strip's axis, mm."""
+    return (ASIDE + 0.5) * design.registration.hole_diameter + design.bond.width
+
+
+def _tail(number: int, inlet: Inlet, body: Region, design: Design) -> Tail:
+    bond, overhang = design.bond.width, design.mask.overhang
+    pin = design.registration.hole_diameter
+    pin_size = design.registration.pin_diameter, design.registration.pin_clearance
+    width = pin + 2 * bond
+    (x, y), (dx, dy) = inlet.mouth, inlet.direction
+
+    def at(distance: float, aside: float = 0.0) -> Point:
+        return x + dx * distance - dy * aside, y + dy * distance + dx * aside
+
+    ahead = strip(at(0.0), at(FAR), width + 2 * (ASIDE * pin + 2 * overhang)) & body
+    reach = max((edge.farthest_along(at(0.0), (dx, dy)) for edge in ahead.edges), default=0.0)
+    root = reach + overhang
+    first = root + bond + pin / 2
+    # Two holes in line stand apart, so that what play they have turns the mask little.
+    places = [first] if design.stack.balloons > 1 else [first, first + 2 * width]
+    end = places[-1] + pin / 2 + bond
+    aside = ASIDE * pin
+    names = [f"strip{number}"] if len(places) == 1 else [f"strip{number}.{n}" for n in (1, 2)]
+    return Tail(
+        f"the tail of the inlet strip of {inlet.chamber}",
+        strip(at(0.0), at(end), inlet.width),
+        strip(at(root, aside), at(end, aside), width),
+        tuple(
+            Pin(name, at(place, aside), *pin_size)
+            for name, place in zip(names, places, strict=True)
+        ),
+    )
+
+
+def with_tails(pockets: Region, inlet_tails: Iterable[Tail]) -> Region:
+    """Return the bottom balloon's masks with their tails and the holes of these."""
+    inlet_tails = tuple(inlet_tails)
+    if not inlet_tails:
+        return pockets
+    grown = union([pockets, *(part for tail in inlet_tails for part in (tail.strip, tail.head))])
+    return grown - union(
+        disc(pin.centre, pin.hole / 2) for tail in inlet_tails for pin in tail.pins
+    )

@@ -1,4 +1,4 @@
-"""Round actuators by what they must fit: the chamber that is as large as that allows."""
+"""Round actuators by their envelope: the largest chamber that fits it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from sbafab.design.reading import AnyDesign
-from sbafab.design.records import Design
+from sbafab.design.records import AnyDesign, Design
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import beyond_the_outline, outline_diameter, overall_diameter
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import (
+    Laminate,
+    beyond_the_outline,
+    outline_diameter,
+    overall_diameter,
+)
 
 STEP = 0.01
 """mm: chambers are solved in whole steps."""
@@ -33,36 +36,36 @@ class Fits(Section):
 
 
 def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]) -> AnyDesign:
-    """The design with its chamber solved from what it must fit, unless it names its chamber.
+    """Return the design with the largest chamber that fits, unless it names its chamber.
 
     Raises DesignError where no chamber fits.
     """
     chamber = design.chamber
     if fits == Fits() or chamber.outline or "diameter" in chamber.model_fields_set:
         return design
-    found = _Search(design, fits, build).largest() * STEP
-    return _with_chamber(design, round(found, 6)).solved()
+    diameter = _Search(design, fits, build).largest() * STEP
+    return _with_chamber(design, round(diameter, 6)).solved()
 
 
 def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
-    """What to say of a laminate that fits, None where nothing is asked. Raises DesignError."""
+    """A note on the size of a laminate that fits, None without limits. Raises DesignError."""
     over = beyond_the_outline(laminate)
-    said = []
-    for key, asked, measured, what in (
+    sizes = []
+    for key, limit, measure, scope in (
         ("diameter", fits.diameter, overall_diameter, f"with {over}"),
         ("outline", fits.outline, outline_diameter, f"without {over}"),
     ):
-        if asked is None:
+        if limit is None:
             continue
-        found = measured(laminate)
-        if found > asked + ROUNDING:
+        size = measure(laminate)
+        if size > limit + ROUNDING:
             raise DesignError(
-                f"{design.name} measures {found:.3f} mm across {what}, and fits.{key} = {asked:g}; "
+                f"{design.name} measures {size:.3f} mm across {scope}, and fits.{key} = {limit:g}; "
                 f"leave chamber.diameter out to have it solved, or make fits.{key} at least "
-                f"{found:.3f}"
+                f"{size:.3f}"
             )
-        said.append(f"{found:.3f} mm across {what}, within fits.{key} = {asked:g}")
-    return "; ".join(said) or None
+        sizes.append(f"{size:.3f} mm across {scope}, within fits.{key} = {limit:g}")
+    return "; ".join(sizes) or None
 
 
 def _with_chamber(design: AnyDesign, diameter: float, balloons: int | None = None) -> AnyDesign:
@@ -73,7 +76,7 @@ def _with_chamber(design: AnyDesign, diameter: float, balloons: int | None = Non
 
 
 class _Search:
-    """Looks for the largest chamber, in steps of its diameter."""
+    """Search for the largest chamber, in steps of its diameter."""
 
     def __init__(self, design: Any, fits: Fits, build: Callable[[Any], Laminate]) -> None:
         self._design = design
@@ -83,7 +86,7 @@ class _Search:
         self._why = ""
 
     def over(self, steps: int) -> float | None:
-        """By how many mm the design is too wide, None where it cannot be built."""
+        """Return the excess width of the design, mm; None if it cannot be built."""
         if steps not in self._known:
             try:
                 laminate = self._laminate(steps)
@@ -96,8 +99,8 @@ class _Search:
 
     def _excess(self, laminate: Laminate) -> float:
         fits = self._fits
-        asked = [(fits.diameter, overall_diameter), (fits.outline, outline_diameter)]
-        return max(measured(laminate) - most for most, measured in asked if most is not None)
+        limits = [(fits.diameter, overall_diameter), (fits.outline, outline_diameter)]
+        return max(measured(laminate) - most for most, measured in limits if most is not None)
 
     def largest(self) -> int:
         """The most steps that fit. Raises DesignError where none do."""
@@ -136,25 +139,25 @@ class _Search:
         over = self.over(some)
         if over is not None and over <= ROUNDING:
             return some
-        asked = [(f"fits.{key}", value) for key, value in self._fits if value is not None]
-        said = " and ".join(f"{key} = {value:g}" for key, value in asked)
+        limits = [(f"fits.{key}", value) for key, value in self._fits if value is not None]
+        text = " and ".join(f"{key} = {value:g}" for key, value in limits)
         raise DesignError(
-            f"no chamber fits {said}: the smallest that can be built, chamber.diameter = "
+            f"no chamber fits {text}: the smallest that can be built, chamber.diameter = "
             f"{some * STEP:.2f}, is {over or 0.0:.3f} mm too wide; {self._room(some)}"
         )
 
     def _room(self, steps: int) -> str:
-        """What would make room for a chamber; tabs are no part of ``fits.outline``."""
-        laminate, said = self._laminate(steps), []
-        for key, most, measured, also in (
+        """Remedies that make room for a chamber; tabs are no part of ``fits.outline``."""
+        laminate, remedies = self._laminate(steps), []
+        for key, most, measure, also in (
             ("diameter", self._fits.diameter, overall_diameter, " (or shorten inlet.tab_length)"),
             ("outline", self._fits.outline, outline_diameter, ""),
         ):
-            if most is not None and (found := measured(laminate)) > most + ROUNDING:
-                said.append(
-                    f"fits.{key} at least {math.ceil((found - ROUNDING) * 1000) / 1000:.3f}{also}"
+            if most is not None and (size := measure(laminate)) > most + ROUNDING:
+                remedies.append(
+                    f"fits.{key} at least {math.ceil((size - ROUNDING) * 1000) / 1000:.3f}{also}"
                 )
-        return f"make {' and '.join(said)}"
+        return f"make {' and '.join(remedies)}"
 
     def _laminate(self, steps: int) -> Laminate:
         # Balloons above the second change nothing seen from above.
@@ -172,7 +175,7 @@ class _Search:
         return good
 
     def _straight_between(self, good: int, bad: int) -> int:
-        """Where all would be just as wide as it may, were it to widen evenly; else the middle."""
+        """Secant estimate of the largest fit between two sizes; else the middle."""
         low, high = self.over(good), self.over(bad)
         if low is None or high is None or high <= low:
             return (good + bad) // 2

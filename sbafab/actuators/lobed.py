@@ -3,37 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal, Self
 
 from pydantic import Field
 
-from sbafab.actuators.ears import NOTE, Ear, Holder, Ray, film_setback, placed
+from sbafab.actuators.ears import film_setback
 from sbafab.actuators.fits import Fits, fitted
-from sbafab.actuators.panel import on_panel, roots, with_stubs
-from sbafab.actuators.pockets import (
+from sbafab.actuators.footprint import Footprint, build_footprint
+from sbafab.actuators.stacking import (
     RoundChamber,
-    bonded,
-    check_neck,
     free_of_round,
     pocket_shapes,
     reach,
     round_pockets,
-    tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
-from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, Free, degrees_of_freedom
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Form, Free, degrees_of_freedom
 from sbafab.design.section import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point, unit
-from sbafab.geometry.nearby import boxes_meet
-from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
-from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
+from sbafab.geometry.region import Region, disc
+from sbafab.laminate.laminate import Laminate
 
 ROUNDING = 1e-9
 
@@ -91,10 +82,10 @@ class LobedDesign(Design):
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
-    """Distance of the chamber axes from the lumen's axis, and a note where it was raised.
+    """Return the distance of the chamber axes from the lumen's axis, and a note if it was raised.
 
-    One bond width lies between lumen and pockets, and between neighbouring pockets, each of
-    which is kept within its own sector. Raises DesignError if a radius asked for is too small.
+    One bond width lies between lumen and pockets, and between neighbouring pockets, each of which
+    is kept within its own sector. Raises DesignError if the given radius is too small.
     """
     half = math.pi / design.chamber.count
     bond = design.bond.width
@@ -109,15 +100,15 @@ def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str 
     )
     by_neighbour = (bond / 2 + spread) / math.sin(half)
     least = max(by_lumen, by_neighbour)
-    asked = design.chamber.axis_radius
-    if asked is not None:
-        if asked < least - ROUNDING:
-            other = "the lumen" if by_lumen >= by_neighbour else "each other"
+    radius = design.chamber.axis_radius
+    if radius is not None:
+        if radius < least - ROUNDING:
+            obstacle = "the lumen" if by_lumen >= by_neighbour else "each other"
             raise DesignError(
-                f"chamber.axis_radius = {asked:g} brings the chambers nearer than bond.width = "
-                f"{bond:g} to {other}; it must be at least {least:.4f}"
+                f"chamber.axis_radius = {radius:g} brings the chambers nearer than bond.width = "
+                f"{bond:g} to {obstacle}; it must be at least {least:.4f}"
             )
-        return asked, None
+        return radius, None
     if by_neighbour > by_lumen + ROUNDING:
         return by_neighbour, (
             f"axis radius raised from {by_lumen:.3f} to {by_neighbour:.3f} mm so that "
@@ -126,69 +117,31 @@ def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str 
     return by_lumen, None
 
 
-def build(design: LobedDesign) -> Laminate:
-    """The laminate of a lobed design. Raises DesignError where parts do not fit."""
+def footprint(design: LobedDesign) -> Footprint:
+    """Return lobes in a circle, joined by a hub round the lumen."""
     pockets, shape_of = pocket_shapes(design, design.chamber)
-    check_neck(design, pockets, [(0.0, 0.0)])
     radius, note = axis_radius(design, pockets)
     count = design.chamber.count
     angles = [360 * i / count for i in range(count)]
     directions = [unit(angle) for angle in angles]
     axes = tuple((radius * x, radius * y) for x, y in directions)
-    names = [f"chamber{i + 1}" for i in range(count)]
-
-    hub = disc((0.0, 0.0), _hub_radius(design, pockets, radius))
-    lobes = [[p.moved(radius, 0.0).turned(angle) for angle in angles] for p in pockets]
-    shapes = tuple(_plate(design, hub, lobe) for lobe in lobes)
-
-    first = lobes[shape_of[0]]
-    outlines = [bonded(pocket, design.bond.width) for pocket in first]
-    edge = pockets[shape_of[0]].bounds[2] + design.bond.width
-    inlets = [
-        tab_and_strip(design, name, pocket, axis, direction, edge)
-        for name, pocket, axis, direction in zip(names, first, axes, directions, strict=True)
-    ]
-    _check_tabs(design, outlines, inlets)
-    bottom = BalloonShape(
-        fillet(union([hub, *outlines, *(tab for tab, _, _ in inlets)]), design.fillet.radius),
-        union([*first, *(strip for _, strip, _ in inlets)]),
-        1,
-        count,
-    )
-    plates = union(shape.outline for shape in shapes)
-    held_by = roots(design, shapes, bottom.outline, [inlet for _, _, inlet in inlets])
-    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
-    # Nothing but ears and tails asks for both together.
-    body = bottom.outline | plates if design.registration.method == "ears" else plates
-    ears = _ears(design, body, plates, axes)
-    held = tails([inlet for _, _, inlet in inlets], body, ears, design)
-    stack = BalloonStack(bottom, shapes, shape_of, axes, design.lumen.diameter, ears, held)
-    has_bores = design.stack.balloons > 1
-    bore = design.bore.diameter
-    pins = [
-        channel_pin(n, axis, design.bore) for n, axis in zip(names, axes, strict=True) if has_bores
-    ]
-    lumen_pin = Pin("lumen", (0.0, 0.0), design.lumen.pin, design.lumen.diameter - design.lumen.pin)
-    laminate = Laminate(
-        name=design.name,
-        family=design.family,
-        layers=layers(balloon_cuts(stack, design), design),
-        chambers=tuple(Chamber(n, (axis,)) for n, axis in zip(names, axes, strict=True)),
-        bores=tuple(Bore(n, axis, bore) for n, axis in zip(names, axes, strict=True))
-        if has_bores
-        else (),
-        inlets=tuple(inlet for _, _, inlet in inlets),
-        pins=(*pins, *(ear.pin for ear in ears), *(pin for tail in held for pin in tail.pins))
-        if ears
-        else (*pins, lumen_pin),
+    return Footprint(
+        pockets=[[p.moved(radius, 0.0).turned(angle) for angle in angles] for p in pockets],
+        shape_of=shape_of,
+        axes=axes,
+        directions=directions,
+        edge=pockets[shape_of[0]].bounds[2] + design.bond.width,
+        ears=_ears(axes),
+        hub=disc((0.0, 0.0), _hub_radius(design, pockets, radius)),
         lumen=design.lumen.diameter,
-        balloons=design.stack.balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(*((note,) if note else ()), *((NOTE,) if ears else ())),
-        outline=plates,
+        lumen_pin=design.lumen.pin,
+        notes=(note,) if note else (),
     )
-    return on_panel(laminate, held_by, design)
+
+
+def build(design: LobedDesign) -> Laminate:
+    """Return the laminate of a lobed design. Raises DesignError where parts do not fit."""
+    return build_footprint(design, footprint(design))
 
 
 def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:
@@ -204,77 +157,18 @@ def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> floa
     )
 
 
-def _plate(design: LobedDesign, hub: Region, pockets: list[Region]) -> BalloonShape:
-    lobes = [bonded(pocket, design.bond.width) for pocket in pockets]
-    outline = fillet(union([hub, *lobes]), design.fillet.radius)
-    return BalloonShape(Region(outline.outers), union(pockets), 1, len(pockets))
-
-
-def _check_tabs(
-    design: LobedDesign, outlines: list[Region], inlets: list[tuple[Region, Region, Inlet]]
-) -> None:
-    """Raises DesignError where a tab comes nearer than one overhang to another lobe or tab."""
-    room = design.mask.overhang
-    for i, (tab, _, inlet) in enumerate(inlets):
-        aside = [
-            j
-            for j, other in enumerate(outlines)
-            if j != i
-            and not all(_lies_ahead(tab, one, inlet, room) for one in (other, inlets[j][0]))
-        ]
-        if not aside:
-            continue
-        free = grow(tab - outlines[i], room)
-        for j in aside:
-            if _overlap(free, outlines[j]) or _overlap(free, inlets[j][0]):
-                raise DesignError(
-                    f"the inlet tab of {inlet.chamber} ({inlet.width + 2 * design.bond.width:g} "
-                    f"wide) meets the lobe or tab of {inlets[j][2].chamber}; make inlet.width "
-                    "smaller, chamber.axis_radius larger or chamber.count smaller"
-                )
-
-
-def _lies_ahead(tab: Region, other: Region, inlet: Inlet, room: float) -> bool:
-    """Whether all of a tab lies farther out along its inlet than another shape, and some room."""
-    (x, y), centre = inlet.direction, (0.0, 0.0)
-    nearest = -max(edge.farthest_along(centre, (-x, -y)) for edge in tab.edges)
-    return nearest - max(edge.farthest_along(centre, (x, y)) for edge in other.edges) > room
-
-
-def _overlap(a: Region, b: Region) -> bool:
-    return boxes_meet(a.bounds, b.bounds) and not (a & b).is_empty
-
-
-def _ears(
-    design: LobedDesign, body: Region, plates: Region, axes: tuple[Point, ...]
-) -> tuple[Ear, ...]:
-    """Two film and two mask ears between the inlet tabs.
+def _ears(axes: Sequence[Point]) -> list[tuple[Point, float]]:
+    """Start and angle of two film and two mask ears between the inlet tabs.
 
     Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too
     little room there, and the ears stand in the middle between two lobes.
     """
-    if design.registration.method != "ears":
-        return ()
-    count = design.chamber.count
-    step = 360 / count
-    if count <= 4:
-        places = [
-            (axes[0], 60.0),
-            (axes[1], step + 60.0),
-            (axes[0], -60.0),
-            (axes[-1], -step - 60.0),
-        ]
-    else:
-        places = [((0.0, 0.0), step * (k + 0.5)) for k in (0, 2, 1, 3)]
-    names: tuple[tuple[str, Holder], ...] = (
-        ("film1", "film"),
-        ("film2", "film"),
-        ("mask1", "mask"),
-        ("mask2", "mask"),
-    )
-    rays = [
-        Ray(name, holder, start, unit(angle), name.endswith("2"))
-        for (name, holder), (start, angle) in zip(names, places, strict=True)
-        if holder == "film" or design.stack.balloons > 1
+    step = 360 / len(axes)
+    if len(axes) > 4:
+        return [((0.0, 0.0), step * (k + 0.5)) for k in (0, 2, 1, 3)]
+    return [
+        (axes[0], 60.0),
+        (axes[1], step + 60.0),
+        (axes[0], -60.0),
+        (axes[-1], -step - 60.0),
     ]
-    return placed(rays, body, plates, design)

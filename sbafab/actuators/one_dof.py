@@ -4,27 +4,17 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from sbafab.actuators.ears import NOTE, Ear, Ray, placed
 from sbafab.actuators.fits import Fits, fitted
-from sbafab.actuators.panel import on_panel, roots, with_stubs
-from sbafab.actuators.pockets import (
+from sbafab.actuators.footprint import Footprint, build_footprint
+from sbafab.actuators.stacking import (
     RoundChamber,
     bonded,
-    check_neck,
     free_of_round,
     pocket_shapes,
     round_pockets,
-    tab_and_strip,
 )
-from sbafab.actuators.stacking import BalloonShape, BalloonStack, balloon_cuts, channel_pin, layers
-from sbafab.actuators.tails import tails
-from sbafab.design.form import Form, Free, degrees_of_freedom
-from sbafab.design.records import Design
-from sbafab.geometry.boolean import union
-from sbafab.geometry.edges import unit
-from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Bore, Chamber, Laminate
+from sbafab.design.records import Design, Form, Free, degrees_of_freedom
+from sbafab.laminate.laminate import Laminate
 
 AXIS = (0.0, 0.0)
 
@@ -49,63 +39,19 @@ class OneDofDesign(Design):
         return fitted(self, self.fits, build)
 
 
-def build(design: OneDofDesign) -> Laminate:
-    """The laminate of a 1-DoF design. Raises DesignError where parts do not fit."""
+def footprint(design: OneDofDesign) -> Footprint:
+    """Return pockets on one axis, with ears in the sector that the tab leaves free."""
     pockets, shape_of = pocket_shapes(design, design.chamber)
-    check_neck(design, pockets, [AXIS])
-    shapes = tuple(
-        BalloonShape(bonded(pocket, design.bond.width), pocket, 1, 1) for pocket in pockets
+    return Footprint(
+        pockets=[[pocket] for pocket in pockets],
+        shape_of=shape_of,
+        axes=(AXIS,),
+        directions=[(1.0, 0.0)],
+        edge=bonded(pockets[shape_of[0]], design.bond.width).bounds[2],
+        ears=[(AXIS, angle) for angle in (90.0, 210.0, 150.0, 270.0)],
     )
-    first = shapes[shape_of[0]]
-    tab, strip, inlet = tab_and_strip(
-        design, "chamber1", first.pockets, AXIS, (1.0, 0.0), first.outline.bounds[2]
-    )
-    bottom = BalloonShape(
-        fillet(first.outline | tab, design.fillet.radius), first.pockets | strip, 1, 1
-    )
-    plates = union(shape.outline for shape in shapes)
-    held_by = roots(design, shapes, bottom.outline, [inlet])
-    bottom, shapes = with_stubs(bottom, held_by), tuple(with_stubs(s, held_by) for s in shapes)
-    # Nothing but ears and tails asks for both together.
-    body = bottom.outline | plates if design.registration.method == "ears" else plates
-    ears = _ears(design, body, plates)
-    held = tails([inlet], body, ears, design)
-    stack = BalloonStack(bottom, shapes, shape_of, (AXIS,), ears=ears, tails=held)
-    balloons = design.stack.balloons
-    has_bore = balloons > 1
-    laminate = Laminate(
-        name=design.name,
-        family=design.family,
-        layers=layers(balloon_cuts(stack, design), design),
-        chambers=(Chamber("chamber1", (AXIS,)),),
-        bores=(Bore("chamber1", AXIS, design.bore.diameter),) if has_bore else (),
-        inlets=(inlet,),
-        pins=(
-            *((channel_pin("chamber1", AXIS, design.bore),) if has_bore else ()),
-            *(ear.pin for ear in ears),
-            *(pin for tail in held for pin in tail.pins),
-        ),
-        lumen=None,
-        balloons=balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(NOTE,) if ears else (),
-        outline=plates,
-    )
-    return on_panel(laminate, held_by, design)
 
 
-def _ears(design: OneDofDesign, body: Region, plates: Region) -> tuple[Ear, ...]:
-    """Two film and two mask ears in the five sixths of the circle that the tab leaves free."""
-    if design.registration.method != "ears":
-        return ()
-    rays = [
-        Ray("film1", "film", AXIS, unit(90.0), False),
-        Ray("film2", "film", AXIS, unit(210.0), True),
-    ]
-    if design.stack.balloons > 1:
-        rays += [
-            Ray("mask1", "mask", AXIS, unit(150.0), False),
-            Ray("mask2", "mask", AXIS, unit(270.0), True),
-        ]
-    return placed(rays, body, plates, design)
+def build(design: OneDofDesign) -> Laminate:
+    """Return the laminate of a 1-DoF design. Raises DesignError where parts do not fit."""
+    return build_footprint(design, footprint(design))

@@ -1,4 +1,4 @@
-"""Registered sheets: bridges that hold the parts, and the panel that a laminate is made in.
+"""Registered sheets: bridges that hold the parts, and the panel that holds all copies.
 
 A part hangs in its sheet on bridges between its inlet tabs. A stub of each bridge belongs to the
 outline, so that an error of the second cut takes the stub and not the bond. Films leave a window
@@ -15,13 +15,11 @@ from itertools import combinations
 from sbafab.actuators.stacking import BalloonShape
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc, polygon, stadium, strip
-from sbafab.laminate.laminate import Inlet, Laminate, Pin
-from sbafab.laminate.panel import SheetPanel
+from sbafab.geometry.region import Region, disc, polygon, stadium, strip, union
+from sbafab.laminate.laminate import Inlet, Laminate, Pin, SheetPanel
 
 METHOD = "sheet"
 NOTE = (
@@ -55,7 +53,7 @@ FAR = 500.0
 
 @dataclass(frozen=True)
 class Root:
-    """Where a bridge leaves the part: the second cut goes across the ray at ``end``."""
+    """Root of a bridge on the part: the second cut crosses the ray at ``end``."""
 
     start: Point
     direction: Point
@@ -84,7 +82,7 @@ class Root:
 def roots(
     design: Design, shapes: Sequence[BalloonShape], bottom: Region, inlets: Sequence[Inlet]
 ) -> tuple[Root, ...]:
-    """Bridges spread round a part, clear of its inlet tabs; none for other methods.
+    """Return bridges spread round a part, clear of its inlet tabs; none for other methods.
 
     Raises DesignError for a tapered stack, and where tabs leave no room for bridges.
     """
@@ -100,10 +98,10 @@ def roots(
     tabs = grow(bottom - outline, CLEAR)
     angles = [TURN * i for i in range(int(360 / TURN))]
     tried = {angle: _root(angle, outline, tabs, design) for angle in angles}
-    held = {angle: root for angle, root in tried.items() if root is not None}
+    candidates = {angle: root for angle, root in tried.items() if root is not None}
     mouths = [math.degrees(math.atan2(i.direction[1], i.direction[0])) for i in inlets]
     chosen = max(
-        combinations(held, BRIDGES), key=lambda three: _spread(three, mouths), default=None
+        combinations(candidates, BRIDGES), key=lambda three: _spread(three, mouths), default=None
     )
     if chosen is None:
         raise DesignError(
@@ -111,7 +109,7 @@ def roots(
             f"{design.panel.bridge_width:g}; make it or inlet.width smaller, or use "
             'registration.method = "ears"'
         )
-    return tuple(held[angle] for angle in chosen)
+    return tuple(candidates[angle] for angle in chosen)
 
 
 def _root(angle: float, outline: Region, tabs: Region, design: Design) -> Root | None:
@@ -131,7 +129,7 @@ def _root(angle: float, outline: Region, tabs: Region, design: Design) -> Root |
 
 
 def _spread(angles: Sequence[float], mouths: Sequence[float]) -> float:
-    """How well bridges are spread: their least angle apart, and from the inlets, as shares."""
+    """Quality of the spread of bridges: least angle between them, and to the inlets, as shares."""
     apart = [_between(a, b) for a, b in combinations(angles, 2)]
     free = [_between(angle, mouth) for angle in angles for mouth in mouths]
     return min([min(apart) / (360 / BRIDGES), *(f / 60 for f in free)])
@@ -141,24 +139,24 @@ def _between(a: float, b: float) -> float:
     return abs((a - b + 180) % 360 - 180)
 
 
-def with_stubs(shape: BalloonShape, made: Iterable[Root]) -> BalloonShape:
-    """A balloon whose outline has the stubs of its bridges."""
-    stubs = [root.stub for root in made]
+def with_stubs(shape: BalloonShape, bridges: Iterable[Root]) -> BalloonShape:
+    """Return a balloon whose outline has the stubs of its bridges."""
+    stubs = [root.stub for root in bridges]
     return replace(shape, outline=union([shape.outline, *stubs])) if stubs else shape
 
 
-def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Laminate:
-    """The laminate with its registered sheets and their corner pins; as it is without bridges.
+def on_panel(laminate: Laminate, bridges: Sequence[Root], design: Design) -> Laminate:
+    """Return the laminate with its registered sheets and corner pins; unchanged without bridges.
 
     Raises DesignError where not even one copy fits on film and platen, or pins are too thick for
     the sheet's corners.
     """
-    if not made:
+    if not bridges:
         return laminate
     profiles = {name: layers[0].profile for name, layers in laminate.patterns.items()}
     weeded = Region(grow(union(profiles.values()), GAP).outers)
     window = Region(grow(weeded, design.mask.overhang).outers)
-    strips = [root.bridge(window) for root in made]
+    strips = [root.bridge(window) for root in bridges]
     openings = {
         name: (weeded if layers[0].is_mask else window)
         - (profiles[name] if layers[0].is_mask else union([profiles[name], *strips]))
@@ -170,8 +168,8 @@ def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Lamina
     marks = _fiducials(outline)
     _refuse_thick_pins(pins, (outline, *(window.moved(*place) for place in places)), marks)
     holes += [circle(mark, FIDUCIAL / 2) for mark in marks]
-    whole = {name: _sheet(outline, holes, one, places) for name, one in openings.items()}
-    slots = [contour for root in made for contour in root.slot.contours]
+    whole = {name: _sheet(outline, holes, opening, places) for name, opening in openings.items()}
+    slots = [contour for root in bridges for contour in root.slot.contours]
     panel = SheetPanel(
         outline=outline,
         places=places,
@@ -188,18 +186,18 @@ def on_panel(laminate: Laminate, made: Sequence[Root], design: Design) -> Lamina
 def _places(window: Region, design: Design) -> tuple[tuple[Point, ...], int]:
     """Axes of the copies of one batch, the first at the origin, and how many batches there are."""
     low_x, low_y, high_x, high_y = window.bounds
-    own, panel = design.sheets, design.panel
+    sheets, panel = design.sheets, design.panel
     pitch = high_x - low_x + panel.web, high_y - low_y + panel.web
     room = [
         min(platen, *(film - 2 * border for film, border in films))
         for platen, films in (
             (
                 design.press.platen_width,
-                ((own.tpe.width, own.tpe.border), (own.ptfe.width, own.ptfe.border)),
+                ((sheets.tpe.width, sheets.tpe.border), (sheets.ptfe.width, sheets.ptfe.border)),
             ),
             (
                 design.press.platen_length,
-                ((own.tpe.length, own.tpe.border), (own.ptfe.length, own.ptfe.border)),
+                ((sheets.tpe.length, sheets.tpe.border), (sheets.ptfe.length, sheets.ptfe.border)),
             ),
         )
     ]
@@ -288,5 +286,5 @@ def _sheet(
 
 
 def _repeated(contours: Iterable[Contour], places: Sequence[Point]) -> tuple[Contour, ...]:
-    own = Region(tuple(contours))
-    return tuple(contour for place in places for contour in own.moved(*place).contours)
+    region = Region(tuple(contours))
+    return tuple(contour for place in places for contour in region.moved(*place).contours)

@@ -6,43 +6,42 @@ Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Literal, Self
 
 from pydantic import Field
 
 from sbafab.actuators.ears import (
-    NOTE,
     Ear,
     Ray,
+    head_reach,
     placed,
+    tails,
     with_film_ears,
     with_mask_ears,
     with_sheet_ears,
 )
-from sbafab.actuators.feet import film_feet, mask_feet
 from sbafab.actuators.panel import METHOD
-from sbafab.actuators.pockets import bonded, check_neck, drawn_pocket, tab_and_strip
 from sbafab.actuators.stacking import (
     BalloonShape,
     BalloonStack,
     CutFilm,
-    balloon_cuts,
-    channel_pin,
-    layers,
+    bonded,
+    check_neck,
+    drawn_pocket,
+    stacked,
+    tab_and_strip,
 )
-from sbafab.actuators.tails import head_reach, tails
-from sbafab.design.form import Drawn, Form, Free, Slots, Wrap
-from sbafab.design.records import Chamber as ChamberSection
-from sbafab.design.records import Design, Inlet, Stack
+from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap
 from sbafab.design.section import Section
+from sbafab.design.sections import Chamber as ChamberSection
+from sbafab.design.sections import Inlet, Stack
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import rectangle, stadium, strip
-from sbafab.laminate.laminate import Bore, Chamber, Laminate
+from sbafab.geometry.region import Region, rectangle, section, stadium, strip, union
+from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.laminate import Inlet as LaminateInlet
 
 
@@ -134,7 +133,7 @@ class RadialDesign(Design):
         return (width, length, Free("stack.balloons", 1, 3, 1), *super().free[1:])
 
     def completed(self) -> Self:
-        """The same design with inlet and window sizes filled in."""
+        """Return the design with inlet and window sizes filled in."""
         completed = super().completed()
         if self.chamber.outline is not None:
             return completed
@@ -144,7 +143,7 @@ class RadialDesign(Design):
 
 
 def build(design: RadialDesign) -> Laminate:
-    """The flat laminate of a radial design. Raises DesignError where parts do not fit."""
+    """Return the flat laminate of a radial design. Raises DesignError where parts do not fit."""
     if design.registration.method == METHOD:
         raise DesignError(
             "a radial design cannot be made in registered sheets, for its balloons' bridges would "
@@ -153,7 +152,7 @@ def build(design: RadialDesign) -> Laminate:
         )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
-    check_neck(design, [pocket], [(0.0, 0.0)])
+    check_neck(design, [pocket])
     outline = bonded(pocket, bond)
     count = design.chamber.count
     centres = tuple(((i - (count - 1) / 2) * design.pitch, 0.0) for i in range(count))
@@ -165,9 +164,9 @@ def build(design: RadialDesign) -> Laminate:
     bottom, inlets = _bottom(design, shape, outline, centres)
     sheet = _sheet(design, outline)
     ears = _ears(design, bottom, sheet, outline, centres)
-    held = tails(inlets, bottom.outline, ears, design, sheet)
+    inlet_tails = tails(inlets, bottom.outline, ears, design, sheet)
     stack = BalloonStack(
-        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=held
+        bottom, (shape,), (0,) * design.stack.balloons, centres, ears=ears, tails=inlet_tails
     )
     window = _window(design, pocket, outline)
     windows = union(window.moved(*centre) for centre in centres)
@@ -178,34 +177,10 @@ def build(design: RadialDesign) -> Laminate:
         CutFilm("sheet", with_sheet_ears(sheet, ears, fillet_radius), None, 1),
         CutFilm("separator-mask", carrier_mask, None, bottom.outline_pieces),
     ]
-    manifold = design.inlet.manifold
-    names = ["chamber1"] * count if manifold else [f"chamber{i + 1}" for i in range(count)]
-    bored = zip(names, centres, strict=True) if design.stack.balloons > 1 else ()
-    bores = tuple(Bore(name, centre, design.bore.diameter) for name, centre in bored)
-    return Laminate(
-        name=design.name,
-        family=design.family,
-        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
-        chambers=(Chamber("chamber1", centres),)
-        if manifold
-        else tuple(Chamber(n, (centre,)) for n, centre in zip(names, centres, strict=True)),
-        bores=bores,
-        inlets=inlets,
-        pins=(
-            *(
-                channel_pin(f"channel{number}", bore.centre, design.bore)
-                for number, bore in enumerate(bores, start=1)
-            ),
-            *(ear.pin for ear in ears),
-            *(pin for tail in held for pin in tail.pins),
-        ),
-        lumen=None,
-        balloons=design.stack.balloons,
-        registration=design.registration.method,
-        pins_in_full_bonds=design.registration.full_bond_pins == "in",
-        notes=(NOTE,) if ears else (),
-        tube=design.tube.outer_diameter,
-    )
+    parts = [centres] if design.inlet.manifold else [(centre,) for centre in centres]
+    chambers = [Chamber(f"chamber{number}", part) for number, part in enumerate(parts, start=1)]
+    laminate = stacked(design, stack, chambers, inlets, carrier, "channel")
+    return replace(laminate, tube=design.tube.outer_diameter)
 
 
 def _slot(design: RadialDesign) -> tuple[float, float]:
@@ -275,14 +250,14 @@ def _bottom(
     """The bottom balloons with tabs, strips and, for a manifold, the bridges between them."""
     count, manifold = len(centres), design.inlet.manifold
     fed = [centres[(count - 1) // 2]] if manifold else centres
-    made = [
+    feeds = [
         tab_and_strip(
             design, f"chamber{number}", shape.pockets, centre, (0.0, 1.0), outline.bounds[3]
         )
         for number, centre in enumerate(fed, start=1)
     ]
-    tabs = [tab for tab, _, _ in made]
-    strips = [mask for _, mask, _ in made]
+    tabs = [tab for tab, _, _ in feeds]
+    strips = [mask for _, mask, _ in feeds]
     if manifold and count > 1:
         width = design.strip_width
         tabs.append(strip(centres[0], centres[-1], width + 2 * design.bond.width))
@@ -298,7 +273,7 @@ def _bottom(
     pieces = 1 if manifold else count
     return (
         BalloonShape(bottom, union([shape.pockets, *strips]), pieces, pieces),
-        tuple(inlet for _, _, inlet in made),
+        tuple(inlet for _, _, inlet in feeds),
     )
 
 
@@ -333,3 +308,111 @@ def _ears(
         Ray("sheet2", "sheet", (low_x + 1.0, middle), (-1.0, 0.0), True),
     ]
     return placed(rays, bottom.outline | sheet, bottom.outline, design)
+
+
+# Starts of ears on an outline of any shape: two below, and two above beside its tab, which stands
+# on the upper side at x = 0.
+
+
+Side = Literal[-1, 1]
+STEP = 0.25
+"""mm between the places that are tried along an outline."""
+
+
+def film_feet(design: Design, outline: Region) -> tuple[Point, Point]:
+    """Return starts of two film ears at the lower side, a quarter of the width beside its middle.
+
+    Raises DesignError where the outline has no room for both.
+    """
+    low_x, _, high_x, _ = outline.bounds
+    middle, apart = round((low_x + high_x) / 2, 6), _apart(design)
+    beside = max(round((high_x - low_x) / 4, 6), apart)
+    first = _nearest(outline, middle - beside, -1, design)
+    second = first and _nearest(outline, middle + beside, -1, design, first[0])
+    if first is None or second is None:
+        raise DesignError(_no_room(2 * apart + design.bond.width))
+    return first, second
+
+
+def mask_feet(
+    design: Design, outline: Region, head: float
+) -> tuple[tuple[Point, Point | None], ...]:
+    """Starts of two mask ears at the upper side, clear of the tab and the ``head`` of its tail.
+
+    With each the point of the outline that it is joined from, if it starts beside the outline.
+    """
+    half, overhang = _half(design), design.mask.overhang
+    tab = max(design.strip_width / 2 + design.bond.width, head)
+    beside = tab + 2 * overhang + half
+    feet: list[tuple[Point, Point | None]] = []
+    for x in (-beside, beside):
+        # A mask reaches past the outline: an ear may stand half beside it.
+        inner = x - math.copysign(half - design.bond.width, x)
+        start = _foot(outline, x, 1, design) or _foot(outline, inner, 1, design)
+        joint = None if start else _nearest(outline, x, 1, design)
+        start = start or joint
+        if start is None:
+            raise DesignError(_no_room(design.bond.width))
+        feet.append(((x, start[1]), joint))
+    return tuple(feet)
+
+
+def _no_room(width: float) -> str:
+    return (
+        f"the outline of an SBA has no room for ears, which take {width:.3f} mm of its width; make "
+        "the chamber wider or registration.pin_diameter smaller, or use "
+        'registration.method = "channel-pin"'
+    )
+
+
+def _half(design: Design) -> float:
+    """Half the width of an ear."""
+    return design.registration.hole_diameter / 2 + design.bond.width
+
+
+def _apart(design: Design) -> float:
+    """Half the distance of two film ears: the fillets beside both, and a little more."""
+    return _half(design) + design.fillet.radius + design.mask.overhang / 2
+
+
+def _foot(outline: Region, x: float, side: Side, design: Design) -> Point | None:
+    """A point of the outermost stretch of the outline at ``x``; none where that is too short."""
+    stretches = section(outline, (x, 0.0), (0.0, float(side)))
+    if not stretches or stretches[-1][1] - stretches[-1][0] < design.bond.width:
+        return None
+    start, end = stretches[-1]
+    return x, side * (end - min((end - start) / 2, 2 * _half(design)))
+
+
+def _nearest(
+    outline: Region, preferred: float, side: Side, design: Design, clear_of: float | None = None
+) -> Point | None:
+    """The foot nearest to ``preferred`` from which no other part of the outline lies ahead.
+
+    Where it does everywhere: the one with the least ahead. ``clear_of``: the x of another ear.
+    """
+    low_x, _, high_x, _ = outline.bounds
+    reach = max(high_x, preferred) - min(low_x, preferred)
+    steps = [STEP * k for k in range(round(reach / STEP) + 1)]
+    best: tuple[float, Point] | None = None
+    for x in (preferred + sign * step for step in steps for sign in (1, -1)):
+        if clear_of is not None and abs(x - clear_of) < 2 * _apart(design) - 1e-9:
+            continue
+        start = _foot(outline, x, side, design)
+        if start is None:
+            continue
+        ahead = _ahead(outline, start, side, design)
+        if ahead < 4 * _half(design):
+            return start
+        if best is None or ahead < best[0]:
+            best = ahead, start
+    return best and best[1]
+
+
+def _ahead(outline: Region, start: Point, side: Side, design: Design) -> float:
+    """Reach of the outline past ``start`` in the way of an ear, mm."""
+    half = _half(design) + 2 * design.mask.overhang
+    _, low, _, high = outline.bounds
+    band = outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))
+    _, low, _, high = band.bounds
+    return (high - start[1]) if side > 0 else (start[1] - low)

@@ -1,37 +1,52 @@
-"""What every family shares: balloons of given outlines and pockets become a stack of layers."""
+"""Stacks of balloons as layers, and the pockets, tabs and strips that families share."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Annotated
+
+from pydantic import Field
 
 from sbafab.actuators.ears import (
+    NOTE,
     Ear,
+    Tail,
     film_holes,
     film_setback,
     with_film_ears,
     with_mask_ears,
+    with_tails,
 )
-from sbafab.actuators.tails import Tail, with_tails
-from sbafab.design.messages import listed, shown
-from sbafab.design.records import Bore as BoreSection
-from sbafab.design.records import Design
+from sbafab.design.files import listed, shown
+from sbafab.design.records import Design, Discs, Drawn, Free
+from sbafab.design.sections import Bore as BoreSection
+from sbafab.design.sections import Chamber as ChamberSection
+from sbafab.design.units import Length
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.films import Film, in_order
-from sbafab.laminate.laminate import ROLES, Layer, Pin, Role
+from sbafab.laminate.laminate import (
+    ROLES,
+    Bore,
+    Chamber,
+    Inlet,
+    Laminate,
+    Layer,
+    Pin,
+    Role,
+)
 
 
 @dataclass(frozen=True)
 class BalloonShape:
     """One balloon seen from above, before bores and lumen are cut: its outline and pockets.
 
-    The counts say how many separate parts outline and pockets are meant to have.
+    The counts are the numbers of separate parts that outline and pockets should have.
     """
 
     outline: Region
@@ -53,6 +68,7 @@ class BalloonStack:
     shape_of: tuple[int, ...]
     axes: tuple[Point, ...]
     lumen: float | None = None
+    lumen_pin: float = 0.0
     ears: tuple[Ear, ...] = ()
     tails: tuple[Tail, ...] = ()
 
@@ -68,7 +84,7 @@ class CutFilm:
 
 
 def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
-    """The films of a stack of balloons, base to cap (geometry of the laminate table)."""
+    """Return the films of a stack of balloons, base to cap (geometry of the laminate table)."""
     count = len(stack.shape_of)
     back, ears = film_setback(design), stack.ears
     radius = design.bore.diameter / 2
@@ -136,20 +152,20 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
 
 
 def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
-    """The dowel pin of a channel bore."""
+    """Return the dowel pin of a channel bore."""
     return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
 def film_of(design: Design, role: Role) -> Film:
-    """The film that a design's layup gives to the layers of a role.
+    """Return the film that a design's layup gives to the layers of a role.
 
-    Raises DesignError where it names none, or one that cannot do the role's work.
+    Raises DesignError if it names none, or one of the wrong kind.
     """
     key = role.replace("-", "_")
     name: str = getattr(design.layup, key)
     stock = design.films.stock
-    wanted = "mask" if role.endswith("-mask") else "structural"
-    fit = [known for known, film in stock.items() if film.kind == wanted]
+    kind = "mask" if role.endswith("-mask") else "structural"
+    fit = [name_of_film for name_of_film, film in stock.items() if film.kind == kind]
     if name not in stock:
         raise DesignError(
             f"layup.{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
@@ -158,19 +174,19 @@ def film_of(design: Design, role: Role) -> Film:
     if name not in fit:
         raise DesignError(
             f"layup.{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
-            f"{wanted} one: {listed(fit)}"
+            f"{kind} one: {listed(fit)}"
         )
     return stock[name]
 
 
 def used_films(design: Design) -> dict[str, Film]:
-    """The films that a design's layup names, by material, TPE first. Raises DesignError."""
+    """Return the films that a design's layup names, by material, TPE first. Raises DesignError."""
     named = {film.material: film for role in ROLES for film in [film_of(design, role)]}
     return {material: named[material] for material in in_order(named)}
 
 
 def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
-    """The films in their order, with heights and pattern names."""
+    """Return the films as layers, with heights and pattern names."""
     films = {role: film_of(design, role) for role in ROLES}
     patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
@@ -184,3 +200,190 @@ def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
         )
         z += film.thickness
     return tuple(placed)
+
+
+def stacked(
+    design: Design,
+    stack: BalloonStack,
+    chambers: Sequence[Chamber],
+    inlets: tuple[Inlet, ...],
+    carrier: Sequence[CutFilm] = (),
+    channel: str = "chamber",
+) -> Laminate:
+    """Return the laminate of a stack of balloons on its ``carrier`` films, with bores and pins.
+
+    Pins in bores are named ``channel`` and a number; with ears the lumen has no pin.
+    """
+    balloons = len(stack.shape_of)
+    bores = tuple(
+        Bore(chamber.name, centre, design.bore.diameter)
+        for chamber in chambers
+        for centre in chamber.centres
+        if balloons > 1
+    )
+    pins = [channel_pin(f"{channel}{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
+    if stack.lumen is not None and not stack.ears:
+        pins.append(Pin("lumen", (0.0, 0.0), stack.lumen_pin, stack.lumen - stack.lumen_pin))
+    pins += [ear.pin for ear in stack.ears]
+    pins += [pin for tail in stack.tails for pin in tail.pins]
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers([*carrier, *balloon_cuts(stack, design)], design),
+        chambers=tuple(chambers),
+        bores=bores,
+        inlets=inlets,
+        pins=tuple(pins),
+        lumen=stack.lumen,
+        balloons=balloons,
+        registration=design.registration.method,
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        notes=(NOTE,) if stack.ears else (),
+    )
+
+
+# Pockets of discs or of a drawn outline, tapered or not, and their inlet strips and tabs.
+
+
+MOST_SIZES = 40
+"""Different pockets in a stack: twice the balloons that have been built (paper Sec. 6)."""
+
+
+class RoundChamber(ChamberSection):
+    """The chamber of a family whose pockets are discs, or one drawn outline."""
+
+    diameter: Length | Annotated[tuple[Length, ...], Field(strict=False, min_length=1)] = 5.0
+    """Pocket diameter; a list gives one a balloon, bottom to top (a tapered stack)."""
+
+
+def free_diameter(chamber: RoundChamber) -> tuple[Free, ...]:
+    """Return the diameter as a search variable: that of all balloons, or the largest of a list."""
+    if chamber.outline is not None:
+        return ()
+    return (Free("chamber.diameter", 2.6, 16.0, 0.1, widens=True),)
+
+
+def free_of_round(chamber: RoundChamber, further: tuple[Free, ...]) -> tuple[Free, ...]:
+    """Return the search variables of a round chamber and ``further`` ones.
+
+    A list of diameters fixes the number of balloons.
+    """
+    is_list = chamber.outline is None and not isinstance(chamber.diameter, float)
+    settled = ("stack.balloons",) if is_list else ()
+    return (*free_diameter(chamber), *(free for free in further if free.key not in settled))
+
+
+def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
+    """Return the pocket diameter of every balloon, bottom to top. Raises DesignError."""
+    if isinstance(chamber.diameter, float):
+        return (chamber.diameter,) * design.stack.balloons
+    if len(chamber.diameter) != design.stack.balloons:
+        raise DesignError(
+            f"chamber.diameter lists {len(chamber.diameter)} balloons but stack.balloons = "
+            f"{design.stack.balloons}; give one diameter a balloon, bottom to top"
+        )
+    return chamber.diameter
+
+
+def round_pockets(design: Design, chamber: RoundChamber) -> Discs | Drawn:
+    """Return the form of these pockets."""
+    return Drawn() if chamber.outline is not None else Discs(diameters(design, chamber))
+
+
+def drawn_pocket(design: Design) -> Region | None:
+    """Return the drawn pocket, or None. Raises DesignError if it cannot be read."""
+    if design.drawing is None:
+        return None
+    from sbafab.design.outline import read_outline
+
+    return read_outline(design.drawing)
+
+
+def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
+    """Return the distinct pockets round (0, 0), and the index of each balloon's.
+
+    Raises DesignError where a pocket has no room for bore and neck ring.
+    """
+    if chamber.outline is not None and not isinstance(chamber.diameter, float):
+        raise DesignError(
+            "chamber.outline and a list in chamber.diameter exclude each other; remove one"
+        )
+    drawn = drawn_pocket(design)
+    if drawn is not None:
+        check_neck(design, [drawn])
+        return [drawn], (0,) * design.stack.balloons
+    sizes = diameters(design, chamber)
+    distinct = list(dict.fromkeys(sizes))
+    if len(distinct) > MOST_SIZES:
+        raise DesignError(
+            f"chamber.diameter lists {len(distinct)} different diameters, where at most "
+            f"{MOST_SIZES} are allowed; let neighbouring balloons share one"
+        )
+    pockets = [disc((0.0, 0.0), size / 2) for size in distinct]
+    check_neck(design, pockets)
+    return pockets, tuple(distinct.index(size) for size in sizes)
+
+
+def check_neck(design: Design, pockets: list[Region]) -> None:
+    """Raise DesignError if bore and neck ring leave no free film in the smallest pocket."""
+    if design.stack.balloons == 1:
+        return
+    ring = design.bore.diameter / 2 + film_setback(design) + design.bond.width
+    room = min(pocket.distance_to_edge((0.0, 0.0)) for pocket in pockets)
+    if ring >= room:
+        largest = design.bore.diameter - 2 * (ring - room)
+        remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"
+        raise DesignError(
+            f"bore.diameter = {design.bore.diameter:g} with a neck ring of bond.width = "
+            f"{design.bond.width:g} round it (outer radius {ring:.3f}) does not fit a pocket that "
+            f"leaves {room:.3f} round the channel; {remedy}"
+        )
+
+
+def reach(region: Region, direction: Point) -> float:
+    """Return the extent of the region from (0, 0) along a unit direction, mm."""
+    turn = -math.degrees(math.atan2(direction[1], direction[0]))
+    return region.turned(turn).bounds[2]
+
+
+def tab_and_strip(
+    design: Design, chamber: str, pocket: Region, start: Point, direction: Point, edge: float
+) -> tuple[Region, Region, Inlet]:
+    """Return inlet tab, mask strip and inlet of a chamber.
+
+    The strip starts at ``start`` inside the pocket and runs along ``direction``; the outline ends
+    ``edge`` mm from there. The strip reaches one overhang past the tab's end. Raises DesignError
+    where the strip is wider than the pocket.
+    """
+    width = design.strip_width
+    for side in (1, -1):
+        corner = (
+            start[0] - side * direction[1] * width / 2,
+            start[1] + side * direction[0] * width / 2,
+        )
+        if not pocket.contains(corner):
+            raise DesignError(
+                f"inlet.width = {width:g} is wider than the pocket of {chamber} where the strip "
+                "leaves it; make inlet.width smaller or the chamber larger"
+            )
+    length = edge + design.inlet.tab_length
+
+    def along(distance: float) -> Point:
+        return start[0] + direction[0] * distance, start[1] + direction[1] * distance
+
+    tab = strip(start, along(length), width + 2 * design.bond.width)
+    mask = strip(start, along(length + design.mask.overhang), width)
+    inlet = Inlet(
+        chamber,
+        along(length),
+        direction,
+        width,
+        design.inlet.tab_length,
+        design.inlet.tube_outer_diameter,
+    )
+    return tab, mask, inlet
+
+
+def bonded(pockets: Region, width: float) -> Region:
+    """Return the outline of pockets with a bonded ring round them; filled inside."""
+    return Region(grow(pockets, width).outers)

@@ -1,4 +1,4 @@
-"""The rule deck on the cut files of an output folder as they lie on disk (``as-built``)."""
+"""Checks of an output folder as it is on disk: file integrity, claims, rules, design."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sbafab.actuators import build, load_design, records
-from sbafab.as_built.by_layer import UNMEASURED, findings_as_built, rules_by_layer
-from sbafab.as_built.chords import chorded_place
 from sbafab.as_built.claims import (
     claim,
     design_problems,
@@ -18,8 +16,9 @@ from sbafab.as_built.claims import (
     order_problems,
     property_problems,
 )
-from sbafab.as_built.cut_files import CutPart, LayerFile, inside, read_layers
-from sbafab.as_built.meant import Meant, RunWork, departure, meant_by
+from sbafab.as_built.cut_files import CutPart, LayerFile, path_in_folder, read_layers
+from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, departure, expected_laminate
+from sbafab.as_built.kerf_removed import chords_for_arc
 from sbafab.as_built.measures import (
     batch_problems,
     fixture_problems,
@@ -30,47 +29,46 @@ from sbafab.as_built.measures import (
     size_problems,
     with_plate_pins,
 )
-from sbafab.as_built.panels import read_panel
-from sbafab.as_built.pieces import Lot
 from sbafab.as_built.records import (
     CLAIMS,
     DESIGNED,
     INTEGRITY,
     Problem,
     findings_of,
+    is_assembly,
     is_job,
-    is_joined,
+    read_assembly,
     read_claims,
     read_job,
 )
-from sbafab.as_built.sheets import SheetOrder, sheet_problems
+from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
-from sbafab.design.reading import validated
-from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.checks import lowered_checks, run_checks
+from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import SheetPanel
-from sbafab.models.sizes import sizes
-from sbafab.output.manifest_records import Manifest
-from sbafab.output.planned import Checked
-from sbafab.output.settings import limits as limits_of
-from sbafab.rules.deck import RULES, run_deck
-from sbafab.rules.finding import Finding
-from sbafab.rules.limits import TOLERANCE, Limits
-from sbafab.rules.lowered import lowered
+from sbafab.laminate.laminate import Laminate, SheetPanel
+from sbafab.models.formulas import sizes
+from sbafab.output.checked import Checked
+from sbafab.output.checked import limits as limits_of
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
+from sbafab.rules import film_limits
+from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import TOLERANCE, Limits, lowered
 from sbafab.rules.measures import Measures
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
 
 
 @dataclass(frozen=True)
-class AsBuilt:
-    """A folder read back: ``laminate`` is None where a layer's file could not be read.
+class AsBuiltFolder:
+    """A folder read back; ``laminate`` is None if the file of a layer could not be read.
 
-    ``meant`` is what the design makes, if it can be made; ``is_meant``: every layer's file cuts
-    just that, so that ``laminate`` is the design's own.
+    ``expected`` is the laminate of the design, None if it cannot be built.
     """
 
     claims: Manifest
@@ -79,165 +77,171 @@ class AsBuilt:
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
-    meant: Meant | None
-    known: tuple[Finding, ...] | None = None
-    """What the rules found in ``meant``, where a run has just measured it."""
+    expected: ExpectedLaminate | None
+    design_findings: tuple[Finding, ...] | None = None
+    """The findings of the design check of a run that has just written the folder."""
+    measured: tuple[Finding, ...] = ()
+    """The findings of the rules on the layers as cut."""
 
     @property
-    def is_meant(self) -> bool:
-        own, meant = self.laminate, self.meant
-        if own is not None and meant is not None and own.panel is not meant.laminate.panel:
-            return False
-        return all(file.part is not None and file.part.is_meant for file in self.files)
+    def is_expected(self) -> bool:
+        """True if every layer file cuts the design's layer; ``laminate`` is then the design's."""
+        laminate, expected = self.laminate, self.expected
+        is_same_panel = (
+            laminate is None or expected is None or laminate.panel is expected.laminate.panel
+        )
+        return is_same_panel and all(
+            file.part is not None and file.part.is_expected for file in self.files
+        )
 
 
-def check_folder(folder: Path) -> tuple[Finding, ...]:
-    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
-    whether all that lies in it is what its design makes.
+@dataclass(frozen=True)
+class FolderReadBack:
+    """An output folder read back and measured; nothing of it is made again.
 
-    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
-    with one sentence for a folder that holds no sound manifest or no cut files.
+    ``findings`` are those on files, claims, rules, and on the layers of each design of a job;
+    ``problems``: where a folder of one design cuts other layers than its ``design.toml`` makes.
+    """
+
+    findings: tuple[Finding, ...]
+    problems: tuple[Problem, ...]
+    designs: tuple[AsBuiltFolder, ...]
+    job: JobManifest | None = None
+
+    def against_design(self, problems: Sequence[Problem]) -> tuple[Finding, ...]:
+        """Return the findings, the last one with the ``problems`` against the design."""
+        return (*self.findings, *findings_of(DESIGNED, [*problems], AS_DESIGNED))
+
+
+def read_back(folder: Path, works: Mapping[str, WrittenDesign] | None = None) -> FolderReadBack:
+    """Read an output folder, of one design or several, as it lies on the disk.
+
+    ``works``: the designs of a run that has just written the folder, by name, with their expected
+    laminates and findings: layers that are cut just so are not measured again. Without, both are
+    made from each ``design.toml``. Raises OutputError for a folder without a sound manifest or
+    without cut files.
     """
     if is_job(folder):
-        return _check_job(folder)
-    built = read_folder(folder)
-    measured = _deck(built)
-    problems = design_problems_of(folder, built, measured)
-    return (*_findings(built, measured), *findings_of(DESIGNED, problems, AS_DESIGNED))
+        return _read_job(folder, works)
+    work = next(iter(works.values())) if works is not None else None
+    built = read_folder(folder, work=work)
+    built = replace(built, measured=_run_deck(built))
+    return FolderReadBack(_findings(built), tuple(layer_departures(built)), (built,))
 
 
-def check_written(folder: Path, works: Mapping[str, RunWork]) -> tuple[Finding, ...]:
-    """What is found in a folder that has just been written, of ``works`` by their designs' names.
-
-    Everything is read from the disk. Where every layer's file cuts what the design check measured,
-    its findings hold and are not measured again; what was written beside the cut files is not made
-    a second time to be compared with itself.
-    """
-    if is_job(folder):
-        return _check_job(folder, works)
-    built = read_folder(folder, work=next(iter(works.values())))
-    problems = _layer_problems(built)
-    return (*_findings(built, _deck(built)), *findings_of(DESIGNED, problems, AS_DESIGNED))
-
-
-def _deck(built: AsBuilt) -> tuple[Finding, ...]:
-    """What the rules find in the layers as they are cut."""
+def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
+    """Return the findings of the rules on the layers as cut."""
     if built.laminate is None:
         return rules_by_layer(built.files, built.claims, built.design, built.limits)
-    if built.is_meant and built.known is not None:
-        return built.known
+    if built.is_expected and built.design_findings is not None:
+        return built.design_findings
     measures = Measures(built.laminate, built.limits)
     return tuple(finding for rule in RULES for finding in findings_as_built(rule, measures))
 
 
-def _findings(built: AsBuilt, measured: Sequence[Finding]) -> tuple[Finding, ...]:
-    problems = [*built.problems, *_unsaid_waivers(measured, built.claims)]
+def _findings(built: AsBuiltFolder) -> tuple[Finding, ...]:
+    problems = [*built.problems, *_unlisted_waivers(built.measured, built.claims)]
     count = len(built.files)
     return (
         *findings_of(
             INTEGRITY, problems, f"{count} cut files read back: closed contours in millimetres"
         ),
         *findings_of(CLAIMS, problems, "the manifest's claims hold for what lies on disk"),
-        *measured,
+        *built.measured,
     )
 
 
-def _check_job(folder: Path, works: Mapping[str, RunWork] | None = None) -> tuple[Finding, ...]:
-    """What is found in every design of a job, its name before it, and on the job's sheets.
+def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> FolderReadBack:
+    """Read the designs of a job, its sheets, and the places between the parts of an assembly.
 
-    In an assembly's folder, also what is found between its parts. ``works``: what the run that has
-    just written the folder knows of its designs.
+    ``works``: the designs of a run that has just written the folder.
     """
     job = read_job(folder)
-    found: list[Finding] = []
-    lots: list[Lot] = []
+    findings: list[Finding] = []
+    lots: list[DesignLot] = []
     problems: list[Problem] = []
-    weak: list[str] = []
-    folders: list[AsBuilt] = []
-    checked: list[Checked | None] = []
-    for told in job.designs:
-        work = works.get(told.name) if works is not None else None
-        built = read_folder(inside(folder, told.folder), of_job=True, work=work)
+    lowered_limits: list[str] = []
+    folders: list[AsBuiltFolder] = []
+    for entry in job.designs:
+        work = works.get(entry.name) if works is not None else None
+        built = read_folder(path_in_folder(folder, entry.folder), of_job=True, work=work)
+        built = replace(built, measured=_run_deck(built))
         folders.append(built)
-        weak += lowered(limits_of(built.design))
-        measured = _deck(built)
-        named = [*_findings(built, measured)]
-        layers = _layer_problems(built)
-        named += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
-        found += [replace(f, message=f"{told.name}: {f.message}") for f in named]
-        checked.append(_as_designed(built, measured) if works is None else None)
-        lots.append(Lot(told.name, told.copies, built.files, built.design.order.spare_parts))
-        own = (built.claims.name, built.claims.copies, built.claims.design_sha256)
-        if own != (told.name, told.copies, told.design_sha256):
-            message = f"{told.folder}: name, copies or design_sha256 are not those of its manifest"
+        lowered_limits += lowered(limits_of(built.design))
+        design_findings = [*_findings(built)]
+        layers = layer_departures(built)
+        design_findings += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
+        findings += [replace(f, message=f"{entry.name}: {f.message}") for f in design_findings]
+        lots.append(
+            DesignLot(entry.name, entry.copies, built.files, built.design.order.spare_parts)
+        )
+        identity = (built.claims.name, built.claims.copies, built.claims.design_sha256)
+        if identity != (entry.name, entry.copies, entry.design_sha256):
+            message = f"{entry.folder}: name, copies or design_sha256 are not those of its manifest"
             problems.append(claim(message))
     first = folders[0]
     problems += file_problems(folder, job)
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
     problems += sheet_problems(folder, order)
-    if is_joined(job):
-        from sbafab.as_built.joined import joined_findings, lowered_between
-
-        weak += lowered_between(folder)
-        between, wrong = joined_findings(folder)
-        found += between
-        problems += wrong
-    problems += lowered_problems(job.lowered_limits, weak)
-    whole = [one for one in checked if one is not None]
-    if works is None and len(whole) == len(checked):
-        from sbafab.as_built.derived import derived_job_problems
-
-        problems += derived_job_problems(folder, job, whole, folders[0].claims.curves)
+    if is_assembly(job):
+        lowered_limits += lowered_between(folder)
+        between, between_problems = assembly_findings(folder)
+        findings += between
+        problems += between_problems
+    problems += lowered_problems(job.lowered_limits, lowered_limits)
     count = len(job.sheets)
-    return (
-        *found,
+    all_findings = (
+        *findings,
         *findings_of(INTEGRITY, problems, f"{count} sheets read back: closed contours, no overlap"),
         *findings_of(CLAIMS, problems, "the sheets hold what the job's designs are made of"),
-        *findings_of(DESIGNED, problems, AS_DESIGNED),
     )
+    designed = tuple(problem for problem in problems if problem.rule == DESIGNED)
+    return FolderReadBack(all_findings, designed, tuple(folders), job)
 
 
-def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None) -> AsBuilt:
-    """The laminate that a folder's cut files make, and what is wrong with files and claims.
+def read_folder(
+    folder: Path, of_job: bool = False, work: WrittenDesign | None = None
+) -> AsBuiltFolder:
+    """Read the laminate of a folder's cut files, with the problems of files and claims.
 
-    The folder of a design ``of_job`` has no film sheets of its own. ``work``: what the run that has
-    just written it knows. Raises OutputError as ``check_folder`` does.
+    The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run
+    that has just written the folder. Raises OutputError as ``read_back`` does.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
-    design, is_own, problems = _design(folder, claims)
+    design, is_readable, problems = _design(folder, claims)
     if work is not None:
-        meant: Meant | None = work.meant
+        expected: ExpectedLaminate | None = work.expected
     else:
-        meant = meant_by(design, claims.curves) if is_own else None
+        expected = expected_laminate(design, claims.curves) if is_readable else None
     problems += order_problems(claims, design)
     try:
         problems += file_problems(folder, claims)
     except OSError as error:
         raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
     count = len(claims.layers)
-    expected = meant.layers(count) if meant is not None else [None] * count
-    files, unread = read_layers(folder, claims, _drawn_in_chords(design), expected)
-    problems += unread
-    panel, files, unread = read_panel(folder, claims, files, meant)
-    problems += unread
+    layers_expected = expected.layers(count) if expected is not None else [None] * count
+    files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
+    problems += file_errors
+    panel, files, file_errors = read_panel(folder, claims, files, expected)
+    problems += file_errors
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
     problems += property_problems(files, claims, design)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
     if not of_job and panel is None:
-        problems += _own_sheet_problems(folder, claims, design, files)
+        problems += _design_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
     if len(parts) == len(files):
         try:
-            laminate = _laminate(files, claims, design, meant, panel)
+            laminate = _laminate(files, claims, design, expected, panel)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
-            outline = meant.laminate.outline if meant is not None else Region()
+            outline = expected.laminate.outline if expected is not None else Region()
             outlined = replace(laminate, outline=outline)
             problems += size_problems(claims, sizes(design, outlined), room)
             laminate = with_plate_pins(folder, laminate, claims)
@@ -245,83 +249,75 @@ def read_folder(folder: Path, of_job: bool = False, work: RunWork | None = None)
             laminate = None
             message = f"the layers do not lie over each other as films of one stack ({error})"
             problems.append(Problem(INTEGRITY, message))
-    known = work.findings if work is not None else None
+    design_findings = work.findings if work is not None else None
     limits = limits_of(design)
-    return AsBuilt(claims, design, limits, tuple(files), laminate, tuple(problems), meant, known)
+    return AsBuiltFolder(
+        claims, design, limits, tuple(files), laminate, tuple(problems), expected, design_findings
+    )
 
 
 def _laminate(
     files: Sequence[LayerFile],
     claims: Manifest,
     design: Design,
-    meant: Meant | None,
+    expected: ExpectedLaminate | None,
     panel: SheetPanel | None,
 ) -> Laminate:
-    """The layers as they are cut, with bores, inlets and pins where the design wants them.
+    """Return the laminate as cut, with bores, inlets and pins of the design.
 
-    What an opening is for cannot be told from its shape alone: a window may look like a tooling
-    hole, and an ear like a tab. Only where no design tells are they guessed from the profiles.
+    The purpose of an opening does not follow from its shape: a window may look like a tooling hole,
+    and an ear like a tab. Only without a usable design are they inferred from the profiles.
     """
-    if meant is None or len(meant.laminate.layers) != len(files):
+    if expected is None or len(expected.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
-    if all(file.part is not None and file.part.is_meant for file in files):
-        own = meant.laminate
-        return own if panel is own.panel else replace(own, panel=panel)
-    layers = zip(stacked_layers(files, design), meant.laminate.layers, strict=True)
-    cut = tuple(replace(layer, pieces=wanted.pieces) for layer, wanted in layers)
-    return replace(meant.laminate, layers=cut, panel=panel)
+    if all(file.part is not None and file.part.is_expected for file in files):
+        laminate = expected.laminate
+        return laminate if panel is laminate.panel else replace(laminate, panel=panel)
+    layers = zip(stacked_layers(files, design), expected.laminate.layers, strict=True)
+    cut = tuple(replace(layer, pieces=layer_expected.pieces) for layer, layer_expected in layers)
+    return replace(expected.laminate, layers=cut, panel=panel)
 
 
-def design_problems_of(folder: Path, built: AsBuilt, measured: Sequence[Finding]) -> list[Problem]:
-    """Layers, and all that lies beside them, that are not what the folder's design makes."""
-    problems = _layer_problems(built)
-    checked = _as_designed(built, measured)
-    if checked is not None and built.meant is not None:
-        from sbafab.as_built.derived import derived_problems
-
-        of_job = is_job(folder.absolute().parent)
-        problems += derived_problems(folder, built.claims, checked, built.meant.paths, of_job)
-    return problems
-
-
-def _layer_problems(built: AsBuilt) -> list[Problem]:
-    """Layers whose files cut something else than the design makes there."""
-    if built.meant is None:
+def layer_departures(built: AsBuiltFolder) -> list[Problem]:
+    """Return the layers whose files differ from the design."""
+    if built.expected is None:
         return [Problem(DESIGNED, "design.toml makes no laminate to hold the cut files against")]
     problems = []
-    expected = built.meant.layers(len(built.files))
-    for file, own in zip(built.files, expected, strict=True):
-        if file.part is None or file.part.is_meant or own is None:
+    expected = built.expected.layers(len(built.files))
+    for file, layer in zip(built.files, expected, strict=True):
+        if file.part is None or file.part.is_expected or layer is None:
             continue
-        off = departure(file.part.path, own.path)
-        if off:
-            message = f"{file.label} is not what design.toml makes: {off}; regenerate the folder"
+        difference = departure(file.part.path, layer.path)
+        if difference:
+            message = (
+                f"{file.label} is not what design.toml makes: {difference}; regenerate the folder"
+            )
             problems.append(Problem(DESIGNED, message, (file.position,)))
     if built.files and expected[0] is None:
-        count = len(built.meant.laminate.layers)
+        count = len(built.expected.laminate.layers)
         message = f"design.toml makes {count} layers, and the manifest lists {len(built.files)}"
         problems.append(Problem(DESIGNED, message))
     return problems
 
 
-def _as_designed(built: AsBuilt, measured: Sequence[Finding]) -> Checked | None:
-    """The folder's design with what the rules find in it; None where it makes no laminate."""
-    if built.meant is None:
+def as_designed(built: AsBuiltFolder) -> Checked | None:
+    """Return the folder's design with its findings; None if it cannot be built."""
+    if built.expected is None:
         return None
     in_chords = built.claims.curves is not None
-    laminate = build(built.design) if in_chords else built.meant.laminate
-    is_known = built.is_meant and not in_chords
-    findings = tuple(measured) if is_known else run_deck(laminate, limits_of(built.design))
+    laminate = build(built.design) if in_chords else built.expected.laminate
+    is_known = built.is_expected and not in_chords
+    findings = built.measured if is_known else run_deck(laminate, limits_of(built.design))
     return Checked(built.design, laminate, findings)
 
 
-def _own_sheet_problems(
+def _design_sheet_problems(
     folder: Path, claims: Manifest, design: Design, files: Sequence[LayerFile]
 ) -> list[Problem]:
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    lots = [Lot(claims.name, claims.copies, files, design.order.spare_parts)]
+    lots = [DesignLot(claims.name, claims.copies, files, design.order.spare_parts)]
     return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 
@@ -341,37 +337,142 @@ def _laminate_problems(
 
 
 def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]]:
-    """The folder's design, and whether it could be read; else the family's defaults."""
+    """Return the folder's design, True and problems; if unreadable, default values and False."""
     try:
         design = load_design(folder / "design.toml")
         digest = design_sha256(design)
     except (DesignError, OSError) as error:
-        said = str(error) or type(error).__name__
+        reason = str(error) or type(error).__name__
         try:
             design = validated({"name": "unknown", "family": claims.family}, records(), folder)
         except DesignError as unknown:
             raise OutputError(f"manifest.json: {unknown}") from None
-        return design, False, [claim(f"checked against default limits, for {said}")]
+        return design, False, [claim(f"checked against default limits, for {reason}")]
     return design, True, design_problems(claims, design, digest)
 
 
 def _drawn_in_chords(design: Design) -> bool:
-    """Whether the user drew the outline itself with chords for arcs."""
+    """Return True if the user's outline has chords in place of arcs."""
     if design.drawing is None:
         return False
     from sbafab.design.outline import read_outline
 
     try:
-        return chorded_place(read_outline(design.drawing)) is not None
+        return chords_for_arc(read_outline(design.drawing)) is not None
     except (DesignError, OSError):
         return False
 
 
-def _unsaid_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
-    """Rules that the design waives, that fail as built, and that no cut file names as waived."""
+def _unlisted_waivers(measured: Sequence[Finding], claims: Manifest) -> list[Problem]:
+    """Return the waived rules that fail as built and are not in the manifest."""
     rules = dict.fromkeys(finding.rule for finding in measured if finding.by_user)
     return [
         claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
         for rule in rules
+        if rule not in claims.waived
+    ]
+
+
+# Rules as built: on a whole stack, or on the layers that could be read.
+
+
+BY_LAYER = (film_limits.NAME,)
+"""Rules that measure single layers."""
+UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
+"""Errors of rules on shapes that no design makes; a programming error is not among them."""
+
+
+def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
+    """Return the findings of a rule; a shape that the rule cannot measure fails it."""
+    try:
+        return run_rule(rule, measures.laminate, measures.limits, measures)
+    except UNMEASURED as error:
+        message = f"cannot be measured on these files ({error}); regenerate them"
+        return [Finding(rule.name, "fail", None, None, "", Place(), message)]
+
+
+def rules_by_layer(
+    files: Sequence[LayerFile], claims: Manifest, design: Design, limits: Limits
+) -> tuple[Finding, ...]:
+    """Return the findings of rules on single layers; every other rule fails as not run."""
+    layers = stacked_layers(files, design)
+    lost = tuple(file.position for file in files if file.part is None)
+    some = Laminate(
+        name=claims.name,
+        family=claims.family,
+        layers=layers,
+        chambers=(),
+        bores=(),
+        inlets=(),
+        pins=(),
+        lumen=None,
+        balloons=0,
+        registration=design.registration.method,
+    )
+    why = "it needs every layer, and not all could be read" if lost else "there is no whole stack"
+    findings: list[Finding] = []
+    measures = Measures(some, limits)
+    for rule in RULES:
+        if layers and rule.name in BY_LAYER:
+            findings += findings_as_built(rule, measures)
+        else:
+            message = f"not run: {why}"
+            findings.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
+    return tuple(findings)
+
+
+# The assembly of a folder: its parts as design.toml puts them together, and what is claimed.
+
+
+def assembly_findings(folder: Path) -> tuple[tuple[Finding, ...], list[Problem]]:
+    """Return the findings between parts of an assembly, and differences of its manifest.
+
+    Parts are taken as designed: their films are checked design by design.
+    """
+    claims = read_assembly(folder)
+    try:
+        assembled = assemble(load_assembly(folder / DESIGN_FILE))
+    except (DesignError, OSError) as error:
+        return (), [claim(f"the parts were not put together, for {error or type(error).__name__}")]
+    between = run_checks(assembled)
+    return between, [
+        *_assembly_problems(claims, assembled),
+        *_unlisted_assembly_waivers(claims, between),
+    ]
+
+
+def lowered_between(folder: Path) -> tuple[str, ...]:
+    """Return the lowered limits between parts of the assembly in a folder; () if unreadable."""
+    try:
+        return lowered_checks(load_assembly(folder / DESIGN_FILE).rules)
+    except (DesignError, OSError):
+        return ()
+
+
+def _assembly_problems(claims: AssemblyManifest, assembled: Assembled) -> list[Problem]:
+    problems = []
+    if claims.name != assembled.assembly.name:
+        problems.append(claim(f"design.toml names the assembly {assembled.assembly.name}"))
+    if claims.design_sha256 != assembly_sha256(assembled):
+        problems.append(claim("design_sha256 is not that of design.toml and its parts' designs"))
+    claimed = [(entry.name, entry.copies, entry.design_sha256) for entry in claims.designs]
+    designed = [
+        (part.design.name, part.design.order.quantity, design_sha256(part.design))
+        for part in assembled.designs
+    ]
+    if claimed != designed:
+        problems.append(claim("designs or their copies are not those that the parts ask for"))
+    if list(claims.parts) != [part_entry(placed) for placed in assembled.parts]:
+        problems.append(claim("parts or their places are not those of design.toml"))
+    return problems
+
+
+def _unlisted_assembly_waivers(
+    claims: AssemblyManifest, between: tuple[Finding, ...]
+) -> list[Problem]:
+    waived = dict.fromkeys(finding.rule for finding in between if finding.by_user)
+    return [
+        claim(f"{rule} fails and is waived by design.toml, which the manifest does not say")
+        for rule in waived
         if rule not in claims.waived
     ]

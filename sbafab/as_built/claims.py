@@ -1,4 +1,4 @@
-"""What the manifest claims in words: files and hashes, order and roles, heights, properties."""
+"""Claims of the manifest in words: files and hashes, order and roles, heights, properties."""
 
 from __future__ import annotations
 
@@ -20,49 +20,60 @@ from sbafab.cutting.properties import (
 )
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Layer
-from sbafab.output.manifest import file_hashes, kerf_claim
-from sbafab.output.manifest_records import JobManifest, KerfClaim, LayerClaim, Manifest
-from sbafab.output.settings import kerf_widths, limits, warnings
-from sbafab.output.swap import is_among_cut_files
+from sbafab.output.checked import kerf_widths, limits, warnings
+from sbafab.output.manifest import (
+    JobManifest,
+    KerfClaim,
+    LayerClaim,
+    Manifest,
+    file_hashes,
+    kerf_claim,
+)
+from sbafab.output.swap import (
+    is_among_cut_files,
+)
 from sbafab.rules.finding import Verdict
-from sbafab.rules.lowered import lowered
+from sbafab.rules.limits import lowered
 
 CUT_ENDINGS = (
     *(".dxf", ".dwg", ".ai", ".cdr", ".eps", ".lbrn", ENDING),
     *(".rd", ".plt", ".hpgl", ".gcode", ".nc", ".ngc", ".tap"),
 )
-"""Of files that CAD draws and that a laser cuts; pictures and pages may lie about as notes."""
+"""Suffixes of CAD and laser files; pictures and pages are not cut by mistake."""
 HEIGHT = 1e-6
-"""mm to which heights and thicknesses agree."""
+"""Tolerance of heights and thicknesses, mm."""
 
 
 def claim(message: str, *layers: int) -> Problem:
+    """Return a problem of a claim of the manifest."""
     return Problem(CLAIMS, message, layers)
 
 
 def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
-    """Files that are missing, changed, or not in the manifest.
+    """Return files that are missing, changed or not in the manifest.
 
-    One that could be cut by mistake fails, a note elsewhere in the folder is a warning.
+    An unlisted file that could be cut by mistake fails; any other is a warning.
     """
-    found = file_hashes(folder)
-    found.pop("manifest.json", None)
+    hashes = file_hashes(folder)
+    hashes.pop("manifest.json", None)
     layers = claims.layers if isinstance(claims, Manifest) else ()
     layer_of = {layer.file: number for number, layer in enumerate(layers, start=1)}
     problems = []
     for path, digest in claims.files.items():
-        own = (layer_of[path],) if path in layer_of else ()
-        if path not in found:
-            problems.append(claim(f"{path} is in the manifest and not in the folder", *own))
-        elif found[path] != digest:
+        layer_number = (layer_of[path],) if path in layer_of else ()
+        if path not in hashes:
+            problems.append(
+                claim(f"{path} is in the manifest and not in the folder", *layer_number)
+            )
+        elif hashes[path] != digest:
             problems.append(
                 claim(
-                    f"{path} was changed: its sha256 is {found[path][:12]}..., the manifest's "
+                    f"{path} was changed: its sha256 is {hashes[path][:12]}..., the manifest's "
                     f"{digest[:12]}...",
-                    *own,
+                    *layer_number,
                 )
             )
-    for path in (*found, *_links(folder)):
+    for path in (*hashes, *_links(folder)):
         if path not in claims.files:
             message = f"{path} lies in the folder and is not in the manifest; remove it"
             verdict: Verdict = "fail" if could_be_cut(path) else "warn"
@@ -71,10 +82,10 @@ def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]
 
 
 def could_be_cut(path: str) -> bool:
-    """Return whether a file of a folder, by its place or its ending, may be taken for a cut file.
+    """Return True if a file, by its folder or suffix, may be taken for a cut file.
 
-    All that lies among the cut files may: laser programs open pictures, pages and files without
-    an ending as well.
+    Any file among the cut files may: laser programs also open pictures, pages and files without a
+    suffix.
     """
     return is_among_cut_files(PurePosixPath(path)) or path.lower().endswith(CUT_ENDINGS)
 
@@ -89,7 +100,7 @@ def _links(folder: Path) -> list[str]:
 
 
 def order_problems(claims: Manifest, design: Design) -> list[Problem]:
-    """Indices, names, roles and films that do not fit their place in the stack."""
+    """Return indices, names, roles and films that do not fit their place in the stack."""
     problems = []
     expected = _roles([layer.role for layer in claims.layers])
     for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=True), start=1):
@@ -117,7 +128,7 @@ def order_problems(claims: Manifest, design: Design) -> list[Problem]:
 
 
 def _roles(roles: Sequence[str]) -> list[str]:
-    """The roles that a stack of as many layers has, with a sheet below if there is one."""
+    """Return the roles of a stack of as many layers, with a sheet below if there is one."""
     carrier = ["sheet", "separator-mask"] if "sheet" in roles[:2] else []
     count = len(roles) - len(carrier)
     turn = ("separator-mask", "wall", "chamber-mask", "wall")
@@ -128,7 +139,7 @@ def _roles(roles: Sequence[str]) -> list[str]:
 
 
 def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -> list[Problem]:
-    """Thicknesses against the design's films, heights against their sums, balloon numbers."""
+    """Return differences of thicknesses, heights and balloon numbers from the design."""
     problems = []
     stock = {film.material: film.thickness for film in design.films.stock.values()}
     placed = {layer.index: layer for layer in layers}
@@ -146,11 +157,11 @@ def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -
         if abs(layer.z - z) > HEIGHT:
             message = f"layer {position} lies at z {layer.z:g}, and the films below it sum to {z:g}"
             problems.append(claim(message, position))
-        own = placed.get(position)
-        if own is not None and own.balloon != layer.balloon:
+        layer_cut = placed.get(position)
+        if layer_cut is not None and layer_cut.balloon != layer.balloon:
             message = (
                 f"layer {position} is of balloon {layer.balloon} in the manifest and lies in "
-                f"balloon {own.balloon}"
+                f"balloon {layer_cut.balloon}"
             )
             problems.append(claim(message, position))
         z += layer.thickness
@@ -160,14 +171,16 @@ def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -
 def _film_problems(claims: Manifest, stock: Mapping[str, float]) -> list[Problem]:
     problems = []
     for material in dict.fromkeys(layer.material for layer in claims.layers):
-        own = [layer for layer in claims.layers if layer.material == material]
-        area = sum(layer.area for layer in own)
+        film_layers = [layer for layer in claims.layers if layer.material == material]
+        area = sum(layer.area for layer in film_layers)
         film = next((film for film in claims.films if film.material == material), None)
         if film is None:
             problems.append(claim(f"the manifest's films have no {material}"))
             continue
-        if film.layers != len(own):
-            message = f"films: {film.layers} layers of {material}, and {len(own)} are listed"
+        if film.layers != len(film_layers):
+            message = (
+                f"films: {film.layers} layers of {material}, and {len(film_layers)} are listed"
+            )
             problems.append(claim(message))
         if abs(film.area - area) > 1e-4 * area:
             message = f"films: {film.area:g} mm2 of {material}, and its layers sum to {area:g}"
@@ -180,7 +193,7 @@ def _film_problems(claims: Manifest, stock: Mapping[str, float]) -> list[Problem
 
 
 def design_problems(claims: Manifest, design: Design, digest: str) -> list[Problem]:
-    """Where the manifest is not of the design that lies beside it."""
+    """Return differences of the manifest from the design beside it."""
     balloons = sum(layer.role == "chamber-mask" for layer in claims.layers)
     agree = (
         ("design_sha256", claims.design_sha256[:12], digest[:12]),
@@ -191,18 +204,18 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
         ("copies", claims.copies, design.order.quantity),
     )
     problems = [
-        claim(f"{what} is {said} in the manifest and {stated} by design.toml")
-        for what, said, stated in agree
-        if said != stated
+        claim(f"{key} is {claimed} in the manifest and {stated} by design.toml")
+        for key, claimed, stated in agree
+        if claimed != stated
     ]
     for material, width in kerf_widths(design).items():
-        said = claims.kerf.get(material)
-        wanted = kerf_claim(width)
-        if said != wanted:
+        claimed = claims.kerf.get(material)
+        expected = kerf_claim(width)
+        if claimed != expected:
             problems.append(
                 claim(
-                    f"the kerf of {material} is {_kerf(said)} in the manifest and "
-                    f"{_kerf(wanted)} by design.toml"
+                    f"the kerf of {material} is {_kerf(claimed)} in the manifest and "
+                    f"{_kerf(expected)} by design.toml"
                 )
             )
     problems += lowered_problems(claims.lowered_limits, lowered(limits(design)))
@@ -212,42 +225,45 @@ def design_problems(claims: Manifest, design: Design, digest: str) -> list[Probl
     return problems
 
 
-def lowered_problems(told: Sequence[str], own: Sequence[str]) -> list[Problem]:
-    """Where the manifest names other lowered limits than design.toml sets."""
-    missing = [said for said in own if said not in told]
-    added = [said for said in told if said not in own]
+def lowered_problems(claimed: Sequence[str], designed: Sequence[str]) -> list[Problem]:
+    """Return lowered limits that only one of manifest and design.toml names."""
+    missing = [limit for limit in designed if limit not in claimed]
+    added = [limit for limit in claimed if limit not in designed]
     return [
-        *(claim(f"design.toml lowers {said}, which the manifest does not say") for said in missing),
-        *(claim(f"{said} is lowered in the manifest and not in design.toml") for said in added),
+        *(
+            claim(f"design.toml lowers {limit}, which the manifest does not say")
+            for limit in missing
+        ),
+        *(claim(f"{limit} is lowered in the manifest and not in design.toml") for limit in added),
     ]
 
 
-def _kerf(said: KerfClaim | None) -> str:
-    return "missing" if said is None else f"{said.state} ({said.width})"
+def _kerf(kerf: KerfClaim | None) -> str:
+    return "missing" if kerf is None else f"{kerf.state} ({kerf.width})"
 
 
 def property_problems(
     files: Iterable[LayerFile], claims: Manifest, design: Design
 ) -> list[Problem]:
-    """Custom properties of the cut files that are not what the manifest says, alike ones as one."""
-    where: dict[str, list[int]] = {}
+    """Return custom properties of the cut files that differ from the manifest, joined by value."""
+    layers_of: dict[str, list[int]] = {}
     bare = [file for file in files if file.part is not None and not file.part.properties]
     dangers = warnings(design)
     for file in files:
         if file.part is None or file in bare:
             continue
-        found = file.part.properties
-        for name, said in _properties(file.claim, claims, dangers).items():
-            if found.get(name) != said:
-                message = f"custom property {name} is {found.get(name)!r}, not {said!r}"
-                where.setdefault(message, []).append(file.position)
+        properties = file.part.properties
+        for name, expected in _expected_properties(file.claim, claims, dangers).items():
+            if properties.get(name) != expected:
+                message = f"custom property {name} is {properties.get(name)!r}, not {expected!r}"
+                layers_of.setdefault(message, []).append(file.position)
     problems = []
     if bare:
         parts = [file.part for file in bare if file.part is not None]
         of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file of {bare[0].label}"
         has_units = all(part.units for part in parts)
         problems.append(bare_problem(of, has_units, *(file.position for file in bare)))
-    for message, layers in where.items():
+    for message, layers in layers_of.items():
         shown = ", ".join(map(str, layers[:5])) + (" ..." if len(layers) > 5 else "")
         plural = "layers" if len(layers) > 1 else "layer"
         problems.append(claim(f"{plural} {shown}: {message}", *layers))
@@ -255,7 +271,7 @@ def property_problems(
 
 
 def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
-    """A warning that files carry no custom properties, as one saved before R2004 cannot."""
+    """Return a warning on files without custom properties, as formats before R2004 have none."""
     lost = "custom properties" if has_units else "custom properties and no units"
     message = (
         f"{files} carry no {lost}: save as DXF R2004 or later to keep them; kerf, waivers and "
@@ -264,7 +280,7 @@ def bare_problem(files: str, has_units: bool, *layers: int) -> Problem:
     return Problem(CLAIMS, message, layers, verdict="warn")
 
 
-def _properties(
+def _expected_properties(
     layer: LayerClaim, claims: Manifest, dangers: Mapping[str, str]
 ) -> dict[str, str | None]:
     kerf = claims.kerf.get(layer.material)
@@ -284,8 +300,11 @@ def _properties(
 
 
 def waiver_properties(claims: Manifest) -> dict[str, str | None]:
-    """What every cut file must say of waived rules and lowered limits; None for nothing."""
+    """Return the properties of every cut file on waived rules and lowered limits."""
     return {
         "WAIVED": ", ".join(claims.waived) or "none",
         LIMITS: limit_properties(claims.lowered_limits).get(LIMITS),
     }
+
+
+# What ``manifest.json`` claims, read with its types checked, and problems as data.

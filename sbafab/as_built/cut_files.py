@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
-from sbafab.as_built.agreement import in_agreement, with_circles, without_specks
-from sbafab.as_built.chords import chorded_place
-from sbafab.as_built.meant import Expected, departure
+from sbafab.as_built.expected import Expected, departure, in_agreement, with_circles, without_specks
+from sbafab.as_built.kerf_removed import chords_for_arc, remove_kerf
 from sbafab.as_built.records import INTEGRITY, Problem
-from sbafab.as_built.uncut import uncut
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SEQUENCE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.properties import (
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SEQUENCE,
+    REFERENCE,
     chord_error_of,
     curves_property,
     kerf_of,
@@ -27,24 +28,24 @@ from sbafab.cutting.verify import check_datum
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
-from sbafab.output.manifest_records import LayerClaim, Manifest
+from sbafab.output.manifest import LayerClaim, Manifest
 
-MOST_BYTES = 20_000_000
-MOST_MARKS = 300_000
-"""Entities and points a cut file may be drawn with: more would take minutes to be kept apart."""
+MAX_BYTES = 20_000_000
+MAX_ENTITIES = 300_000
+"""Entities and points of a cut file: more would take minutes to check."""
 MARK = re.compile(rb"\n *1?0\r?\n")
 DATUM = "LINE"
-"""What the datum cross is drawn with: all that a layer file holds beside its contours."""
+"""Entity of the datum cross, the only one in a layer file beside its contours."""
 
 
 @dataclass(frozen=True)
 class CutPart:
-    """What a cut file cuts: ``region`` with the kerf undone, round contours as circles.
+    """The part that a cut file cuts: ``region`` without the kerf, round contours as circles.
 
-    ``path`` is the beam's path as it is drawn. ``chord_error`` is what the file says, in mm, 0 for
-    true arcs; ``corner_room`` the mm2 by which the area may be off because the beam rounds corners.
-    ``properties`` and ``units`` are empty where the file does not say.
-    ``is_meant``: the path is that of the design's own layer, and ``region`` what that one cuts.
+    ``path`` is the beam's path as drawn. ``chord_error``: as the file claims, mm, 0 for true arcs.
+    ``corner_room``: mm2 by which the area may differ since the beam rounds corners. ``properties``
+    and ``units`` are empty if the file has none. ``is_expected``: the path agrees with the design's
+    layer, and ``region`` is that layer.
     """
 
     region: Region
@@ -53,7 +54,7 @@ class CutPart:
     chord_error: float
     corner_room: float
     units: str = "mm"
-    is_meant: bool = False
+    is_expected: bool = False
 
 
 @dataclass(frozen=True)
@@ -75,42 +76,40 @@ def read_layers(
     chords_drawn: bool,
     expected: Sequence[Expected | None],
 ) -> tuple[list[LayerFile], list[Problem]]:
-    """Every layer's file, files of equal bytes that should be equal read once.
+    """Read the file of every layer, files of equal bytes once; agreeing contours become one.
 
-    Contours that differ by less than what files promise are made one.
-
-    ``chords_drawn``: the design's own outline is drawn in chords, so they are no fault.
-    ``expected`` holds what each layer should be, where that is known.
+    ``chords_drawn``: the design's outline is drawn in chords, which are then no fault. ``expected``
+    holds the design's layers, None where unknown.
     """
-    known: dict[tuple[str, Material, str], CutPart] = {}
+    parts: dict[tuple[str, Material, str], CutPart] = {}
     files, problems = [], []
-    for position, (claim, own) in enumerate(zip(claims.layers, expected, strict=True), start=1):
+    for position, (claim, layer) in enumerate(zip(claims.layers, expected, strict=True), start=1):
         part: CutPart | None = None
         try:
-            path = inside(folder, claim.file)
-            key = sound_digest(path), claim.material, own.profile.key if own is not None else ""
-            if key not in known:
-                told = told_of(claims, claim.material)
-                known[key] = read_part(path, chords_drawn, told, own)
-            part = known[key]
+            path = path_in_folder(folder, claim.file)
+            key = sound_digest(path), claim.material, layer.profile.key if layer is not None else ""
+            if key not in parts:
+                properties = claimed_properties(claims, claim.material)
+                parts[key] = read_part(path, chords_drawn, properties, layer)
+            part = parts[key]
         except OutputError as error:
             name = claim.file or claim.name
-            said = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
-            message = f"layer {position} ({name}): {said}"
+            reason = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
+            message = f"layer {position} ({name}): {reason}"
             problems.append(Problem(INTEGRITY, message, (position,)))
         files.append(LayerFile(position, claim, part))
     return _in_agreement(files), problems
 
 
-def told_of(claims: Manifest, material: str) -> dict[str, str]:
-    """The properties that the manifest tells of the cut files of a material."""
+def claimed_properties(claims: Manifest, material: str) -> dict[str, str]:
+    """Return the properties that the manifest claims for the cut files of a material."""
     kerf = next((kerf.width for name, kerf in claims.kerf.items() if name == material), None)
     return {**kerf_properties(kerf), **curves_property(claims.curves)}
 
 
 def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
     parts = {id(file.part): file.part for file in files if file.part is not None}
-    if all(part.is_meant for part in parts.values()):
+    if all(part.is_expected for part in parts.values()):
         return list(files)
     regions = in_agreement([part.region for part in parts.values()])
     agreed = {
@@ -120,8 +119,8 @@ def _in_agreement(files: Sequence[LayerFile]) -> list[LayerFile]:
     return [replace(file, part=agreed.get(id(file.part))) for file in files]
 
 
-def inside(folder: Path, file: str | None) -> Path:
-    """Where a file of the manifest lies. Raises OutputError where that is not in the folder."""
+def path_in_folder(folder: Path, file: str | None) -> Path:
+    """Return the path of a file of the manifest. Raises OutputError if it is outside the folder."""
     if file is None:
         raise OutputError("the manifest names no cut file for it; regenerate the folder")
     pure = PurePosixPath(file)
@@ -131,20 +130,20 @@ def inside(folder: Path, file: str | None) -> Path:
 
 
 def sound_digest(path: Path) -> str:
-    """sha256 of a file that is there and can be read in time. Raises OutputError."""
+    """Return the sha256 of a file. Raises OutputError if it is missing, unreadable or too large."""
     try:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
             raise OutputError("no plain file; regenerate it")
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"larger than {MOST_BYTES:,} bytes; regenerate it")
+        if path.stat().st_size > MAX_BYTES:
+            raise OutputError(f"larger than {MAX_BYTES:,} bytes; regenerate it")
         data = path.read_bytes()
         # A mark has a line of its own, and lines are counted in a moment.
-        is_long = data.count(b"\n") > MOST_MARKS
+        is_long = data.count(b"\n") > MAX_ENTITIES
         marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
-        if marks > MOST_MARKS:
+        if marks > MAX_ENTITIES:
             raise OutputError(
-                f"drawn with {marks:,} entities and points, where at most {MOST_MARKS:,} may be"
+                f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
             )
         return hashlib.sha256(data).hexdigest()
     except (FileNotFoundError, NotADirectoryError):
@@ -158,20 +157,20 @@ def sound_digest(path: Path) -> str:
 def read_part(
     path: Path,
     chords_drawn: bool = False,
-    told: Mapping[str, str] | None = None,
+    properties: Mapping[str, str] | None = None,
     expected: Expected | None = None,
-    noted: bool = False,
+    has_letters: bool = False,
 ) -> CutPart:
-    """The part that a cut file cuts. Raises OutputError where it is not what the format says.
+    """Read the part that a cut file cuts. Raises OutputError if the file is not sound.
 
-    ``told`` stands in for the properties of a file that has none; ``expected`` is what it should
-    be, where that is known. ``noted``: it may have letters on REFERENCE, as a base plate has.
+    ``properties`` replace those of a file that has none. ``expected``: the design's layer, if
+    known. ``has_letters``: letters on REFERENCE are permitted, as on a base plate.
     """
     try:
-        found = read_profile(path)
-        if noted:
-            found = _without_notes(found)
-        return _part(found, chords_drawn, found.properties or told or {}, expected)
+        drawing = read_profile(path)
+        if has_letters:
+            drawing = _without_letters(drawing)
+        return _part(drawing, chords_drawn, drawing.properties or properties or {}, expected)
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError) as error:
@@ -179,44 +178,44 @@ def read_part(
 
 
 def _part(
-    found: ReadBack,
+    drawing: ReadBack,
     chords_drawn: bool,
     properties: Mapping[str, str],
     expected: Expected | None,
 ) -> CutPart:
-    _check_drawn(found)
+    _check_drawn(drawing)
     kerf = kerf_of(properties) or 0.0
     chord_error = chord_error_of(properties)
     if chord_error and isinstance(kerf, tuple):
         raise OutputError("its chords do not tell how its kerf was compensated; regenerate it")
     if not chord_error and not chords_drawn:
-        place = chorded_place(found.region)
+        place = chords_for_arc(drawing.region)
         if place is not None:
             raise OutputError(
                 f"an arc is drawn as chords at x {place[0]:.3f}, y {place[1]:.3f}, and the file "
                 "does not say so; regenerate it with arcs"
             )
-    if expected is not None and not departure(found.region, expected.path):
+    if expected is not None and not departure(drawing.region, expected.path):
         # What is cut within its tolerance needs no guess at what the beam may have left.
         return CutPart(
             expected.profile,
-            found.region,
-            found.properties,
+            drawing.region,
+            drawing.properties,
             chord_error,
             0.0,
-            found.units,
-            is_meant=True,
+            drawing.units,
+            is_expected=True,
         )
-    region, corner_room = uncut(with_circles(found.region), kerf)
+    region, corner_room = remove_kerf(with_circles(drawing.region), kerf)
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; regenerate it")
     return CutPart(
         with_circles(without_specks(region)),
-        found.region,
-        found.properties,
+        drawing.region,
+        drawing.properties,
         chord_error,
         corner_room,
-        found.units,
+        drawing.units,
     )
 
 
@@ -224,33 +223,33 @@ LETTERS = ("LWPOLYLINE", "POLYLINE")
 """Types of the strokes of letters, the latter before R2000."""
 
 
-def _without_notes(found: ReadBack) -> ReadBack:
-    """The same without polylines on REFERENCE, which are letters: the datum cross is two lines."""
-    kept = [
+def _without_letters(drawing: ReadBack) -> ReadBack:
+    """Return the drawing without polylines on REFERENCE, which are letters; the datum is lines."""
+    remaining = [
         (kind, stroke)
-        for kind, stroke in zip(found.other, found.strokes, strict=True)
+        for kind, stroke in zip(drawing.other, drawing.strokes, strict=True)
         if kind not in LETTERS or stroke[0] != REFERENCE
     ]
-    kinds, strokes = tuple(kind for kind, _ in kept), tuple(stroke for _, stroke in kept)
-    return replace(found, other=kinds, strokes=strokes)
+    kinds, strokes = tuple(kind for kind, _ in remaining), tuple(stroke for _, stroke in remaining)
+    return replace(drawing, other=kinds, strokes=strokes)
 
 
-def _check_drawn(found: ReadBack) -> None:
-    if found.region.is_empty:
+def _check_drawn(drawing: ReadBack) -> None:
+    if drawing.region.is_empty:
         raise OutputError(f"no contour on {CUT_INNER} or {CUT_OUTER}; regenerate it")
-    for kind in found.other:
+    for kind in drawing.other:
         if kind != DATUM:
             raise OutputError(
                 f"a {kind} lies on a layer other than {CUT_INNER} and {CUT_OUTER}, so it would "
                 "not be cut in its turn; move it"
             )
-    check_datum(found)
-    check_sequence(found)
+    check_datum(drawing)
+    check_sequence(drawing)
 
 
-def check_sequence(found: ReadBack) -> None:
-    """Raises OutputError where an outline is cut before a hole, or anything out of its turn."""
-    ranks = [CUT_SEQUENCE.index(layer) for layer in found.layers if layer in CUT_SEQUENCE]
+def check_sequence(drawing: ReadBack) -> None:
+    """Raise OutputError if an outline is cut before a hole, or any other layer out of sequence."""
+    ranks = [CUT_SEQUENCE.index(layer) for layer in drawing.layers if layer in CUT_SEQUENCE]
     for before, after in pairwise(ranks):
         if before > after:
             raise OutputError(

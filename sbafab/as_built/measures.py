@@ -1,4 +1,4 @@
-"""What the manifest claims in numbers: areas, pieces, patterns, interfaces, bores, pins."""
+"""Claims of the manifest in numbers: areas, pieces, patterns, interfaces, bores, pins, batches."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sbafab.as_built.claims import claim, waiver_properties
-from sbafab.as_built.cut_files import CutPart, LayerFile, read_part, told_of
+from sbafab.as_built.cut_files import CutPart, LayerFile, claimed_properties, read_part
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
@@ -16,16 +16,16 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.output.manifest_records import Manifest
-from sbafab.pressing.together import APART, are_apart
+from sbafab.output.manifest import Manifest
+from sbafab.pressing.cycles import APART, are_apart
 from sbafab.rules.limits import TOLERANCE, at
 
 SHARE = 1e-4
-"""Share of an area by which a claim may be off (0.01 %)."""
+"""Relative tolerance of areas."""
 
 
 def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem]:
-    """Area, pieces and open bores of every layer against what its file cuts."""
+    """Return differences of area, pieces and open bores of layers from their files."""
     problems = []
     for file in files:
         if file.part is None:
@@ -65,7 +65,7 @@ def layer_problems(files: Iterable[LayerFile], claims: Manifest) -> list[Problem
 
 
 def _area_room(region: Region, part: CutPart) -> float:
-    """mm2 by which an area may be off: its share, its edges' error, corners the beam rounds."""
+    """Return the tolerance of an area, mm2: its share, the error of its edges, rounded corners."""
     length = sum(contour.length for contour in region.contours)
     return SHARE * region.area + part.corner_room + (part.chord_error + TOLERANCE) * length
 
@@ -75,25 +75,27 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def pattern_problems(layers: Sequence[Layer], claims: Manifest) -> list[Problem]:
-    """Layers that share a pattern in the manifest and not on disk, or the other way round.
+    """Return layers that share a pattern only in the manifest or only on disk.
 
-    Patterns that differ by no more than files can tell, such as by a tab of 1 um, may be equal on
-    disk: the manifest then says that their areas differ.
+    Patterns that differ by less than the tolerance of files may be equal on disk: the areas in the
+    manifest then differ.
     """
     problems = []
     areas = [layer.area for layer in claims.layers]
-    said_of: dict[str, tuple[str, int]] = {}
-    found_of: dict[str, tuple[str, int]] = {}
+    claimed_of: dict[str, tuple[str, int]] = {}
+    cut_of: dict[str, tuple[str, int]] = {}
     for layer in layers:
-        said = claims.layers[layer.index - 1].pattern
-        pattern, first = found_of.setdefault(said, (layer.pattern, layer.index))
+        claimed = claims.layers[layer.index - 1].pattern
+        pattern, first = cut_of.setdefault(claimed, (layer.pattern, layer.index))
         if pattern != layer.pattern:
-            message = f"layers {first} and {layer.index} are both of pattern {said} and differ"
+            message = f"layers {first} and {layer.index} are both of pattern {claimed} and differ"
             problems.append(claim(message, first, layer.index))
-        name, twin = said_of.setdefault(layer.pattern, (said, layer.index))
+        name, twin = claimed_of.setdefault(layer.pattern, (claimed, layer.index))
         one_area = areas[twin - 1] == areas[layer.index - 1]
-        if name != said and pattern == layer.pattern and one_area:
-            message = f"layers {twin} and {layer.index} are equal, and of patterns {name}, {said}"
+        if name != claimed and pattern == layer.pattern and one_area:
+            message = (
+                f"layers {twin} and {layer.index} are equal, and of patterns {name}, {claimed}"
+            )
             problems.append(claim(message, twin, layer.index))
     return problems
 
@@ -101,15 +103,19 @@ def pattern_problems(layers: Sequence[Layer], claims: Manifest) -> list[Problem]
 def interface_problems(
     laminate: Laminate, claims: Manifest, parts: Sequence[CutPart]
 ) -> list[Problem]:
-    """Kind, layers, contact and bond of every interface."""
-    found, said = laminate.interfaces, claims.interfaces
-    if len(found) != len(said):
-        return [claim(f"the layers make {len(found)} interfaces, the manifest lists {len(said)}")]
+    """Return differences of kind, layers, contact and bond of interfaces."""
+    interfaces, claimed = laminate.interfaces, claims.interfaces
+    if len(interfaces) != len(claimed):
+        return [
+            claim(
+                f"the layers make {len(interfaces)} interfaces, the manifest lists {len(claimed)}"
+            )
+        ]
     problems = []
-    for gap, told in zip(found, said, strict=True):
+    for gap, gap_claim in zip(interfaces, claimed, strict=True):
         masks = tuple(mask.index for mask in gap.masks)
-        own = (gap.below.index, gap.above.index, masks, gap.kind)
-        if own != (told.below, told.above, told.masks, told.kind):
+        structure = (gap.below.index, gap.above.index, masks, gap.kind)
+        if structure != (gap_claim.below, gap_claim.above, gap_claim.masks, gap_claim.kind):
             message = (
                 f"interface {gap.index} is a {gap.kind} interface of layers "
                 f"{', '.join(map(str, gap.layer_indices))}, which the manifest tells otherwise"
@@ -117,14 +123,14 @@ def interface_problems(
             problems.append(claim(message, *gap.layer_indices))
             continue
         lot = [parts[index - 1] for index in gap.layer_indices]
-        for what, region, area in (
-            ("contact", gap.contact, told.contact_area),
-            ("bond", gap.bond, told.bond_area),
+        for kind, region, area in (
+            ("contact", gap.contact, gap_claim.contact_area),
+            ("bond", gap.bond, gap_claim.bond_area),
         ):
             room = sum(_area_room(part.region, part) - SHARE * part.region.area for part in lot)
             if abs(region.area - area) > room + SHARE * area:
                 message = (
-                    f"the {what} at {gap.kind} interface {gap.index} has {region.area:.4f} mm2, "
+                    f"the {kind} at {gap.kind} interface {gap.index} has {region.area:.4f} mm2, "
                     f"the manifest says {area:.4f}"
                 )
                 problems.append(Problem(CLAIMS, message, gap.layer_indices, gap.index))
@@ -132,7 +138,7 @@ def interface_problems(
 
 
 def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
-    """Bores, inlets, pins and lumen: where the manifest says, and as wide."""
+    """Return differences of place and width of bores, inlets, pins and lumen."""
     room = TOLERANCE
     pairs: list[tuple[str, Sequence[_Spot], Sequence[_Spot]]] = [
         (
@@ -152,7 +158,9 @@ def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
         ),
     ]
     problems = [
-        problem for what, said, found in pairs for problem in _unmatched(what, said, found, room)
+        problem
+        for feature, claimed, cut in pairs
+        for problem in _unmatched(feature, claimed, cut, room)
     ]
     if (claims.lumen is None) != (laminate.lumen is None) or (
         claims.lumen is not None
@@ -162,7 +170,7 @@ def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
         message = f"the lumen is {claims.lumen} in the manifest and {laminate.lumen} by design.toml"
         problems.append(claim(message))
     for inlet in claims.inlets:
-        tubes = {own.tube_diameter for own in laminate.inlets}
+        tubes = {inlet_cut.tube_diameter for inlet_cut in laminate.inlets}
         if any(abs(tube - inlet.tube_outer_diameter) > room for tube in tubes):
             message = (
                 f"the tube of {inlet.chamber} is {inlet.tube_outer_diameter:g} in the manifest"
@@ -172,7 +180,7 @@ def place_problems(laminate: Laminate, claims: Manifest) -> list[Problem]:
 
 
 def size_problems(claims: Manifest, sizes: Mapping[str, float], room: float) -> list[Problem]:
-    """Overall sizes, mm, against those of the cut parts."""
+    """Return differences of overall sizes, mm, from the cut parts."""
     return [
         claim(
             f"the {name.replace('_', ' ')} is {claims.sizes.get(name, math.nan):g} mm in the "
@@ -187,46 +195,50 @@ _Spot = tuple[str, Point, float]
 
 
 def _unmatched(
-    what: str, said: Sequence[_Spot], found: Sequence[_Spot], room: float
+    feature: str, claimed: Sequence[_Spot], cut: Sequence[_Spot], room: float
 ) -> list[Problem]:
-    """Claims that no place on disk answers to, and places that no claim is of."""
+    """Return claims without a place in the cut files, and places without a claim."""
 
-    def alike(one: _Spot, other: _Spot) -> bool:
+    def agree(a: _Spot, candidate: _Spot) -> bool:
         return (
-            one[0] == other[0]
-            and math.dist(one[1], other[1]) <= room + 1e-6
-            and abs(one[2] - other[2]) <= 2 * room
+            a[0] == candidate[0]
+            and math.dist(a[1], candidate[1]) <= room + 1e-6
+            and abs(a[2] - candidate[2]) <= 2 * room
         )
 
-    def told(spot: _Spot) -> str:
-        return f"{what} of {spot[0]}, {spot[2]:.3f} wide at {at(spot[1])}"
+    def description(spot: _Spot) -> str:
+        return f"{feature} of {spot[0]}, {spot[2]:.3f} wide at {at(spot[1])}"
 
     return [
         *(
-            claim(f"the manifest has a {told(spot)}, which the cut files have not")
-            for spot in said
-            if not any(alike(spot, other) for other in found)
+            claim(f"the manifest has a {description(spot)}, which the cut files have not")
+            for spot in claimed
+            if not any(agree(spot, candidate) for candidate in cut)
         ),
         *(
-            claim(f"the cut files have a {told(spot)}, which the manifest has not")
-            for spot in found
-            if not any(alike(spot, other) for other in said)
+            claim(f"the cut files have a {description(spot)}, which the manifest has not")
+            for spot in cut
+            if not any(agree(spot, candidate) for candidate in claimed)
         ),
     ]
 
 
 def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list[Problem]:
-    """The base plate: sound, and a hole for every pin and for nothing else."""
+    """Return problems of the base plate: soundness, a hole for every pin and no other."""
     if claims.fixture is None:
         return [claim("the manifest names no fixture for the pins")] if laminate.pins else []
     if claims.fixture not in claims.files:
         return [claim(f"the fixture {claims.fixture!r} is not among the manifest's files")]
     try:
-        part = read_part(folder / claims.fixture, told=told_of(claims, "plate"), noted=True)
+        part = read_part(
+            folder / claims.fixture,
+            properties=claimed_properties(claims, "plate"),
+            has_letters=True,
+        )
     except OutputError as error:
         name = Path(claims.fixture).name
-        said = str(error).removeprefix(f"{name}: ")
-        return [Problem(INTEGRITY, f"{claims.fixture}: {said}")]
+        reason = str(error).removeprefix(f"{name}: ")
+        return [Problem(INTEGRITY, f"{claims.fixture}: {reason}")]
     circles = [hole.circle for hole in part.region.holes]
     holes = [("hole", c[0], 2 * c[1]) for c in circles if c is not None]
     pins = [
@@ -236,9 +248,11 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
     ]
     room = TOLERANCE
     for name, stated in waiver_properties(claims).items() if part.properties else ():
-        found = part.properties.get(name)
-        if found != stated:
-            return [claim(f"{claims.fixture}: custom property {name} is {found!r}, not {stated!r}")]
+        actual = part.properties.get(name)
+        if actual != stated:
+            return [
+                claim(f"{claims.fixture}: custom property {name} is {actual!r}, not {stated!r}")
+            ]
     problems = _unmatched("pin's hole of the plate", pins, holes, room)
     if problems or len(circles) != len(pins):
         of = "laminate has" if len(_places(claims)) == 1 else "laminates at its places have"
@@ -247,9 +261,9 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
 
 
 def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list[Problem]:
-    """Cycles that do not make all copies, places that are too near or off the platen.
+    """Return cycles that do not make all copies, and places too near each other or off the platen.
 
-    Registered sheets are pressed as one piece; what they hold is claimed of their panel.
+    Registered sheets are pressed as one piece; their panel claims its places.
     """
     if claims.copies == 1 or laminate.panel is not None:
         return []
@@ -282,18 +296,18 @@ def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list
 
 
 def _places(claims: Manifest) -> tuple[Point, ...]:
-    """Where the laminates of a press cycle lie on their plate."""
+    """Return the places of the laminates of a press cycle on their plate."""
     if claims.batch is None:
         return ((0.0, 0.0),)
     return tuple((place.x, place.y) for place in claims.batch.places)
 
 
 def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Laminate:
-    """The laminate with a pin in every hole of the plate, whatever holes its layers have."""
+    """Return the laminate with a pin in every hole of the plate."""
     if claims.fixture is None or claims.fixture not in claims.files:
         return laminate
     try:
-        holes = read_part(folder / claims.fixture, noted=True).region.holes
+        holes = read_part(folder / claims.fixture, has_letters=True).region.holes
     except OutputError:
         return laminate
     names = {(pin.x, pin.y): pin.name for pin in claims.registration.pins}
@@ -302,8 +316,8 @@ def with_plate_pins(folder: Path, laminate: Laminate, claims: Manifest) -> Lamin
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     for number, (spot, radius) in enumerate((h.circle for h in holes if h.circle), start=1):
         # As it lies in the laminate whose place is nearest.
-        found = [(spot[0] - x, spot[1] - y) for x, y in _places(claims)]
-        centre = min(found, key=lambda place: math.dist(place, middle))
+        candidates = [(spot[0] - x, spot[1] - y) for x, y in _places(claims)]
+        centre = min(candidates, key=lambda place: math.dist(place, middle))
         if not any(
             math.dist(pin.centre, centre) < LOOSE and abs(pin.diameter - 2 * radius) < LOOSE
             for pin in pins

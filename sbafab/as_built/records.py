@@ -1,4 +1,4 @@
-"""What ``manifest.json`` claims, read with its types checked, and problems as data."""
+"""The manifest as typed records, and problems as data."""
 
 from __future__ import annotations
 
@@ -9,49 +9,50 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from sbafab.errors import OutputError
-from sbafab.output.manifest_records import AssemblyManifest, JobManifest, Manifest
-from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, read_manifest
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
+from sbafab.output.swap import (
+    ASSEMBLY_SCHEMA,
+    JOB_SCHEMA,
+    SCHEMA,
+    read_manifest,
+)
 from sbafab.rules.finding import Finding, Place, Verdict
 
 INTEGRITY = "file-integrity"
 CLAIMS = "manifest-claims"
 DESIGNED = "as-designed"
-MOST_BYTES = 50_000_000
-MOST_SHOWN = 12
-"""Problems of one rule that are reported one by one."""
+MAX_MANIFEST_BYTES = 50_000_000
+MAX_SHOWN = 12
+"""Problems of a rule that are reported one by one."""
 
 
 def read_claims(folder: Path) -> Manifest:
-    """The manifest of an output folder.
-
-    Raises OutputError with one sentence where there is none, or a key is missing or of a wrong
-    type.
-    """
+    """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
     return _read(folder, Manifest, SCHEMA)
 
 
 def is_job(folder: Path) -> bool:
-    """Whether a folder is one of several designs, of a job or an assembly."""
+    """Return True if a folder holds several designs, of a job or an assembly."""
     path = folder / "manifest.json"
     try:
-        is_small = path.is_file() and path.stat().st_size <= MOST_BYTES
+        is_small = path.is_file() and path.stat().st_size <= MAX_MANIFEST_BYTES
     except OSError:
         return False
     return is_small and (read_manifest(folder) or {}).get("schema") in (JOB_SCHEMA, ASSEMBLY_SCHEMA)
 
 
 def read_job(folder: Path) -> JobManifest:
-    """The manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
+    """Return the manifest of a job's folder. Raises OutputError as ``read_claims`` does."""
     return _read(folder, JobManifest, JOB_SCHEMA)
 
 
-def is_joined(job: JobManifest) -> bool:
-    """Whether a job's designs are the parts of an assembly."""
+def is_assembly(job: JobManifest) -> bool:
+    """Return True if a job's designs are the parts of an assembly."""
     return job.schema_name == ASSEMBLY_SCHEMA
 
 
-def read_joined(folder: Path) -> AssemblyManifest:
-    """The manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
+def read_assembly(folder: Path) -> AssemblyManifest:
+    """Return the manifest of an assembly's folder. Raises OutputError as ``read_claims`` does."""
     return _read(folder, AssemblyManifest, ASSEMBLY_SCHEMA)
 
 
@@ -64,8 +65,10 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         # A pipe or a device would be read for ever.
         if path.exists() and not path.is_file():
             raise OutputError(f"{path} is no plain file; regenerate the folder")
-        if path.stat().st_size > MOST_BYTES:
-            raise OutputError(f"{path} is larger than {MOST_BYTES:,} bytes; regenerate the folder")
+        if path.stat().st_size > MAX_MANIFEST_BYTES:
+            raise OutputError(
+                f"{path} is larger than {MAX_MANIFEST_BYTES:,} bytes; regenerate the folder"
+            )
         data = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         raise OutputError(
@@ -81,15 +84,15 @@ def _read(folder: Path, kind: type[Read], schema: str) -> Read:
         first = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in first["loc"])
         reason = first["msg"][:1].lower() + first["msg"][1:]
-        said = f"{where}: {reason}" if where else reason
+        fault = f"{where}: {reason}" if where else reason
         raise OutputError(
-            f"{path} is not a sound {schema}: {said}; regenerate the folder with sbafab generate"
+            f"{path} is not a sound {schema}: {fault}; regenerate the folder with sbafab generate"
         ) from None
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is not as it should be, found outside the rule deck."""
+    """A fault outside the rule deck."""
 
     rule: str
     message: str
@@ -101,11 +104,11 @@ class Problem:
 
 
 def findings_of(rule: str, problems: list[Problem], passed: str) -> list[Finding]:
-    """Findings of one rule: each problem, the many in one at the end, or one that passes."""
-    own = [problem for problem in problems if problem.rule == rule]
-    if not any(problem.verdict == "fail" for problem in own):
-        own.append(Problem(rule, passed, verdict="pass"))
-    shown, rest = own[:MOST_SHOWN], own[MOST_SHOWN:]
+    """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
+    rule_problems = [problem for problem in problems if problem.rule == rule]
+    if not any(problem.verdict == "fail" for problem in rule_problems):
+        rule_problems.append(Problem(rule, passed, verdict="pass"))
+    shown, rest = rule_problems[:MAX_SHOWN], rule_problems[MAX_SHOWN:]
     if rest:
         layers = tuple(dict.fromkeys(index for problem in rest for index in problem.layers))
         message = f"and {len(rest)} more like these"

@@ -1,28 +1,30 @@
-"""An assembly put together: every part with its design, laminate and place."""
+"""Assemblies put together: rigid poses, the tree of parts, their designs and places."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
-from sbafab.actuators import build
-from sbafab.assemblies.poses import (
-    FLIPPED,
-    LYING,
-    OUTWARD,
-    PartPose,
-    about_axis,
-    along,
-    shifted,
+from sbafab.actuators import build, records
+from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
+from sbafab.design.files import (
+    ASSEMBLY,
+    add_waivers,
+    design_path,
+    kit_names,
+    listed,
+    override,
+    read_toml,
+    shown,
 )
-from sbafab.assemblies.reading import part_design
-from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.assemblies.tree import building_order
-from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, validated
+from sbafab.design.sections import RuleName
+from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.meshing.wrap import bent_point
@@ -31,6 +33,174 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+Rows = tuple[Vector, Vector, Vector]
+
+
+class PartPose(NamedTuple):
+    """A rigid pose: a point p of a part's frame goes to ``rows p + shift``."""
+
+    rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    shift: Vector = (0.0, 0.0, 0.0)
+
+    def at(self, p: Vector) -> Vector:
+        x, y, z = (
+            sum(a * b for a, b in zip(row, p, strict=True)) + s
+            for row, s in zip(self.rows, self.shift, strict=True)
+        )
+        return x, y, z
+
+    def then(self, inner: PartPose) -> PartPose:
+        """Return the pose of a part whose pose in this frame is ``inner``."""
+        columns = tuple(zip(*inner.rows, strict=True))
+        r0, r1, r2 = (
+            tuple(sum(a * b for a, b in zip(row, column, strict=True)) for column in columns)
+            for row in self.rows
+        )
+        return PartPose(((*r0,), (*r1,), (*r2,)), self.at(inner.shift))  # type: ignore[arg-type]
+
+    def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the points (n, 3) in this pose."""
+        import numpy as np
+
+        moved: NDArray[np.float64] = points @ np.array(self.rows).T + np.array(self.shift)
+        return moved
+
+    @property
+    def axis(self) -> Vector:
+        """Direction of the part's own axis."""
+        return self.rows[0][2], self.rows[1][2], self.rows[2][2]
+
+
+def shifted(x: float, y: float, z: float) -> PartPose:
+    return PartPose(shift=(x, y, z))
+
+
+def about_axis(degrees: float) -> PartPose:
+    """A turn about z; quarter turns are exact."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    if degrees % 90 == 0:
+        c, s = float(round(c)), float(round(s))
+    return PartPose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+FLIPPED = PartPose(((-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)))
+"""Upside down: half a turn about y."""
+LYING = PartPose(((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)))
+"""The axis along x, what pointed along x downward."""
+OUTWARD = PartPose(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+"""The axis along x, the part's x along y, its y along z: lying on a cylinder's side."""
+
+
+def along(direction: Vector, at: Vector) -> PartPose:
+    """Return a pose with its axis along a unit vector, at a point."""
+    z = direction
+    least = min(range(3), key=lambda i: abs(z[i]))
+    helper: Vector = (float(least == 0), float(least == 1), float(least == 2))
+    x = _unit(_cross(helper, z))
+    y = _cross(z, x)
+    return PartPose(((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), at)
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def _unit(v: Vector) -> Vector:
+    size = math.hypot(*v)
+    return v[0] / size, v[1] / size, v[2] / size
+
+
+# The tree of parts: the order to build in, and allowed joints.
+
+
+PLACES: Mapping[str, tuple[Seat, ...]] = {
+    "sba": ("top", "bottom", "lumen", "inlet"),
+    "tube": ("start", "end", "outside", "lumen"),
+    "magnet": ("top", "bottom"),
+    "base": ("top", "bottom"),
+    "sheet": ("top", "bottom"),
+    "cup": (),
+    "line": (),
+}
+"""Places on a part of each kind where others may be fixed."""
+FOR_LINES: tuple[Seat, ...] = ("lumen", "inlet")
+
+
+def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
+    """Return part names, the root first, each after its host; else in the file's order.
+
+    Raises DesignError where there is not exactly one root, or a part is fixed on an unknown one, in
+    a circle, or at a place that its host does not have.
+    """
+    roots = [name for name, part in parts.items() if part.on is None]
+    for name, part in parts.items():
+        if part.on is not None:
+            _check_joint(name, part, parts)
+        elif part.at is not None:
+            raise DesignError(
+                f'parts.{name}.at = "{part.at}" needs parts.{name}.on, the part that it is fixed on'
+            )
+    if len(roots) > 1:
+        raise DesignError(
+            f"{listed(roots)} are fixed on nothing; give all but one of them on = the part that "
+            "each is fixed on"
+        )
+    order = list(roots)
+    for name in order:
+        order += [hanging for hanging, part in parts.items() if part.on == name]
+    if len(order) < len(parts):
+        circle = _circle(parts, order)
+        how = "are fixed on each other in a circle" if circle[1:] else "hangs on itself"
+        raise DesignError(
+            f"{listed(circle)} {how}; leave out on and at in the part that all others are fixed on"
+        )
+    return tuple(order)
+
+
+def _circle(parts: Mapping[str, AnyPart], hanging: Iterable[str]) -> list[str]:
+    """Return the parts of one circle among those that do not hang on the root."""
+    name = next(name for name in parts if name not in set(hanging))
+    walk: list[str] = []
+    while name not in walk:
+        walk.append(name)
+        name = str(parts[name].on)
+    return walk[walk.index(name) :]
+
+
+def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None:
+    where = f"parts.{name}"
+    host = parts.get(str(part.on))
+    if host is None:
+        near = difflib.get_close_matches(str(part.on), parts, 1)
+        hint = f"did you mean {near[0]}?" if near else f"the parts are {', '.join(parts)}"
+        raise DesignError(f"{where}.on = {shown(part.on)} is not a part of the assembly; {hint}")
+    allowed = places_for(part, host)
+    if not allowed:
+        raise DesignError(
+            f'{where}.on = "{part.on}": no {part.kind} can be fixed on a {host.kind}; fix it on '
+            "another part"
+        )
+    if part.at not in allowed:
+        fault = "is missing" if part.at is None else f'= "{part.at}"'
+        raise DesignError(
+            f"{where}.at {fault}; a {part.kind} is fixed on a {host.kind} at one of "
+            f"{listed(allowed)}"
+        )
+
+
+def places_for(part: AnyPart, host: AnyPart) -> tuple[Seat, ...]:
+    """Return the places for a part on its host: lines run inside, all else sits outside."""
+    is_line = isinstance(part, Line)
+    return tuple(place for place in PLACES[host.kind] if (place in FOR_LINES) == is_line)
+
+
+# Parts with their designs, laminates and places.
+
+
 RESERVED = frozenset(
     {
         *("sheets", "mesh", "preview"),
@@ -38,12 +208,12 @@ RESERVED = frozenset(
         *("findings.html", "traveller.html"),
     }
 )
-"""What lies in an assembly's folder beside the folders of its designs."""
+"""Names in an assembly's folder beside the folders of its designs."""
 
 
 @dataclass(frozen=True)
 class PartDesign:
-    """A design that parts are made from; ``design.order.quantity`` counts them all."""
+    """A design that parts are made from; ``design.order.quantity`` counts all of them."""
 
     design: Design
     laminate: Laminate
@@ -81,17 +251,18 @@ class PlacedPart:
         raise TypeError(f"{self.name} is placed without its design")
 
     def at(self, p: Vector) -> Vector:
-        """Where a point (x, y, z) in mm of the part's own frame lies in the assembly."""
+        """Return the place in the assembly of a point (x, y, z) in mm of the part's own frame."""
         p = about_axis(self.turn).at(p)
         return self.pose.at(p if self.radius is None else bent_point(p, self.radius))
 
     def turned(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) in mm, turned about the part's own axis before they are bent or placed."""
+        """Points (n, 3) in mm turned about the part's own axis, before bending and placing."""
         return about_axis(self.turn).points(points)
 
     def upright(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) in mm of the part's own frame in the assembly, not bent: one that lies on a
-        tube stands on the tangent.
+        """Return points (n, 3) in mm of the part's own frame in the assembly, not bent.
+
+        A part that lies on a tube stands on the tangent.
         """
         import numpy as np
 
@@ -104,7 +275,7 @@ class PlacedPart:
 
 @dataclass(frozen=True)
 class PlacedSba(PlacedPart):
-    """An SBA in its place; ``radius`` is that of the tube which it is bent round, if it is."""
+    """An SBA in its place; ``radius`` is that of the tube which it is bent round, if any."""
 
     made: PartDesign
     radius: float | None = None
@@ -116,7 +287,7 @@ class PlacedSba(PlacedPart):
 
 @dataclass(frozen=True)
 class Assembled:
-    """An assembly with its parts in place, each after what it is fixed on."""
+    """An assembly with its parts in place, each after its host."""
 
     assembly: Assembly
     designs: tuple[PartDesign, ...]
@@ -126,52 +297,103 @@ class Assembled:
         return next(part for part in self.parts if part.name == name)
 
     def on(self, placed: PlacedPart) -> PlacedPart | None:
-        """What a part is fixed on; None for the root."""
+        """Return the host that a part is fixed on; None for the root."""
         return None if placed.part.on is None else self[placed.part.on]
 
 
 def assemble(assembly: Assembly) -> Assembled:
-    """Every part with its laminate and its place. Raises DesignError where it cannot be."""
+    """Every part with its laminate and its place. Raises DesignError if that is impossible."""
     order = building_order(assembly.parts)
     designs = _designs(assembly)
-    made = {name: one for one in designs for name in one.parts}
+    design_of = {name: design for design in designs for name in design.parts}
     placed: dict[str, PlacedPart] = {}
     for name in order:
         part = assembly.parts[name]
-        own = made.get(name)
+        source = design_of.get(name)
         if part.on is None:
-            _check_root(name, own)
+            _check_root(name, source)
             pose = LYING if assembly.pose == "lying" else PartPose()
-            placed[name] = _at_pose(name, part, pose, own)
+            placed[name] = _at_pose(name, part, pose, source)
         else:
-            placed[name] = _placed(name, part, own, placed[part.on])
+            placed[name] = _placed(name, part, source, placed[part.on])
     return Assembled(assembly, designs, tuple(placed.values()))
 
 
 def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
-    """The distinct designs of the parts, in the file's order, with names of their own."""
-    found: dict[str, tuple[Design, list[str]]] = {}
+    """Return the distinct designs of the parts, in the file's order, with unique names."""
+    by_hash: dict[str, tuple[Design, list[str]]] = {}
     for name, part in assembly.parts.items():
         if isinstance(part, Sba):
-            design = part_design(assembly, name, part)
-            found.setdefault(design_sha256(design), (design, []))[1].append(name)
-    if not found:
+            design = _read_part(assembly, name, part)
+            by_hash.setdefault(design_sha256(design), (design, []))[1].append(name)
+    if not by_hash:
         raise DesignError(
             'an assembly needs a stacked balloon actuator; add a part of kind = "sba"'
         )
-    # Some systems hold names that differ in small and capital letters for one.
-    names = [design.name.lower() for design, _ in found.values()]
-    made = []
-    for design, parts in found.values():
-        own = design.name
-        plain = own.lower()
+    # Some file systems ignore the case of letters.
+    names = [design.name.lower() for design, _ in by_hash.values()]
+    sources = []
+    for design, parts in by_hash.values():
+        name_of_design = design.name
+        plain = name_of_design.lower()
         if names.count(plain) > 1 or plain in RESERVED or plain == assembly.name.lower():
-            own = f"{own}-{parts[0]}"
-        made.append(_made(design, own, parts, assembly))
-    return tuple(made)
+            name_of_design = f"{name_of_design}-{parts[0]}"
+        sources.append(_build_part(design, name_of_design, parts, assembly))
+    return tuple(sources)
 
 
-def _made(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
+def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
+    """Return the design of an SBA part, with the part's and the assembly's own keys set.
+
+    Raises DesignError that names the part.
+    """
+    try:
+        path = design_path(design_source(part.design, assembly.folder))
+        table = read_toml(path)
+        if table.get("family") == ASSEMBLY:
+            raise DesignError(
+                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
+                "one actuator"
+            )
+        data = override(table, [part.set, assembly.shared])
+        data.setdefault("name", path.stem)
+        _keep_outline(data, part, assembly.folder)
+        _keep_kit(data, part, assembly)
+        waived = _waivers(data)
+        rules = [r for r in assembly.rules.waive if r in get_args(RuleName) and r not in waived]
+        return validated(add_waivers(data, rules), records(), path.parent)
+    except DesignError as error:
+        raise DesignError(f"parts.{name}: {error}") from None
+
+
+def design_source(design: str, folder: Path) -> str | Path:
+    """The source of a design: a bare word names a template, a path starts at the file's folder."""
+    return folder / design if Path(design).name != design or "." in design else design
+
+
+def _waivers(data: Mapping[str, Any]) -> list[Any]:
+    """Return the rules that a design file's tables waive, if they are a list."""
+    rules = data.get("rules")
+    waived = rules.get("waive") if isinstance(rules, dict) else None
+    return waived if isinstance(waived, list) else []
+
+
+def _keep_outline(data: dict[str, Any], part: Sba, folder: Path) -> None:
+    """Resolve an outline that the assembly's file names against its folder, not the design's."""
+    chamber = part.set.get("chamber")
+    if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
+        data["chamber"]["outline"] = str((folder / chamber["outline"]).absolute())
+
+
+def _keep_kit(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
+    """Resolve a kit's file likewise."""
+    kit = data.get("kit")
+    is_named_here = assembly.kit is not None or "kit" in part.set
+    if is_named_here and isinstance(kit, str) and kit not in kit_names():
+        data["kit"] = str((assembly.folder / kit).absolute())
+
+
+def _build_part(design: Design, name: str, parts: list[str], assembly: Assembly) -> PartDesign:
     order = assembly.order.model_copy(update={"copies": len(parts) * assembly.order.copies})
     named = design.model_copy(update={"name": name, "order": order})
     try:
@@ -180,86 +402,86 @@ def _made(design: Design, name: str, parts: list[str], assembly: Assembly) -> Pa
         raise DesignError(f"parts.{parts[0]}: {error}") from None
 
 
-def _check_root(name: str, made: PartDesign | None) -> None:
-    if made is not None and made.design.form.wrap is not None:
+def _check_root(name: str, source: PartDesign | None) -> None:
+    if source is not None and source.design.form.wrap is not None:
         raise DesignError(
             f'parts.{name} is a radial design; wrap it round a tube: on = a tube, at = "outside"'
         )
 
 
-def _placed(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart) -> PlacedPart:
-    _check_kinds(name, part, made, other)
+def _placed(name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart) -> PlacedPart:
+    _check_kinds(name, part, source, host)
     if part.at == "outside":
-        tube = other.part
+        tube = host.part
         assert isinstance(tube, Tube)
         radius = tube.outer_diameter / 2
         side = about_axis(part.angle)
-        if made is not None:
-            pose = _frame(other).then(side).then(shifted(0.0, 0.0, part.along))
-            return PlacedSba(name, part, pose, made, radius)
-        pose = _frame(other).then(side).then(shifted(radius, 0.0, part.along)).then(OUTWARD)
+        if source is not None:
+            pose = _frame(host).then(side).then(shifted(0.0, 0.0, part.along))
+            return PlacedSba(name, part, pose, source, radius)
+        pose = _frame(host).then(side).then(shifted(radius, 0.0, part.along)).then(OUTWARD)
         return PlacedPart(name, part, pose)
-    if isinstance(part, Line) and isinstance(other, PlacedSba) and part.at == "inlet":
-        return PlacedPart(name, part, _at_inlet(name, part, other))
-    return _at_pose(name, part, _frame(other).then(_on_axis(part, other)), made)
+    if isinstance(part, Line) and isinstance(host, PlacedSba) and part.at == "inlet":
+        return PlacedPart(name, part, _at_inlet(name, part, host))
+    return _at_pose(name, part, _frame(host).then(_on_axis(part, host)), source)
 
 
-def _at_pose(name: str, part: AnyPart, pose: PartPose, made: PartDesign | None) -> PlacedPart:
-    return PlacedPart(name, part, pose) if made is None else PlacedSba(name, part, pose, made)
+def _at_pose(name: str, part: AnyPart, pose: PartPose, source: PartDesign | None) -> PlacedPart:
+    return PlacedPart(name, part, pose) if source is None else PlacedSba(name, part, pose, source)
 
 
 def _frame(placed: PlacedPart) -> PartPose:
-    """The frame that other parts are fixed in: turned with the part."""
+    """Return the frame that other parts are fixed in: turned with the part."""
     return placed.pose.then(about_axis(placed.turn))
 
 
-def _on_axis(part: AnyPart, other: PlacedPart) -> PartPose:
+def _on_axis(part: AnyPart, host: PlacedPart) -> PartPose:
     x, y = part.offset
     if part.at == "lumen":
         return shifted(0.0, 0.0, part.along)
     if part.at in ("top", "end"):
-        return shifted(x, y, other.height)
+        return shifted(x, y, host.height)
     return shifted(x, y, 0.0).then(FLIPPED)
 
 
-def _at_inlet(name: str, line: Line, other: PlacedSba) -> PartPose:
-    """At the mouth of a chamber's inlet, pointing outward."""
-    inlet = inlet_of(name, line, other)
+def _at_inlet(name: str, line: Line, host: PlacedSba) -> PartPose:
+    """Return the pose at the mouth of a chamber's inlet, pointing outward."""
+    inlet = inlet_of(name, line, host)
     (x, y), (u, v) = inlet.mouth, inlet.direction
-    middle = other.made.laminate.layers[0].film.thickness
-    start, beyond = other.at((x, y, middle)), other.at((x + 1e-4 * u, y + 1e-4 * v, middle))
+    height = host.made.laminate.layers[0].film.thickness
+    start, beyond = host.at((x, y, height)), host.at((x + 1e-4 * u, y + 1e-4 * v, height))
     way = [(b - a) / 1e-4 for a, b in zip(start, beyond, strict=True)]
     size = sum(value * value for value in way) ** 0.5
     return along((way[0] / size, way[1] / size, way[2] / size), start)
 
 
-def inlet_of(name: str, line: Line, other: PlacedSba) -> Inlet:
-    """The inlet that a line goes into. Raises DesignError where there is none."""
-    inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in other.made.laminate.inlets}
+def inlet_of(name: str, line: Line, host: PlacedSba) -> Inlet:
+    """Return the inlet that a line goes into. Raises DesignError if there is none."""
+    inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in host.made.laminate.inlets}
     if line.chamber not in inlets:
         raise DesignError(
-            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {other.name}; it has '
+            f'parts.{name}.chamber = "{line.chamber}" has no inlet in {host.name}; it has '
             f"{', '.join(inlets)}"
         )
     return inlets[line.chamber]
 
 
-def _check_kinds(name: str, part: AnyPart, made: PartDesign | None, other: PlacedPart) -> None:
-    """What a design's family allows beyond what its kind does."""
-    if made is not None and made.design.form.wrap is not None:
+def _check_kinds(name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart) -> None:
+    """Refuse joints that the kinds allow and a design's family does not. Raises DesignError."""
+    if source is not None and source.design.form.wrap is not None:
         if part.at != "outside":
-            _check_root(name, made)
+            _check_root(name, source)
         if part.turn % 180 != 0:
             raise DesignError(
                 f"parts.{name}.turn = {part.turn:g} turns a radial design out of line with its "
                 "tube; it must be 0 or 180"
             )
-    if other.radius is not None and part.at != "inlet":
+    if host.radius is not None and part.at != "inlet":
         raise DesignError(
-            f'parts.{name}.on = "{other.name}", which is bent round a tube and has no flat face; '
+            f'parts.{name}.on = "{host.name}", which is bent round a tube and has no flat face; '
             "fix it on another part"
         )
-    if part.at == "lumen" and other.made is not None and other.made.laminate.lumen is None:
+    if part.at == "lumen" and host.made is not None and host.made.laminate.lumen is None:
         raise DesignError(
-            f'parts.{name}.on = "{other.name}", which has no lumen; only lobed designs have one'
+            f'parts.{name}.on = "{host.name}", which has no lumen; only lobed designs have one'
         )

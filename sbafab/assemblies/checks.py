@@ -1,41 +1,629 @@
-"""The checks between the parts of an assembly, as findings; each has a stable name."""
+"""Checks of assemblies as findings: joints, supply tubes, ways through holes, collisions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.assemblies import collisions, deployment, fits, supply
-from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.records import AssemblyRules, CheckName
-from sbafab.rules.finding import Finding
-from sbafab.rules.lowered import weakened
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba, inlet_of
+from sbafab.assemblies.records import AssemblyRules, Base, CheckName, Cup, Line, Magnet, Tube
+from sbafab.assemblies.shapes import face, placed_surface
+from sbafab.design.records import Discs
+from sbafab.geometry.region import Region, rectangle
+from sbafab.laminate.laminate import outline_diameter
+from sbafab.meshing.surface import Surface, Vector
+from sbafab.models.formulas import LOBES, deflated_diameter, folded_diameter, reached_diameter
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import holds, weakened
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+WHOLE = Place()
+
+
+def _finding(
+    rule: str,
+    passed: bool,
+    limit: float | None,
+    measured: float | None,
+    message: str,
+    unit: str = "mm",
+) -> Finding:
+    return Finding(rule, "pass" if passed else "fail", limit, measured, unit, WHOLE, message)
+
+
+def joints(assembled: Assembled) -> Iterator[tuple[PlacedPart, PlacedPart]]:
+    """Yield each part that is fixed on another, with that host."""
+    for placed in assembled.parts:
+        host = assembled.on(placed)
+        if host is not None:
+            yield placed, host
+
+
+def tube_match(assembled: Assembled) -> Iterator[Finding]:
+    """Check that an SBA bent round a tube was made for it, or at least goes round it once."""
+    tolerance = assembled.assembly.rules.tube_tolerance
+    for placed, host in joints(assembled):
+        if not isinstance(placed, PlacedSba) or not isinstance(host.part, Tube):
+            continue
+        if placed.radius is None:
+            continue
+        outer = host.part.outer_diameter
+        wrap = placed.made.design.form.wrap
+        if wrap is not None:
+            design_diameter = wrap.tube_diameter
+            off = abs(design_diameter - outer)
+            good = holds(tolerance, off)
+            message = (
+                f"{placed.name}, made for a tube of {design_diameter:g}, goes round {host.name} "
+                f"of {outer:g}"
+            )
+            if not good:
+                message += (
+                    f"; set tube.outer_diameter = {outer:g} in its design, or change the tube"
+                )
+            yield _finding("tube-match", good, tolerance, off, message)
+            continue
+        walls = placed.made.laminate.layers[0].profile.turned(placed.turn)
+        width, room = walls.bounds[2] - walls.bounds[0], math.pi * outer
+        yield _finding(
+            "tube-match",
+            holds(room, width),
+            room,
+            width,
+            f"{placed.name} takes {width:.2f} of the {room:.2f} round {host.name}, tabs included"
+            + ("" if holds(room, width) else "; take a thicker tube or a smaller actuator"),
+        )
+
+
+def inlet_match(assembled: Assembled) -> Iterator[Finding]:
+    """Check that a line in an inlet fits the opened strip."""
+    for placed, host in joints(assembled):
+        if placed.part.at != "inlet" or not isinstance(placed.part, Line):
+            continue
+        if not isinstance(host, PlacedSba):
+            continue
+        inlet = inlet_of(placed.name, placed.part, host)
+        limit = 2 * inlet.width / math.pi
+        outer = placed.part.outer_diameter
+        yield _finding(
+            "inlet-match",
+            holds(limit, outer),
+            limit,
+            outer,
+            f"{placed.name} has an outer diameter of {outer:g}, and the inlet of {inlet.chamber} "
+            f"in {host.name}, {inlet.width:g} wide, opens to {limit:.3f}"
+            + ("" if holds(limit, outer) else "; set inlet.tube_outer_diameter in its design"),
+        )
+
+
+def line_clearance(assembled: Assembled) -> Iterator[Finding]:
+    """Check the clearance round a line in the lumen or tube that it runs through."""
+    limit = assembled.assembly.rules.line_clearance
+    for placed, host in joints(assembled):
+        if placed.part.at != "lumen" or not isinstance(placed.part, Line):
+            continue
+        lumen = _opening(host)
+        if lumen is None:
+            continue
+        clearance = lumen - placed.part.outer_diameter
+        good = holds(clearance, limit)
+        yield _finding(
+            "line-clearance",
+            good,
+            limit,
+            clearance,
+            f"{placed.name} of {placed.part.outer_diameter:g} in the lumen of {host.name}, "
+            f"{lumen:g}, leaves {clearance:.3f} in diameter"
+            + ("" if good else f"; take a line of at most {lumen - limit:g} or a wider lumen"),
+        )
+
+
+def _opening(placed: PlacedPart) -> float | None:
+    """Return the diameter of the lumen of a part, mm; None for a part without lumen."""
+    if isinstance(placed.part, Tube):
+        return placed.part.inner_diameter
+    return placed.made.laminate.lumen if placed.made is not None else None
+
+
+def seat(assembled: Assembled) -> Iterator[Finding]:
+    """Check the share of the smaller of two glued faces that lies on the other.
+
+    A part round a tube must lie on it, and a line in a lumen must run through it; a line in
+    an inlet is fixed by its strip.
+    """
+    limit = assembled.assembly.rules.seat_share
+    for placed, host in joints(assembled):
+        if placed.part.at == "lumen":
+            yield _through(placed, host, limit)
+        elif placed.part.at == "outside":
+            yield _around(placed, host, limit)
+        elif placed.part.at != "inlet":
+            lower, under = _lower_face(placed), _face_of(host, placed.part.at)
+            share = (lower & under).area / min(lower.area, under.area)
+            good = holds(share, limit)
+            message = f"{share:.0%} of the smaller face of {placed.name} on {host.name} is glued"
+            if not good:
+                message += "; move it with offset, or use a larger part: an opening lies under it"
+            yield _finding("seat", good, limit, share, message, "")
+
+
+def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
+    """A line in the lumen of another part, both along that part's axis."""
+    start, end = placed.part.along, placed.part.along + placed.height
+    inside = max(0.0, min(end, host.height) - max(start, 0.0))
+    share = inside / min(placed.height, host.height)
+    good = holds(share, limit)
+    message = f"{inside:.3f} of {placed.name} lie in the lumen of {host.name}"
+    if not good:
+        message += (
+            f", which reaches from 0 to {host.height:.3f}; along = {start:g} puts the line from "
+            f"{start:g} to {end:g}"
+        )
+    return _finding("seat", good, limit, share, message, "")
+
+
+def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
+    """A part on the side of a tube, whose face lies from ``along`` both ways."""
+    lower = _face_of(placed, "bottom").turned(placed.turn)
+    x0, y0, x1, y1 = lower.bounds
+    along, length = placed.part.along, host.height
+    low, high = max(y0, -along), min(y1, length - along)
+    share = (lower & rectangle((x0, low), (x1, high))).area / lower.area if low < high else 0.0
+    if not holds(share, limit):
+        message = (
+            f"{share:.0%} of {placed.name} lies on {host.name}, which is {length:g} long; "
+            f"along = {along:g} puts it from {along + y0:.2f} to {along + y1:.2f}"
+        )
+        return _finding("seat", False, limit, share, message, "")
+    if placed.radius is None:
+        remedy = f"build the joint of {placed.name} up with adhesive"
+        message = f"{remedy}: it is stiff and touches the round {host.name} in a line only"
+        return Finding("seat", "warn", limit, 0.0, "", WHOLE, message, remedy=remedy)
+    message = f"{share:.0%} of {placed.name} lies on {host.name}"
+    if holds(share, 1.0):
+        return _finding("seat", True, limit, share, message, "")
+    remedy = f"move {placed.name} along {host.name}, or glue well what lies on it"
+    message = (
+        f"{remedy}: {message}, the rest hangs past its end; along = {along:g} puts it from "
+        f"{along + y0:.2f} to {along + y1:.2f} of {length:g}"
+    )
+    return Finding("seat", "warn", limit, share, "", WHOLE, message, remedy=remedy)
+
+
+def _lower_face(placed: PlacedPart) -> Region:
+    """Return the face that is glued on, as it lies on the host's."""
+    part = placed.part
+    region = _face_of(placed, "bottom").turned(part.turn)
+    if part.at in ("bottom", "start"):
+        region = region.mirrored()
+    return region.moved(*part.offset)
+
+
+def _face_of(placed: PlacedPart, at: str | None) -> Region:
+    if placed.made is None:
+        return face(placed.part)
+    layers = placed.made.laminate.layers
+    return layers[-1 if at == "top" else 0].profile
+
+
+# Supply tubes: the size of folded tabs with tubes in them, and the tubes' runs.
+#
+# The paper does not describe them. Tabs fold back over the edge that they leave; their tubes then
+# lie along the actuator's host, away from the actuator.
+
+
+@dataclass(frozen=True)
+class SupplyRun:
+    """A supply tube along the outside of a tube, ``angle`` degrees round it from its marked line.
+
+    ``over`` are the parts with balloons under it.
+    """
+
+    chamber: str
+    angle: float
+    over: tuple[str, ...]
+
+
+def folded_diameter_with_tubes(placed: PlacedPart, assembled: Assembled) -> float | None:
+    """Return the diameter in mm over folded tabs with a tube in each; None without an inlet.
+
+    The tabs fold over the outline where they leave it, or over the tube below if that is wider. On
+    it lie the tab's two films, with the supply tube and the strip's mask between them; the strip's
+    end outside the tab is snipped off when the tube goes in.
+    """
+    if placed.made is None or not placed.made.laminate.inlets:
+        return None
+    laminate = placed.made.laminate
+    inside = placed.radius or 0.0
+    if placed.radius is None:
+        host = assembled.on(placed)
+        if host is not None and isinstance(host.part, Tube):
+            inside = host.part.outer_diameter / 2
+        roots = [math.hypot(*inlet.mouth) - inlet.length for inlet in laminate.inlets]
+        inside = max(inside, *roots)
+    strip = max(layer.film.thickness for layer in laminate.layers if layer.is_mask)
+    films = 2 * laminate.tpe_layers[0].film.thickness + strip
+    return 2 * (inside + films + max(inlet.tube_diameter for inlet in laminate.inlets))
+
+
+def reach(placed: PlacedPart) -> float:
+    """Return the diameter in mm of the circle that holds an actuator with its tabs unfolded."""
+    assert placed.made is not None
+    layers = [layers[0] for layers in placed.made.laminate.patterns.values()]
+    edges = (edge for layer in layers for edge in layer.profile.edges)
+    return 2 * max(edge.farthest_from((0.0, 0.0)) for edge in edges)
+
+
+def supply_runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ...]:
+    """Return the runs along a tube of the supply tubes of an actuator on its end or start."""
+    tube = assembled.on(placed)
+    if placed.made is None or tube is None or not isinstance(tube.part, Tube):
+        return ()
+    if placed.radius is not None:
+        return ()
+    around = tube.part.outer_diameter / 2
+    covered = list(_covered(tube, assembled))
+    supply = []
+    for inlet in placed.made.laminate.inlets:
+        angle = _angle(tube, placed.at((*inlet.mouth, 0.0)))
+        half_tube = math.degrees(inlet.tube_diameter / 2 / around)
+        over = [
+            name
+            for name, middle, half_stack in covered
+            if _angle_between(angle, middle) < half_stack + half_tube
+        ]
+        supply.append(SupplyRun(inlet.chamber, angle, tuple(dict.fromkeys(over))))
+    return tuple(supply)
+
+
+def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, float, float]]:
+    """Yield the parts round a tube: name, and the middle and half of each stack's angle."""
+    for sba in assembled.parts:
+        if sba.made is None or sba.radius is None or sba.part.on != tube.name:
+            continue
+        for piece in sba.made.laminate.layers[-1].profile.pieces:
+            low_x, low_y, high_x, high_y = piece.turned(sba.turn).bounds
+            # A part's own turn comes first when it is placed, and is taken off again here.
+            x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+            unturn = math.radians(-sba.turn)
+            middle = (
+                x * math.cos(unturn) - y * math.sin(unturn),
+                x * math.sin(unturn) + y * math.cos(unturn),
+                0.0,
+            )
+            half = math.degrees((high_x - low_x) / 2 / sba.radius)
+            yield sba.name, _angle(tube, sba.at(middle)), half
+
+
+def _angle(tube: PlacedPart, p: Vector) -> float:
+    """Return the angle of a point round a tube, degrees anti-clockwise from its marked line."""
+    origin = tube.at((0.0, 0.0, 0.0))
+    x, y = (
+        sum((b - a) * (d - a) for a, b, d in zip(origin, tube.at(unit), p, strict=True))
+        for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )
+    return math.degrees(math.atan2(y, x)) % 360
+
+
+def _angle_between(a: float, b: float) -> float:
+    off = abs(a - b) % 360
+    return min(off, 360 - off)
+
+
+def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
+    """Check that supply tubes stay off balloons that press on the wall of a lumen."""
+    if assembled.assembly.deploy.lumen_diameter is None:
+        return
+    for placed in assembled.parts:
+        supply = supply_runs(placed, assembled)
+        if not supply:
+            continue
+        crossing = [run for run in supply if run.over]
+        if not crossing:
+            message = f"the supply tubes of {placed.name} run past all balloons"
+            yield _finding("supply-tubes", True, 0, 0, message, "tubes")
+            continue
+        names = ", ".join(dict.fromkeys(name for run in crossing for name in run.over))
+        message = (
+            f"{len(crossing)} of {len(supply)} supply tubes of {placed.name} would lie on balloons "
+            f"of {names} and be squeezed against the lumen; {_remedy(placed, assembled, supply)}"
+        )
+        yield Finding("supply-tubes", "fail", 0, len(crossing), "tubes", WHOLE, message)
+
+
+def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun]) -> str:
+    """Return the remedy: the turn, in whole degrees, with every tube farthest from balloons."""
+    tube = assembled.on(placed)
+    assert tube is not None
+    covered = list(_covered(tube, assembled))
+
+    def room(turn: int) -> float:
+        """Return the degrees between the nearest tube and balloon."""
+        return min(
+            _angle_between(run.angle + turn, middle) - half
+            for run in supply
+            for _, middle, half in covered
+        )
+
+    best = max(range(360), key=lambda turn: (round(room(turn), 6), -turn))
+    if room(best) <= 0:
+        return "lead them through the tube, or use narrower chambers"
+    return f"turn = {(placed.turn + best) % 360:g} leads them between"
+
+
+# Ways of the whole: through an aperture, into a lumen, against its wall.
+
+
+PRESSED = 0.95 / 1.865
+"""Ratio of measured to nominal thickness of the paper's 15-balloon 3-DoF actuator (Sec. 4)."""
+
+
+class _Passage(NamedTuple):
+    """The diameter that a part needs, mm, with nominal films and films pressed as the paper's."""
+
+    name: str
+    nominal: float
+    pressed: float
+    how: str
+
+
+def aperture(assembled: Assembled) -> Iterator[Finding]:
+    """Check that each part passes the aperture, lobes folded and all else as it is.
+
+    Folded sizes are predicted: where only the thinner, pressed laminate passes, or the paper gives
+    no folded size of a part, the verdict is a warning.
+    """
+    hole = assembled.assembly.deploy.aperture_diameter
+    if hole is None:
+        return
+    needs = [_passage(placed) for placed in assembled.parts]
+    worst = max(needs, key=lambda need: (need.pressed > hole, need.nominal))
+    message = f"{worst.name} {worst.how} needs {worst.nominal:.2f} of the aperture's {hole:g}"
+    if holds(hole, worst.nominal):
+        yield _finding("aperture", True, hole, worst.nominal, message)
+    elif holds(hole, worst.pressed):
+        remedy = "try it in the aperture first"
+        message = (
+            f"{remedy}: {message}, or {worst.pressed:.2f} if pressed as thin as the paper's, which "
+            "passed 9.25"
+        )
+        yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
+    else:
+        message += "; use fewer balloons, smaller chambers or a smaller part"
+        yield _finding("aperture", False, hole, worst.pressed, message)
+
+
+def _passage(placed: PlacedPart) -> _Passage:
+    part = placed.part
+    if not isinstance(placed, PlacedSba):
+        size = _girth(placed)
+        soft = isinstance(part, Cup)
+        return _Passage(
+            placed.name, size, 0.0 if soft else size, "squeezed" if soft else "as it is"
+        )
+    form, laminate = placed.made.design.form, placed.made.laminate
+    if form.wrap is not None:
+        size = deflated_diameter(form.wrap, laminate)
+        return _Passage(placed.name, size, size, "deflated")
+    lobe = _lobe_width(placed)
+    if lobe is not None:
+        return _Passage(
+            placed.name,
+            folded_diameter(lobe, laminate.thickness),
+            folded_diameter(lobe, PRESSED * laminate.thickness),
+            "folded",
+        )
+    return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
+
+
+def _lobe_width(placed: PlacedSba) -> float | None:
+    """Return the width in mm of a lobe of a three-lobed actuator; None for others."""
+    design = placed.made.design
+    form = design.form
+    if not form.is_parallel or form.stacks != LOBES or not isinstance(form.pockets, Discs):
+        return None
+    return max(form.pockets.diameters) + 2 * design.bond.width
+
+
+def _flat_diameter(placed: PlacedSba) -> float:
+    """Circle round an SBA's axis that holds its widest film, tabs and ears taken off, mm."""
+    return outline_diameter(placed.made.laminate)
+
+
+def _girth(placed: PlacedPart) -> float:
+    """Return the diameter of the smallest round hole that a bought part passes, mm."""
+    part = placed.part
+    if isinstance(part, Tube | Line):
+        return part.outer_diameter
+    if isinstance(part, Magnet | Cup):
+        return part.diameter
+    assert isinstance(part, Base)
+    short, middle, _ = sorted((part.width, part.length, part.thickness))
+    return float((short**2 + middle**2) ** 0.5)
+
+
+def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
+    """Check that the deflated assembly passes the lumen, tabs folded back with a tube in each."""
+    lumen = assembled.assembly.deploy.lumen_diameter
+    if lumen is None:
+        return
+    sizes = [(_deflated(placed, assembled), placed, "") for placed in assembled.parts]
+    sizes += [
+        (folded, placed, "tabs folded back with their tubes")
+        for placed in assembled.parts
+        if (folded := folded_diameter_with_tubes(placed, assembled)) is not None
+    ]
+    widest, part, how = max(sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None))
+    good = widest < lumen
+    message = f"deflated, {part.name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    if how:
+        message += f", {how}"
+        if part.radius is None and reach(part) > lumen:
+            message += f" (unfolded they reach {reach(part):.2f}: tie them before it goes in)"
+    if not good:
+        message += "; make it narrower or its laminate thinner"
+        message += ", or take thinner supply tubes" if how else ""
+    yield _finding("lumen-pass", good, lumen, widest, message)
+
+
+def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
+    if not isinstance(placed, PlacedSba):
+        return _girth(placed)
+    wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
+    if wrap is not None:
+        return deflated_diameter(wrap, laminate)
+    if placed.radius is not None:
+        return 2 * (placed.radius + laminate.thickness)
+    return _flat_diameter(placed)
+
+
+def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
+    """Check that inflated radial parts reach the lumen's wall."""
+    lumen = assembled.assembly.deploy.lumen_diameter
+    if lumen is None:
+        return
+    sizes = [
+        (reached, placed.name)
+        for placed in assembled.parts
+        if placed.made is not None
+        and (reached := reached_diameter(placed.made.design.form, placed.made.laminate))
+    ]
+    if not sizes:
+        message = (
+            f"no part expands against a lumen of {lumen:g}; add a radial design, or leave out "
+            "deploy.lumen_diameter"
+        )
+        yield _finding("lumen-brace", False, lumen, None, message)
+        return
+    widest, name = max(sizes)
+    good = holds(widest, lumen)
+    message = f"inflated, {name} reaches {widest:.2f} free (lens of two arcs), and the lumen is "
+    message += f"{lumen:g}"
+    if not good:
+        message += "; use wider or longer chambers, more balloons or a thicker tube"
+    yield _finding("lumen-brace", good, lumen, widest, message)
+
+
+# Collisions of solids in place, deflated, their pockets filled.
+
+
+TOUCH = 0.05
+"""Overlap in mm3 up to which two parts only touch: arcs are chords here."""
+
+
+def collision(assembled: Assembled) -> Iterator[Finding]:
+    """Check that no two parts share space: a finding for each pair that does, or one for none.
+
+    An SBA bent round a tube lies on it by construction; this pair is not compared.
+    """
+    surfaces = {p.name: placed_surface(p, filled=True) for p in assembled.parts}
+    boxes = {name: _box(surface) for name, surface in surfaces.items()}
+    solids: dict[str, Any] = {}
+    worst = 0.0
+    has_collision = False
+    for number, a in enumerate(assembled.parts):
+        for b in assembled.parts[:number]:
+            if _lies_on(a, b) or not _meet(boxes[a.name], boxes[b.name]):
+                continue
+            for name in (a.name, b.name):
+                if name not in solids:
+                    solids[name] = _solid(surfaces[name])
+            shared = solids[a.name] ^ solids[b.name]
+            volume = float(shared.volume())
+            worst = max(worst, volume)
+            if volume > TOUCH:
+                has_collision = True
+                yield _hit(a, b, volume, _box_of(shared))
+    if not has_collision:
+        message = "no two parts run into each other, deflated, at nominal film thickness"
+        yield _finding("collision", True, TOUCH, worst, message, "mm3")
+
+
+def _hit(a: PlacedPart, b: PlacedPart, volume: float, at: NDArray[np.float64]) -> Finding:
+    x, y, z = at
+    return _finding(
+        "collision",
+        False,
+        TOUCH,
+        volume,
+        f"{a.name} and {b.name} share {volume:.2f} mm3 round x {x:.1f}, y {y:.1f}, "
+        f"z {z:.1f}; move one of them (along, angle, offset, turn) or make it smaller",
+        "mm3",
+    )
+
+
+def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
+    return any(
+        upper.part.at == "outside" and upper.part.on == lower.name
+        for upper, lower in ((a, b), (b, a))
+    )
+
+
+def _box(surface: Surface) -> NDArray[np.float64]:
+    import numpy as np
+
+    return np.array([surface.points.min(axis=0), surface.points.max(axis=0)])
+
+
+def _meet(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    return bool((a[0] < b[1]).all() and (b[0] < a[1]).all())
+
+
+def _box_of(solid: Any) -> NDArray[np.float64]:
+    import numpy as np
+
+    low, high = np.array(solid.bounding_box()).reshape(2, 3)
+    middle: NDArray[np.float64] = (low + high) / 2
+    return middle
+
+
+def _solid(surface: Surface) -> Any:
+    import numpy as np
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(
+        Mesh64(
+            vert_properties=np.ascontiguousarray(surface.points),
+            tri_verts=surface.faces.astype(np.uint64),
+        )
+    )
+
+
+# All checks, by stable names.
+
 
 CHECKS: Mapping[CheckName, Callable[[Assembled], Iterator[Finding]]] = {
-    "tube-match": fits.tube_match,
-    "inlet-match": fits.inlet_match,
-    "line-clearance": fits.line_clearance,
-    "seat": fits.seat,
-    "collision": collisions.collision,
-    "aperture": deployment.aperture,
-    "lumen-pass": deployment.lumen_pass,
-    "lumen-brace": deployment.lumen_brace,
-    "supply-tubes": supply.supply_tubes,
+    "tube-match": tube_match,
+    "inlet-match": inlet_match,
+    "line-clearance": line_clearance,
+    "seat": seat,
+    "collision": collision,
+    "aperture": aperture,
+    "lumen-pass": lumen_pass,
+    "lumen-brace": lumen_brace,
+    "supply-tubes": supply_tubes,
 }
 
 AT_MOST: frozenset[CheckName] = frozenset(
     ("tube-match", "inlet-match", "collision", "aperture", "lumen-pass", "supply-tubes")
 )
-"""Checks whose limit is the most that may be measured; of all others it is the least."""
+"""Checks with an upper limit; those of all others are lower limits."""
 
 
 def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
-    """What every check finds, in their order; failures that the assembly waives say so."""
+    """Return the findings of all checks, in their order, with failures that the assembly waives."""
     rules = assembled.assembly.rules
     return tuple(
         _waived(finding) if name in rules.waive and finding.verdict == "fail" else finding
         for name, check in CHECKS.items()
-        for finding in (_against(lowered_checks(rules, name), found) for found in check(assembled))
+        for finding in (
+            _against(lowered_checks(rules, name), result) for result in check(assembled)
+        )
     )
 
 

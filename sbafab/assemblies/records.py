@@ -1,4 +1,4 @@
-"""What an assembly file asks for: parts, what each is fixed on, and what the whole must fit.
+"""Records of an assembly file: parts, joints, places that the whole must fit, and limits.
 
 Defaults are the paper's (Sec. 2.1) where it gives a figure; else ours, and the field says so.
 Lengths are mm, angles degrees.
@@ -11,12 +11,10 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from sbafab.design.order import Order
-from sbafab.design.records import NAME_PATTERN, Laser, Press, RuleName, Sheets
 from sbafab.design.section import Section
+from sbafab.design.sections import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
-FAMILY = "assembly"
 Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]
 CheckName = Literal[
     "tube-match",
@@ -36,7 +34,7 @@ Words = Annotated[str, Field(max_length=120)]
 
 
 class Fixed(Section):
-    """Where a part is fixed. The root, which all others hang on, has no ``on``."""
+    """The joint of a part. The root, which all others hang on, has no ``on``."""
 
     on: str | None = None
     """The part that this one is fixed on."""
@@ -243,18 +241,18 @@ class Assembly(Section):
 
     @property
     def folder(self) -> Path:
-        """Where relative paths of part designs start: the folder of the assembly's file."""
+        """The start of relative paths of part designs: the folder of the assembly's file."""
         return self._folder
 
     def placed(self, folder: Path) -> Self:
-        """The same assembly with relative paths starting at ``folder``."""
+        """Return the assembly with relative paths that start at ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy
 
     @property
     def shared(self) -> dict[str, Any]:
-        """The keys that are set here for every part's design."""
+        """The keys that the assembly sets for every part's design."""
         sections = {"sheets": self.sheets, "laser": self.laser, "press": self.press}
         kit = {} if self.kit is None else {"kit": self.kit}
         return kit | {

@@ -1,17 +1,15 @@
-"""The solids of parts, in their own frame and in place."""
+"""Solids and colours of parts, in their own frame and in place."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from sbafab.assemblies.build import PlacedPart
+from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.prisms import Slab, closed_surface
-from sbafab.meshing.solid import solid_slabs
+from sbafab.meshing.solid import Slab, closed_surface, solid_slabs
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import bent
 
@@ -25,20 +23,20 @@ AROUND = 48
 
 
 def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The closed surface of a part in place; ``filled`` leaves out what films enclose."""
-    own = bent_surface(placed, filled)
-    return Surface(placed.pose.points(own.points), own.faces)
+    """Return the closed surface of a part in place; ``filled`` fills its pockets."""
+    surface = bent_surface(placed, filled)
+    return Surface(placed.pose.points(surface.points), surface.faces)
 
 
 def bent_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The same before its pose: turned about its own axis and bent round its tube."""
-    own = own_surface(placed, filled)
-    turned = Surface(placed.turned(own.points), own.faces)
+    """Return the surface before its pose: turned about its own axis and bent round its tube."""
+    surface = own_surface(placed, filled)
+    turned = Surface(placed.turned(surface.points), surface.faces)
     return turned if placed.radius is None else bent(turned, placed.radius)
 
 
 def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """The closed surface of a part in its own frame."""
+    """Return the closed surface of a part in its own frame."""
     part = placed.part
     if isinstance(part, Cup):
         return _bell(part)
@@ -51,7 +49,7 @@ def own_surface(placed: PlacedPart, filled: bool = False) -> Surface:
 
 
 def filled_slabs(laminate: Laminate) -> list[Slab]:
-    """Films and all that lies between two of them, pockets included: what others bump into."""
+    """Return slabs of the films and the gaps between them, pockets included, for collisions."""
     slabs = [
         Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
         for layer in laminate.tpe_layers
@@ -65,7 +63,7 @@ def filled_slabs(laminate: Laminate) -> list[Slab]:
 
 
 def face(part: AnyPart) -> Region:
-    """The end face of a bought part, at its own origin."""
+    """Return the end face of a bought part, at its own origin."""
     if isinstance(part, Tube | Line):
         return _ring(part.outer_diameter, part.inner_diameter)
     if isinstance(part, Magnet):
@@ -82,7 +80,7 @@ def _ring(outer: float, inner: float) -> Region:
 
 
 def _bell(cup: Cup) -> Surface:
-    """A cup's section, counter-clockwise from its bore, turned round its axis."""
+    """A cup's surface: its section, counter-clockwise from its bore, turned round its axis."""
     import numpy as np
 
     bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
@@ -108,3 +106,41 @@ def _bell(cup: Cup) -> Surface:
     both = (ring + 1) % AROUND * count + (place + 1) % count
     lower, upper = np.column_stack([here, on, both]), np.column_stack([here, both, up])
     return Surface(points, np.concatenate([lower, upper]))
+
+
+# Colours of parts in pictures and solids, distinct for the colour blind.
+
+
+RGB = tuple[int, int, int]
+FILMS: tuple[RGB, ...] = ((86, 180, 233), (0, 114, 178), (240, 228, 66), (204, 121, 167))
+"""Colours of the assembly's designs in their order, repeated (Okabe and Ito's set)."""
+BOUGHT: dict[str, RGB] = {
+    "tube": (190, 190, 186),
+    "magnet": (66, 66, 72),
+    "cup": (230, 159, 0),
+    "line": (213, 94, 0),
+    "base": (150, 200, 180),
+    "sheet": (0, 158, 115),
+}
+
+
+def colours(assembled: Assembled) -> dict[str, RGB]:
+    """Return screen colours by part name."""
+    designs = [source.design.name for source in assembled.designs]
+    return {
+        placed.name: BOUGHT[placed.part.kind]
+        if placed.made is None
+        else FILMS[designs.index(placed.made.design.name) % len(FILMS)]
+        for placed in assembled.parts
+    }
+
+
+def linear(colour: RGB) -> tuple[float, float, float]:
+    """Return a screen (sRGB) colour in linear light, 0 to 1."""
+    r, g, b = (round(_light(value / 255), 6) for value in colour)
+    return r, g, b
+
+
+def _light(value: float) -> float:
+    low = 0.04045
+    return value / 12.92 if value <= low else ((value + 0.055) / 1.055) ** 2.4

@@ -1,21 +1,81 @@
-"""The command line: one command a file; nothing but arguments, progress and printing."""
+"""The command line: the table of commands and the group that runs one; a command is a module."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator, MutableMapping
+from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
 import click
 
 from sbafab import __version__
-from sbafab.cli.ending import BAD_INPUT, ended_plainly, prepared_streams, say
-from sbafab.cli.fetching import Fetched
+from sbafab.cli.exit import BAD_INPUT, exit_plainly, prepared_streams, print_error
+from sbafab.cli.progress import add_verbosity
 from sbafab.process import prepare
 
-COMMANDS = Fetched()
+NAMES = (
+    "templates",
+    "new",
+    "generate",
+    "check",
+    "explain",
+    "cut",
+    "press",
+    "mesh",
+    "nest",
+    "kerf",
+    "predict",
+    "map",
+    "picture",
+    "simulate",
+    "sweep",
+    "find",
+    "record",
+    "reproduce",
+    "studio",
+    "schema",
+)
+"""In the order a newcomer needs them. A module has the name of its command."""
+BUILTIN = {"map": "map_"}
+"""Functions that cannot have the name of their command."""
 
 
+class CommandTable(MutableMapping[str, click.Command]):
+    """Commands by name; a command's module is imported when the command is first looked up.
+
+    Commands import geometry, models and writers inside their functions, so that --help loads none.
+    """
+
+    def __init__(self) -> None:
+        self._loaded: dict[str, click.Command | None] = dict.fromkeys(NAMES)
+
+    def __getitem__(self, name: str) -> click.Command:
+        command = self._loaded[name]
+        if command is None:
+            module = import_module(f"sbafab.cli.{name}")
+            command = self._loaded[name] = getattr(module, BUILTIN.get(name, name))
+            add_verbosity(command)
+        return command
+
+    def __setitem__(self, name: str, command: click.Command) -> None:
+        self._loaded[name] = command
+
+    def __delitem__(self, name: str) -> None:
+        del self._loaded[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._loaded
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaded)
+
+    def __len__(self) -> int:
+        return len(self._loaded)
+
+
+COMMANDS = CommandTable()
 EXTRAS = {
     "control": ("gymnasium", "an environment of Gymnasium, from Python"),
     "dask": ("distributed", "sweep --dask"),
@@ -27,19 +87,19 @@ EXTRAS = {
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "studio": ("starlette", "sbafab studio"),
 }
-"""What each extra brings: a module to look for, and what needs it."""
+"""By extra: a module that it installs, and the feature that needs it."""
 
 
-class InOrder(click.Group):
-    """A group that lists its commands in the order a newcomer needs them."""
+class CommandGroup(click.Group):
+    """A group that lists its commands in the order of NAMES and suggests the nearest name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         missing = [
-            f'{what}: pip install "sbafab[{extra}]"'
-            for extra, (module, what) in EXTRAS.items()
+            f'{feature}: pip install "sbafab[{extra}]"'
+            for extra, (module, feature) in EXTRAS.items()
             if find_spec(module) is None
         ]
         if missing:
@@ -48,12 +108,33 @@ class InOrder(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         # Click hands a command what is left of the line here; it is read before a command is.
-        with ended_plainly("--json" in ctx.args):
+        with exit_plainly("--json" in ctx.args):
             return super().invoke(ctx)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = args[0]
+        if name not in self.commands and not name.startswith("-"):
+            near = " or ".join(similar_commands(name))
+            hint = f"; did you mean {near}?" if near else ""
+            raise click.UsageError(f"{name!r} is not a command{hint}", ctx)
+        return super().resolve_command(ctx, args)
+
+
+def similar_commands(name: str) -> list[str]:
+    """Return the commands that begin with ``name``; if none does, the most similar one, if any."""
+    typed = name.lower()
+    beginning = [command for command in NAMES if typed and command.startswith(typed)]
+    if beginning:
+        return beginning
+    from difflib import get_close_matches
+
+    return get_close_matches(typed, NAMES, 1)
 
 
 @click.group(
-    cls=InOrder,
+    cls=CommandGroup,
     commands=COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
@@ -69,12 +150,12 @@ def app() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs the command line; bad input ends in one sentence and exit code 2."""
+    """Run the command line; bad input ends in one sentence and exit code 2."""
     if arguments is None:
-        # The command is all that the process does, by whatever door it came.
+        # The command is all that the process does, however it was started.
         prepare()
     prepared_streams()
     if any("\0" in argument for argument in arguments or ()):
-        say("an argument holds a NUL character; no path or value can")
+        print_error("an argument contains a NUL character; remove it")
         sys.exit(BAD_INPUT)
     app(arguments, prog_name="sbafab")

@@ -1,35 +1,50 @@
-"""``sbafab check``: the rule deck on a design or on an output folder; nothing is written."""
+"""``sbafab check``: rules on a design or on an output folder, once or after every change."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from sbafab.cli.completing import designs_or_folders
-from sbafab.cli.options import json_option, set_option, waive_option
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED, print_error
+from sbafab.cli.options import designs_or_folders, json_option, set_option, waive_option
+from sbafab.cli.printing import (
+    FILES,
+    Group,
+    groups_of,
+    notes_of,
+    print_failed,
+    print_findings,
+    print_json,
+    print_line,
+    print_listed,
+    print_passed,
+    print_wrapped,
+)
+from sbafab.cli.progress import shown_progress
+from sbafab.errors import DesignError, SbafabError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sbafab.assemblies.records import Assembly
-    from sbafab.cli.verdicts import Group
+    from sbafab.cli.printing import Group
     from sbafab.design.records import Design
     from sbafab.output.advice import Advice
-    from sbafab.output.planned import Checked
-    from sbafab.progress import Progress
+    from sbafab.output.job import CheckedJob
     from sbafab.rules.finding import Finding
 
-
-YIELD = "registration-yield"
-PAPER = "paper"
-"""The kit that a design has by itself."""
+YIELD_RULE = "registration-yield"
+DEFAULT_KIT = "paper"
+"""The kit of a design that names none."""
 
 
 class CheckRequest(NamedTuple):
-    """What the command line asks for."""
+    """Arguments and options of the command."""
 
     source: str
     assignments: tuple[str, ...]
@@ -40,16 +55,16 @@ class CheckRequest(NamedTuple):
 
     @property
     def is_folder(self) -> bool:
-        from sbafab.design.templates import template_names
+        from sbafab.design.files import template_names
 
         return self.source not in template_names() and Path(self.source).is_dir()
 
 
-class Told(NamedTuple):
-    """What was checked ("design" or "as-built"), its name, findings, notes, and the designs.
+class CheckOutcome(NamedTuple):
+    """Result of a check: ``kind`` is "design" or "as-built".
 
-    ``sizes``: those of each design by name, and in words. ``has_target``: the design itself asks
-    for a yield.
+    ``sizes`` and ``size_descriptions`` are by design; ``has_target`` is True if the design itself
+    sets ``rules.target_yield``.
     """
 
     kind: str
@@ -59,22 +74,22 @@ class Told(NamedTuple):
     notes: Sequence[str] = ()
     designs: Sequence[Design] = ()
     sizes: Mapping[str, Mapping[str, float]] = {}
-    sizes_said: Mapping[str, Sequence[str]] = {}
+    size_descriptions: Mapping[str, Sequence[str]] = {}
     has_target: bool = False
 
 
 @click.command()
 @click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs_or_folders)
 @set_option
-@waive_option("Take this rule's failure as accepted; cut files would say so. Repeatable.")
+@waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
 @click.option(
     "--target-yield",
     type=click.FloatRange(0, 1, min_open=True, max_open=True),
     metavar="SHARE",
-    help="Fail below this share of good random builds, and advise the least bond and overhang "
-    "that reach it, e.g. 0.99.",
+    help="Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest "
+    "bond and overhang that reach it.",
 )
-@click.option("-v", "--verbose", is_flag=True, help="All findings with their places and reasons.")
+@click.option("-v", "--verbose", is_flag=True, help="All findings, with places and reasons.")
 @click.option("--watch", is_flag=True, help="Check again whenever a file of the design changes.")
 @json_option
 def check(
@@ -86,166 +101,186 @@ def check(
     watch: bool,
     as_json: bool,
 ) -> None:
-    """Run the rules on a design or on a written folder.
+    """Run the rules on a design or on an output folder.
 
-    Nothing is written. FOLDER is one that sbafab generate has written: its files are read back as
-    they lie on disk.
+    Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
     """
-    asked = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
+    request = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
     if watch:
-        from sbafab.cli.watching import repeated
-
         if as_json:
-            raise click.UsageError("--watch is for people; leave out --json or --watch")
-        repeated(lambda: _checked(asked), Path(source))
-    elif _checked(asked):
+            raise click.UsageError("--watch and --json exclude each other; leave one out")
+        watch_source(lambda: _run_check(request), Path(source))
+    elif _run_check(request):
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _checked(asked: CheckRequest) -> bool:
-    """Checks once and prints what was found; whether a rule failed."""
-    from sbafab.cli.printing import print_json
-    from sbafab.output.checking import checks
+def _run_check(request: CheckRequest) -> bool:
+    """Check and print the outcome; return True if a rule failed."""
+    from sbafab.output.checked import checks
     from sbafab.rules.deck import has_failed
 
-    told = _of_folder(asked) if asked.is_folder else _of_source(asked)
-    advice = None if asked.target is None else _advice(asked, asked.target)
-    if asked.as_json:
-        advised = {"advice": advice.as_dict()} if advice else {}
-        found = checks(told.findings, told.kind, told.name, told.designs)
-        sized = {"sizes": told.sizes} if told.sizes else {}
-        print_json({**found, **sized, "notes": list(told.notes), **advised})
+    outcome = _check_folder(request) if request.is_folder else _check_source(request)
+    advice = None if request.target is None else _advice(request, request.target)
+    if request.as_json:
+        document = checks(outcome.findings, outcome.kind, outcome.name, outcome.designs)
+        if outcome.sizes:
+            document["sizes"] = outcome.sizes
+        document["notes"] = list(outcome.notes)
+        if advice:
+            document["advice"] = advice.as_dict()
+        print_json(document)
     else:
-        _print(told, advice, asked.verbose)
-    return has_failed(told.findings)
+        _print(outcome, advice, request.verbose)
+    return has_failed(outcome.findings)
 
 
-def _print(told: Told, advice: Advice | None, verbose: bool) -> None:
-    from rich.text import Text
+def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
+    """Print sizes, kit, notes and findings, and last the verdict."""
+    from sbafab.design.identity import cited
 
-    from sbafab.cli.lines import console, print_wrapped
-    from sbafab.cli.printing import FILES, print_failed, print_listed
-    from sbafab.cli.verdicts import print_findings, verdict_said
-    from sbafab.design.kits import cited
-
-    out = console()
-    if told.kind == "as-built":
-        out.print(f"as built: {told.name}", markup=False, soft_wrap=True)
-    for name, phrases in told.sizes_said.items():
-        print_listed(f"{name}, size" if len(told.sizes_said) > 1 else "size", phrases)
-    # The paper's kit is what everyone has; one's own is told of.
-    kits = [cited(design) for design in told.designs if verbose or design.kit != PAPER]
-    for said in dict.fromkeys(kits):
-        print_wrapped(said)
-    for note in told.notes:
+    if outcome.kind == "as-built":
+        print_line(f"as built: {outcome.name}")
+    for name, phrases in outcome.size_descriptions.items():
+        print_listed(f"{name}, size" if len(outcome.size_descriptions) > 1 else "size", phrases)
+    kits = [cited(design) for design in outcome.designs if verbose or design.kit != DEFAULT_KIT]
+    for line in dict.fromkeys(kits):
+        print_wrapped(line)
+    for note in outcome.notes:
         print_wrapped(f"note: {note}")
-    print_findings(told.groups, verbose)
+    print_findings(outcome.groups, verbose)
     if advice:
         print_wrapped(advice.sentence)
-    failed = {one.rule for one in told.findings if one.verdict == "fail"}
-    if advice and failed == {YIELD} and not told.has_target:
+    failed = {finding.rule for finding in outcome.findings if finding.verdict == "fail"}
+    if advice and failed == {YIELD_RULE} and not outcome.has_target:
         print_wrapped(
-            f"{told.name} misses the yield of {advice.target:g} that was asked for. Without that "
-            "target no rule fails, and it may be cut.",
+            f"{outcome.name} failed: yield below the requested {advice.target:g}. Without "
+            "--target-yield all rules pass, and it may be cut",
             "bold red",
         )
-        return
-    if failed:
-        change = FILES if told.kind == "as-built" else "design"
-        print_failed(told.findings, f"{told.name} must not be cut", change)
-        return
-    more = "" if verbose else "Details: -v"
-    out.print(Text(verdict_said(told.name, told.groups, more).strip(), style="bold"))
+    elif failed:
+        change = FILES if outcome.kind == "as-built" else "design"
+        print_failed(outcome.name, outcome.findings, "It must not be cut", change)
+    else:
+        print_passed(outcome.name, outcome.groups, "" if verbose else "-v")
 
 
-def _of_source(asked: CheckRequest) -> Told:
-    """What is found in a design or an assembly."""
+def _check_source(request: CheckRequest) -> CheckOutcome:
+    """Check a design or an assembly."""
     from sbafab.actuators import load_design
-    from sbafab.assemblies.loading import load
-    from sbafab.cli.printing import shown_progress
+    from sbafab.assemblies.files import load
     from sbafab.design.records import Design
-    from sbafab.errors import DesignError
+    from sbafab.output.job import check_job
 
-    found = load(asked.source, asked.assignments, asked.waivers)
-    with shown_progress(asked.as_json) as progress:
-        if not isinstance(found, Design):
-            if asked.target is not None:
+    source = load(request.source, request.assignments, request.waivers)
+    with shown_progress(request.as_json) as progress:
+        if not isinstance(source, Design):
+            if request.target is not None:
                 raise DesignError(
                     "--target-yield goes with a design, and this is an assembly; check its "
                     "parts' designs one by one"
                 )
-            return _of_assembly(found, progress)
-        has_target = found.rules.target_yield is not None
-        if asked.target is not None:
-            found = load_design(asked.source, _asking(asked, asked.target), asked.waivers)
-        return _of_design(found, progress)._replace(has_target=has_target)
+            return _outcome(check_job(source, progress=progress))
+        has_target = source.rules.target_yield is not None
+        if request.target is not None:
+            assignments = _with_target(request, request.target)
+            source = load_design(request.source, assignments, request.waivers)
+        return _outcome(check_job(source, progress=progress))._replace(has_target=has_target)
 
 
-def _of_design(design: Design, progress: Progress) -> Told:
-    """The findings and notes; what press and sheets cannot do is refused, as a run would do."""
-    from sbafab.output.checking import check as run_check
-    from sbafab.output.planned import Checked
+def _outcome(job: CheckedJob) -> CheckOutcome:
+    """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
+    from sbafab.models.formulas import size_phrases, sizes
+    from sbafab.output.checked import refuse_undoable
 
-    checked = Checked(design, *run_check(design, progress))
-    return _of_checked(design.name, checked.findings, [checked])
-
-
-def _of_assembly(assembly: Assembly, progress: Progress) -> Told:
-    """Those of its designs and between its parts, likewise."""
-    from sbafab.output.assembly import check_assembly
-
-    checked = check_assembly(assembly, progress)
-    return _of_checked(assembly.name, checked.findings, checked.designs, checked.between)
-
-
-def _of_checked(
-    name: str,
-    findings: Sequence[Finding],
-    checked: Sequence[Checked],
-    between: Sequence[Finding] | None = None,
-) -> Told:
-    from sbafab.cli.printing import notes_of
-    from sbafab.cli.verdicts import groups_of
-    from sbafab.models.sizes import size_said, sizes
-    from sbafab.output.checking import refuse_undoable
-    from sbafab.rules.deck import has_failed
-
-    if not has_failed(findings):
-        refuse_undoable(checked)
-    designs = [one.design for one in checked]
-    groups = groups_of(checked, between)
-    measured = {one.design.name: sizes(one.design, one.laminate) for one in checked}
-    said = {one.design.name: size_said(one.design, one.laminate) for one in checked}
-    return Told("design", name, findings, groups, notes_of(checked), designs, measured, said)
+    if not job.failed:
+        refuse_undoable(job.designs)
+    return CheckOutcome(
+        "design",
+        job.name,
+        job.findings,
+        groups_of(job.designs, job.between),
+        notes_of(job.designs),
+        [each.design for each in job.designs],
+        {each.design.name: sizes(each.design, each.laminate) for each in job.designs},
+        {each.design.name: size_phrases(each.design, each.laminate) for each in job.designs},
+    )
 
 
-def _advice(asked: CheckRequest, target: float) -> Advice:
+def _advice(request: CheckRequest, target: float) -> Advice:
+    """Return the advice on bond and overhang for a target yield."""
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import shown_progress
     from sbafab.output.advice import advise
 
-    with shown_progress(asked.as_json) as tell:
-        return advise(load_design(asked.source, _asking(asked, target)), target, tell)
+    with shown_progress(request.as_json) as progress:
+        return advise(load_design(request.source, _with_target(request, target)), target, progress)
 
 
-def _asking(asked: CheckRequest, target: float) -> tuple[str, ...]:
-    return (*asked.assignments, f"rules.target_yield={target}")
+def _with_target(request: CheckRequest, target: float) -> tuple[str, ...]:
+    return (*request.assignments, f"rules.target_yield={target}")
 
 
-def _of_folder(asked: CheckRequest) -> Told:
-    """What is found in the files of an output folder."""
+def _check_folder(request: CheckRequest) -> CheckOutcome:
+    """Check the files of an output folder."""
     import logging
 
-    from sbafab.as_built.check import check_folder
-    from sbafab.cli.verdicts import Group
-    from sbafab.errors import DesignError
+    from sbafab.cli.printing import Group
+    from sbafab.runs.check_folder import check_folder
 
-    if asked.assignments or asked.waivers or asked.target is not None:
+    if request.assignments or request.waivers or request.target is not None:
         raise DesignError(
-            "--set, --waive and --target-yield go with a design; a folder is checked as it lies, "
-            "so leave them out"
+            "--set, --waive and --target-yield go with a design; leave them out to check a folder"
         )
-    # A broken file is told of in a finding; what ezdxf logs of it would stand in between.
+    # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    findings = check_folder(Path(asked.source))
-    return Told("as-built", asked.source, findings, [Group(asked.source, findings)])
+    findings = check_folder(Path(request.source))
+    return CheckOutcome("as-built", request.source, findings, [Group(request.source, findings)])
+
+
+# Checking again after every change of a file, until Ctrl-C.
+
+
+WATCHED_SUFFIXES = (".toml", ".dxf", ".svg")
+"""Files of a design: its own, a kit, drawings, the designs of an assembly."""
+POLL_SECONDS = 0.4
+"""Polling works on every file system; notifications of changes do not."""
+
+FileStates = dict[Path, tuple[int, int]]
+
+
+def watch_source(action: Callable[[], object], source: Path, polls: int | None = None) -> None:
+    """Call ``action`` now and after every change in the folder of ``source``.
+
+    Errors of the design are printed. ``polls`` limits the number of polls (None: no limit).
+    """
+    previous: FileStates | None = None
+    while polls is None or polls > 0:
+        current = file_states(source)
+        if current != previous:
+            previous = current
+            click.echo(f"{datetime.now():%H:%M:%S}  watching {source}; Ctrl-C stops")
+            try:
+                action()
+            except SbafabError as error:
+                print_error(str(error))
+        polls = None if polls is None else polls - 1
+        time.sleep(POLL_SECONDS)
+
+
+def file_states(source: Path) -> FileStates:
+    """Return time, ns, and size, bytes, of every file that the source may consist of."""
+    states: FileStates = {}
+    for path in _watched_files(source):
+        # A file that an editor is replacing is there again at the next poll.
+        with suppress(OSError):
+            state = path.stat()
+            states[path] = state.st_mtime_ns, state.st_size
+    return states
+
+
+def _watched_files(source: Path) -> Iterator[Path]:
+    if source.is_dir():
+        yield from (path for path in source.rglob("*") if path.is_file())
+    elif source.parent.is_dir():
+        yield from (
+            path for path in source.parent.iterdir() if path.suffix.lower() in WATCHED_SUFFIXES
+        )

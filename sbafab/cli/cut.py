@@ -1,4 +1,4 @@
-"""``sbafab cut``: the cut files only."""
+"""``sbafab cut``: the cut files alone."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import run_parts
+from sbafab.cli.run import run_parts
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
 
 
 @click.command()
@@ -18,5 +18,5 @@ if TYPE_CHECKING:
 @dxf_options
 @sheet_options
 def cut(request: Request, curves: Curves) -> None:
-    """Write the cut files: a DXF a layer, and film sheets."""
+    """Write the cut files: a DXF for each layer, and film sheets."""
     run_parts(request, ("cut",), curves)

@@ -1,40 +1,40 @@
-"""``sbafab explain``: what a rule asks, why, and what to change."""
+"""``sbafab explain``: a rule's criterion, its reason and its remedy."""
 
 from __future__ import annotations
 
 import click
 
-from sbafab.cli.completing import rules
 from sbafab.cli.options import json_option
+from sbafab.cli.options import rules as rule_names
+from sbafab.cli.printing import print_facts, print_json
 
 
 @click.command()
-@click.argument("rule", required=False, shell_complete=rules)
+@click.argument("rule", required=False, shell_complete=rule_names)
 @json_option
 def explain(rule: str | None, as_json: bool) -> None:
-    """Say what a rule asks, why, and what to change.
+    """Explain a rule: criterion, reason, remedy.
 
-    Without RULE: a line for every rule and check.
+    Without RULE: list all rules and checks, a line each.
     """
-    from sbafab.cli.printing import print_json
-    from sbafab.output.printed import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
+    from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
     from sbafab.rules.explained import EXPLAINED
 
     if rule is None:
         if as_json:
-            every = {name: one._asdict() for name, one in EXPLAINED.items()}
-            print_json({"schema": EXPLAINED_SCHEMA, "rules": every})
+            rules = {name: explanation._asdict() for name, explanation in EXPLAINED.items()}
+            print_json({"schema": EXPLAINED_SCHEMA, "rules": rules})
             return
         width = max(map(len, EXPLAINED))
-        for name, one in EXPLAINED.items():
-            click.echo(f"{name:<{width}}  {one.holds}")
+        for name, explanation in EXPLAINED.items():
+            click.echo(f"{name:<{width}}  {explanation.holds}")
         return
     if rule not in EXPLAINED:
         import difflib
 
         near = difflib.get_close_matches(rule, EXPLAINED, 1)
-        hint = f"did you mean {near[0]}?" if near else "sbafab explain lists them"
-        raise click.BadParameter(f"{rule!r} is no rule; {hint}", param_hint="RULE")
+        hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
+        raise click.BadParameter(f"{rule!r} is not a rule; {hint}", param_hint="RULE")
     if as_json:
         print_json({"schema": EXPLAIN_SCHEMA, "rule": rule, **EXPLAINED[rule]._asdict()})
         return
@@ -42,19 +42,15 @@ def explain(rule: str | None, as_json: bool) -> None:
 
 
 def _print(rule: str) -> None:
-    from rich.text import Text
-
-    from sbafab.cli.lines import console, facts_table
     from sbafab.rules.explained import EXPLAINED
 
-    one = EXPLAINED[rule]
-    table = facts_table()
-    for label, said in (
-        ("rule", rule),
-        ("holds when", one.holds),
-        ("because", one.why),
-        ("if it fails", one.mend),
-        ("keys", ", ".join(one.keys) or "none"),
-    ):
-        table.add_row(label, Text(said))
-    console().print(table)
+    explanation = EXPLAINED[rule]
+    print_facts(
+        (
+            ("rule", rule),
+            ("passes when", explanation.holds),
+            ("because", explanation.why),
+            ("if it fails", explanation.mend),
+            ("keys", ", ".join(explanation.keys) or "none"),
+        )
+    )

@@ -1,29 +1,33 @@
-"""``sbafab find``: requirements in, a design file out that generates and passes."""
+"""``sbafab find``: the search for a design that meets requirements."""
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import json_option, set_option
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED, print_error
+from sbafab.cli.options import json_option, refuse_options, set_option
+from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
+from sbafab.cli.progress import shown_progress
+from sbafab.errors import DesignError
 from sbafab.search.quantity_names import quantity_lines
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sbafab.progress import Progress
+    from sbafab.process import Progress
     from sbafab.search.find import FindRequest, FoundDesign
-    from sbafab.search.requirements import Goal, Requirement
-
+    from sbafab.search.quantities import RequestedQuantity
+    from sbafab.search.trial import Goal, Requirement, Trial
 
 HELP = """Find the best design that meets requirements.
 
-Without DESIGN it starts from every family. Exit code 1 where nothing meets all: then the nearest
-miss is shown and no file written. A quantity may name its pressure P and height H with units, such
-as force@12.5mm@50kPa:
+Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
+miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
+height H with units, such as force@12.5mm@50kPa:
 
 \b
 {quantities}
@@ -31,7 +35,7 @@ as force@12.5mm@50kPa:
 
 
 def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
-    """Gives a command its help, which lists every quantity with its unit."""
+    """Set the help text of a command, with all quantities and their units."""
     command.__doc__ = HELP.format(quantities=quantity_lines())
     return command
 
@@ -57,31 +61,31 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     default="mass",
     show_default=True,
     metavar="QUANTITY",
-    help="Of what meets all: the most stroke, bend, force, yield or lumen, or the least of "
-    "another.",
+    help="Goal among the designs that meet all: largest stroke, bend, force, yield or lumen, or "
+    "smallest of another quantity.",
 )
 @click.option(
     "--free",
     metavar="KEY=LOW:HIGH:STEP",
     multiple=True,
-    help="Let this key change, beside those of its family, or in this range. Repeatable.",
+    help="Vary this key as well as those of the family, or set its range. Repeatable.",
 )
 @click.option(
     "--fix",
     "fixed",
     metavar="KEY",
     multiple=True,
-    help="Leave this key as it is, like one named by --set. Repeatable.",
+    help="Do not vary this key; keys of --set are not varied either. Repeatable.",
 )
 @click.option(
     "--tries", type=click.IntRange(4, 100_000), default=240, show_default=True, metavar="N",
-    help="Designs that are tried at most, of each family.",
+    help="Largest number of designs to try, for each family.",
 )  # fmt: skip
 @click.option("--optuna", is_flag=True, help='Search with Optuna (pip install "sbafab[optuna]").')
 @click.option(
     "--storage",
     metavar="URL",
-    help="Optuna's database, in which the search goes on, e.g. sqlite:///search.db.",
+    help="Database of Optuna, to resume the search from, e.g. sqlite:///search.db.",
 )
 @click.option(
     "-o",
@@ -90,95 +94,105 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     default=Path(),
     show_default="this folder",
     metavar="OUT",
-    help="Folder that receives found.toml, or a file that ends in .toml; its stem names the "
-    "design.",
+    help="Folder in which found.toml is written.",
+)
+@click.option(
+    "--to",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write FILE, which ends in .toml, instead of found.toml; its stem names the design.",
 )
 @set_option
 @json_option
 @_with_quantities
-def find(source: str | None, **asked: Any) -> None:
-    from sbafab.cli.ending import say
-    from sbafab.cli.printing import print_json, shown_progress
-    from sbafab.cli.printing_find import as_json, print_found
-    from sbafab.design.templates import name_of
-    from sbafab.search.design_file import found_file, found_toml, write_found
+def find(source: str | None, **options: Any) -> None:
+    from sbafab.design.files import name_of
+    from sbafab.search.find import found_file, found_toml, write_found
 
-    if asked["storage"] is not None and not asked["optuna"]:
+    if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
-    requests = _requests(source, asked)
-    target = found_file(asked["out"])
+    requests = _requests(source, options)
+    target = found_file(_file_or_folder(options["to"], options["out"]))
     try:
-        with shown_progress(asked["as_json"]) as tell:
-            started, found = _found(requests, tell)
+        with shown_progress(options["as_json"]) as progress:
+            origin, result = _best_result(requests, progress)
     except KeyboardInterrupt:
-        kept = "; the same command goes on in its storage" if asked["storage"] else ""
-        say(f"the search was stopped, and no file was written{kept}")
+        resume = "; run the same command again to resume it" if options["storage"] else ""
+        print_error(f"the search was stopped, and no file was written{resume}")
         raise
-    if found.holds:
+    if result.holds:
         write_found(
-            found_toml(started, asked["assignments"], name_of(target) or started, found), target
+            found_toml(origin, options["assignments"], name_of(target) or origin, result), target
         )
-    if asked["as_json"]:
-        print_json(as_json(found, started, target))
+    if options["as_json"]:
+        print_json(as_json(result, origin, target))
     else:
-        print_found(found, started, target)
-    if not found.holds:
+        print_result(result, origin, target)
+    if not result.holds:
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _requests(source: str | None, asked: dict[str, Any]) -> dict[str, FindRequest]:
-    """What is looked for, by the design to start from: the one that is named, or one a family.
+def _file_or_folder(to: Path | None, out: Path) -> Path:
+    """Return the file of --to, or -o, which until version 0.2 may still be a file."""
+    if to is None:
+        return out
+    refuse_options("names a folder and --to a file; leave one out", "out")
+    if to.suffix.lower() != ".toml":
+        raise click.BadParameter(f"{to} must end in .toml", param_hint="--to")
+    return to
 
-    A family that cannot be asked for it is left out. Raises DesignError where none can.
+
+def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequest]:
+    """Return the searches by the design to start from: ``source``, or a template of each family.
+
+    Families without the requested quantities are left out. Raises DesignError if none remains.
     """
-    from sbafab.errors import DesignError
-    from sbafab.search.requirements import read_all
+    from sbafab.search.trial import read_all
 
-    requirements, goal = read_all(asked["least"], asked["most"], asked["best"])
-    found: dict[str, FindRequest] = {}
+    requirements, goal = read_all(options["least"], options["most"], options["best"])
+    requests: dict[str, FindRequest] = {}
     problems: list[str] = []
-    for name in [source] if source else _one_of_each_family():
+    for name in [source] if source else _family_templates():
         try:
-            found[name] = _request(name, requirements, goal, asked)
+            requests[name] = _request(name, requirements, goal, options)
         except DesignError as error:
             problems.append(str(error))
-    if not found:
+    if not requests:
         raise DesignError("; ".join(dict.fromkeys(problems)))
-    return found
+    return requests
 
 
 def _request(
-    name: str, requirements: tuple[Requirement, ...], goal: Goal, asked: dict[str, Any]
+    name: str, requirements: tuple[Requirement, ...], goal: Goal, options: dict[str, Any]
 ) -> FindRequest:
     from sbafab.actuators import load_design
-    from sbafab.design.reading import changed_keys
+    from sbafab.design.files import changed_keys
     from sbafab.search.find import FindRequest, free_keys
-    from sbafab.search.free import read_free
+    from sbafab.search.vary import read_free
 
-    assignments = asked["assignments"]
+    assignments = options["assignments"]
     design = load_design(name, assignments)
-    free = read_free(design, asked["free"], asked["fixed"], tuple(changed_keys(assignments)))
+    free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assignments)))
     request = FindRequest(
-        design, requirements, goal, free, asked["tries"], asked["optuna"], asked["storage"]
+        design, requirements, goal, free, options["tries"], options["optuna"], options["storage"]
     )
-    free_keys(request)
+    free_keys(request)  # raises DesignError for keys that cannot vary
     return request
 
 
-def _found(requests: dict[str, FindRequest], tell: Progress) -> tuple[str, FoundDesign]:
-    """The best of what is found, and the name of the design that it started from."""
-    from sbafab.errors import DesignError
+def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
+    """Run the searches; return the best result and the design that it started from."""
     from sbafab.search.find import find as search
 
     results: list[tuple[str, FoundDesign]] = []
     problems = []
     for number, (name, request) in enumerate(requests.items()):
 
-        def told(what: str, done: int, total: int, before: int = number) -> None:
-            tell(what, before * total + done, len(requests) * total)
+        def report(stage: str, done: int, total: int, searched: int = number) -> None:
+            progress(stage, searched * total + done, len(requests) * total)
 
         try:
-            results.append((name, search(request, told)))
+            results.append((name, search(request, report)))
         except DesignError as error:
             problems.append(str(error))
     if not results:
@@ -186,15 +200,168 @@ def _found(requests: dict[str, FindRequest], tell: Progress) -> tuple[str, Found
     return min(results, key=lambda result: result[1].best.rank)
 
 
-def _one_of_each_family() -> list[str]:
+def _family_templates() -> list[str]:
+    """Return the first template of each family."""
     from sbafab.actuators import load_design
-    from sbafab.design.templates import template_names
-    from sbafab.errors import DesignError
+    from sbafab.design.files import template_names
 
-    found: dict[type, str] = {}
+    templates: dict[type, str] = {}
     for name in template_names():
         try:
-            found.setdefault(type(load_design(name)), name)
+            templates.setdefault(type(load_design(name)), name)
         except DesignError:
             continue
-    return list(found.values())
+    return list(templates.values())
+
+
+# Printing of a result, and its JSON.
+
+
+TABS_HINT = (
+    "overall_diameter includes the inlet tabs: use outline_diameter if they may stand out, or add "
+    "--free inlet.tab_length=3:5:0.5"
+)
+
+
+def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
+    """Return a result as JSON."""
+    from sbafab.output.schema_ids import FIND_SCHEMA
+
+    def trial_json(trial: Trial) -> dict[str, Any]:
+        return {"keys": dict(trial.values), "figures": dict(trial.figures)}
+
+    return {
+        "schema": FIND_SCHEMA,
+        "holds": result.holds,
+        "file": str(target) if result.holds else None,
+        "started_from": origin,
+        "tries": result.tries,
+        "is_cut_short": result.is_cut_short,
+        "best": trial_json(result.best),
+        "full_stroke": result.full_stroke,
+        "measured": {name: row.as_dict() for name, row in result.measured.items()},
+        "missed": result.missed,
+        "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in result.binds],
+        "range_ends": [
+            {"key": end.key, "value": end.value, "low": end.low, "high": end.high}
+            for end in result.ends
+        ],
+        "without_room": [
+            {"rule": s.rule, "measured": s.measured, "unit": s.unit, "place": s.place}
+            for s in result.without_room
+        ],
+        "front": [trial_json(trial) for trial in result.front],
+        "on_front": result.on_front,
+    }
+
+
+def print_result(result: FoundDesign, origin: str, target: Path) -> None:
+    """Print the design with its figures, what binds and the front; or the nearest miss."""
+    from sbafab.search.trial import keys_said, value_said
+
+    keys = keys_said(result.best.values)
+    title = "Best design" if result.holds else "Nearest miss"
+    print_line(f"{title}: {keys}, from {origin}", "bold" if result.holds else "bold red")
+    _print_quantities(result)
+    for rule in result.broken_rules:
+        print_line(f"  {rule}")
+    if result.binds or result.ends or (result.holds and result.without_room):
+        print_line("Binding limits", "bold")
+    for bind in result.binds:
+        print_line(f"  {bind.key} = {value_said(bind.value)}: {bind.breaks}")
+    _print_ends(result)
+    if not result.holds:
+        _print_miss(result)
+        return
+    for spare in result.without_room:
+        print_line(f"  {spare.rule} {spare.place}: {spare.measured:g} {spare.unit}, at its limit")
+    _print_front(result)
+    _print_more_tries(result)
+    count = _counted_requirements(result)
+    print_verdict(f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}")
+
+
+def _counted_requirements(result: FoundDesign) -> str:
+    count = len(result.problem.requirements)
+    return (
+        "the requirement" if count == 1 else f"all {count} requirements" if count else "all rules"
+    )
+
+
+def _print_quantities(result: FoundDesign) -> None:
+    """Print the required quantities and the goal of the best design."""
+    from sbafab.search.quantities import shown_value
+
+    requirements = result.problem.requirements
+    for requirement in requirements:
+        value = result.best.value(requirement)
+        figure = f"  {requirement.quantity.label} {shown_value(requirement.quantity, value)}"
+        is_met = requirement.holds(value)
+        print_line(f"{figure}; {requirement.bound}{'' if is_met else ': MISSED'}")
+        _print_measured(result, requirement.quantity)
+    goal = result.problem.goal
+    label = goal.label if result.holds else goal.quantity.label
+    print_line(f"  {label}: {shown_value(goal.quantity, result.best.value(goal))}")
+    if goal.quantity.label not in [requirement.quantity.label for requirement in requirements]:
+        _print_measured(result, goal.quantity)
+    strokes = [quantity for quantity in result.problem.quantities if quantity.name == "stroke"]
+    is_full = any(quantity.is_full_stroke for quantity in strokes)
+    if strokes and not is_full and result.full_stroke is not None:
+        print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
+
+
+def _print_measured(result: FoundDesign, quantity: RequestedQuantity) -> None:
+    measured = result.measured.get(quantity.label)
+    if measured is not None:
+        print_wrapped(f"({measured.sentence()})", indent="    ")
+
+
+def _print_more_tries(result: FoundDesign) -> None:
+    if result.is_cut_short:
+        more = 2 * result.tries
+        print_line(f"All {result.tries} tries were used; --tries {more} may find a better design")
+
+
+def _print_ends(result: FoundDesign) -> None:
+    for end in result.ends:
+        span = end.high - end.low
+        low, high = end.low, end.high + span
+        if end.value <= end.low:
+            low, high = max(end.step, end.low - span), end.high
+        print_line(
+            f"  {end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
+            f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
+        )
+
+
+def _print_miss(result: FoundDesign) -> None:
+    """Print hints and the verdict of a search without success."""
+    missed = {
+        requirement.quantity.name
+        for requirement in result.problem.requirements
+        if not requirement.holds(result.best.value(requirement))
+    }
+    is_free = any(free.key == "inlet.tab_length" for free in result.free)
+    if "overall_diameter" in missed and not is_free:
+        print_line(TABS_HINT)
+    _print_more_tries(result)
+    print_line(
+        f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
+        "written. Relax a requirement, or vary more keys with --free KEY=LOW:HIGH:STEP",
+        "bold red",
+    )
+
+
+def _print_front(result: FoundDesign) -> None:
+    """Print the Pareto front, if it has several designs."""
+    from sbafab.search.trial import keys_said
+
+    if len(result.front) < 2:
+        return
+    part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""
+    print_line(f"Pareto front, {part}{result.on_front} of the {result.tries} designs tried", "bold")
+    for trial in result.front:
+        figures = ", ".join(f"{name} {value:.4g}" for name, value in trial.figures.items())
+        print_line(f"  {keys_said(trial.values)}: {figures}")
+    for name, measured in result.measured.items():
+        print_wrapped(f"({name}: {measured.sentence()})", indent="    ")

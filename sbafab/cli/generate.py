@@ -1,59 +1,62 @@
-"""``sbafab generate``: everything."""
+"""``sbafab generate``: every file of a design or an assembly."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.working import run_design, tell
+from sbafab.cli.printing import console, facts_table, print_line
+from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_request
 
 if TYPE_CHECKING:
-    from sbafab.assemblies.records import Assembly
-    from sbafab.cutting.dxf_write import Curves
-    from sbafab.laminate.laminate import Laminate
+    from rich.table import Table
+
+    from sbafab.cutting.properties import Curves
+    from sbafab.runs.run import Run
 
 
 @click.command()
 @run_options
 @dxf_options
 @sheet_options
-@click.option("--decks", is_flag=True, help="Write what each simulator reads, too.")
+@click.option("--decks", is_flag=True, help="Also write the input files of the simulators.")
 def generate(request: Request, curves: Curves, decks: bool) -> None:
     """Write everything: cut files, schedule, traveller, meshes.
 
-    With --decks also calculix/, sofa/ and mujoco/, as `sbafab simulate --export` writes them.
-    An assembly gets a folder for each of its designs, and sheets, traveller and solid of the whole.
+    --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
+    has a folder for each of its designs, and sheets, a traveller and a solid of the whole.
     """
-    from sbafab.assemblies.loading import load
+    from sbafab.assemblies.files import load
     from sbafab.design.records import Design
-    from sbafab.output.planned import EVERYTHING
-    from sbafab.output.run import Extras
+    from sbafab.output.checked import EVERYTHING
+    from sbafab.runs.run import RunRequest
+    from sbafab.simulators.simulator import NAMES
 
-    found = load(request.designs[0], request.assignments, request.waivers)
-    if not isinstance(found, Design):
-        if decks:
-            raise click.UsageError("--decks goes with one design; leave it out for an assembly")
-        _generate_assembly(found, request, curves)
-        return
-    extras = Extras(also=_write_decks) if decks else None
-    run_design(found, request, EVERYTHING, curves, extras)
-
-
-def _generate_assembly(assembly: Assembly, request: Request, curves: Curves) -> None:
-    from sbafab.cli.printing import run_json, shown_progress
-    from sbafab.cli.printing_assembly import print_assembly
-    from sbafab.output.assembly import generate_assembly
-
-    with shown_progress(request.as_json) as progress:
-        run = generate_assembly(assembly, request.out, progress, curves)
-    tell(run, request, run_json, print_assembly)
+    source = load(request.designs[0], request.assignments, request.waivers)
+    if decks and not isinstance(source, Design):
+        raise click.UsageError("--decks goes with one design; leave it out for an assembly")
+    parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
+    show = print_run if isinstance(source, Design) else print_assembly
+    run_request(RunRequest(source, request.out, parts, curves), request, show)
 
 
-def _write_decks(laminate: Laminate, folder: Path) -> None:
-    from sbafab.output.decks import write_decks
+def print_assembly(run: Run) -> None:
+    """Print the table of an assembly's files and the verdict, checks between parts included."""
+    if not run.kept:
+        console().print(_assembly_table(run))
+        print_line("")
+    print_run_verdict(run, "assembly")
 
-    for name, why in write_decks(laminate, folder):
-        click.echo(f"sbafab: nothing for {name}: {why}", err=True)
+
+def _assembly_table(run: Run) -> Table:
+    from rich.text import Text
+
+    table = facts_table()
+    index = run.manifest
+    parts = (f"{p['name']} ({p['design'] or p['kind']})" for p in index["parts"])
+    table.add_row("assembly", Text(f"{index['name']}, {index['design_sha256'][:12]}"))
+    table.add_row("parts", Text(", ".join(parts)))
+    add_batch(table, run)
+    return table

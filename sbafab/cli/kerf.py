@@ -1,4 +1,4 @@
-"""``sbafab kerf``: the kerf from what was measured on the coupon."""
+"""``sbafab kerf``: the kerf from measurements of the coupon."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import finite, json_option
+from sbafab.cli.printing import print_json, print_verdict
+from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,25 +25,25 @@ if TYPE_CHECKING:
     default="tpe",
     show_default=True,
     metavar="FILM",
-    help="The film that the coupon was cut from: tpe, ptfe or a further one of a kit.",
+    help="Film of the coupon: tpe, ptfe or another film of a kit.",
 )
 @click.option(
     "--instrument",
     type=click.Choice(["calliper", "scanner", "microscope"]),
-    help="What the sizes were measured with, unless a column of that name says so.",
+    help="Instrument of the measurements, unless the table has a column of that name.",
 )
 @click.option(
     "--resolution",
     type=click.FloatRange(0, 1),
     callback=finite,
     metavar="MM",
-    help="The least step that the instrument shows.  [default: calliper 0.01, scanner 0.0106 (2400 "
+    help="Resolution of the instrument.  [default: calliper 0.01, scanner 0.0106 (2400 "
     "dpi), microscope 0.001]",
 )
 @click.option(
     "--split-xy/--no-split-xy",
     default=None,
-    help="Give the kerf along x and along y apart, or as one.  [default: apart where they differ]",
+    help="Compute two kerfs, along x and along y, or one.  [default: two if they differ]",
 )
 @json_option
 def kerf(
@@ -54,62 +56,74 @@ def kerf(
 ) -> None:
     """Compute the kerf from a filled coupon.csv.
 
-    `sbafab new coupon` writes the piece to cut and the table to fill in. A scan or a microscope
-    reads thin film better than a calliper, which bends it. A constant reading error and a scale are
-    told apart from kerf.
+    `sbafab new coupon` writes the piece to cut and the table to fill in. Measure thin film with a
+    scanner or a microscope rather than a calliper, which bends it. A constant reading error and a
+    scale error are separated from the kerf.
     """
-    from sbafab.cli.printing import print_json
-    from sbafab.cutting.calibration import calibrated
-    from sbafab.cutting.measured_table import read_measurements
-    from sbafab.errors import DesignError
-    from sbafab.output.printed import KERF_SCHEMA
+    from sbafab.cutting.calibration import calibrated, read_measurements
+    from sbafab.output.schema_ids import KERF_SCHEMA
 
     sizes = read_measurements(measurements, instrument or "")
-    found = calibrated(sizes, resolution)
-    if split_xy and (found.x is None or found.y is None):
+    calibration = calibrated(sizes, resolution)
+    if split_xy and (calibration.x is None or calibration.y is None):
         raise DesignError("--split-xy needs two sizes along x and two along y; fill in more rows")
-    widths = _widths(found, split_xy)
-    warnings = _warnings(found, widths)
-    remarks = [_remark(found, widths), *_readings(found.overall), *_touched(sizes)]
-    block = _to_paste(*_place_in_design(material), widths, warnings)
+    widths = _widths(calibration, split_xy)
+    warnings = _warnings(calibration, widths)
+    remarks = [
+        _remark(calibration, widths),
+        *_offset_remarks(calibration.overall),
+        *_contact_remark(sizes),
+    ]
+    block = _toml_block(*_place_in_design(material), widths, warnings)
     if as_json:
         print_json(
             {
                 "schema": KERF_SCHEMA,
-                "all": _as_dict(found.overall),
-                "x": _as_dict(found.x),
-                "y": _as_dict(found.y),
-                "difference": found.difference and found.difference._asdict(),
-                "differs": found.differs,
+                "all": _as_dict(calibration.overall),
+                "x": _as_dict(calibration.x),
+                "y": _as_dict(calibration.y),
+                "difference": calibration.difference and calibration.difference._asdict(),
+                "differs": calibration.differs,
                 "warnings": warnings,
                 "remarks": remarks,
                 "toml": block,
             }
         )
         return
-    for name, estimate in (("all", found.overall), ("along x", found.x), ("along y", found.y)):
+    for name, estimate in (
+        ("all", calibration.overall),
+        ("along x", calibration.x),
+        ("along y", calibration.y),
+    ):
         if estimate is not None:
-            click.echo(f"{name:8} kerf {_told(estimate.kerf)}, from {estimate.count} sizes")
+            click.echo(
+                f"{name:8} kerf {_with_interval(estimate.kerf)}, from {estimate.count} sizes"
+            )
     for remark in remarks:
         click.echo(remark)
     for warning in warnings:
         click.echo(f"warning: {warning}")
-    click.echo(
-        f"\n{'Mind the warning before you paste' if warnings else 'Paste into the design file'}:"
-    )
-    click.echo(f"\n{block.rstrip()}")
+    read_first = "Read the warnings before you paste" if warnings else "Paste into the design file"
+    click.echo(f"\n{read_first}:\n\n{block}")
+    values = ", ".join(f"{estimate.kerf.value:.3f}" for estimate in widths)
+    count = f", {len(warnings)} warning{'s' if len(warnings) > 1 else ''}" if warnings else ""
+    # A comment, so that all from the table on may be pasted.
+    print_verdict(f"# {material} kerf: {values} mm from {calibration.overall.count} sizes{count}")
 
 
 def _film(name: str) -> str:
+    """Return the name of a film; raises BadParameter for one that no film can have."""
     from sbafab.design.films import FILM_NAME
 
     if not FILM_NAME.fullmatch(name):
-        raise click.BadParameter(f"{name!r} names no film; give tpe, ptfe or another's table")
+        raise click.BadParameter(
+            f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
+        )
     return name
 
 
 def _place_in_design(film: str) -> tuple[str, str]:
-    """Table and key of a film's kerf."""
+    """Return table and key of a film's kerf in a design file."""
     return ("[laser]", f"kerf_{film}") if film in ("tpe", "ptfe") else (f"[films.{film}]", "kerf")
 
 
@@ -126,26 +140,26 @@ def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:
 
 
 Widths = tuple["Estimate"] | tuple["Estimate", "Estimate"]
-"""What is pasted: the kerf, or those along x and along y."""
+"""The kerf, or those along x and along y."""
 
 
-def _widths(found: Calibration, split_xy: bool | None) -> Widths:
-    """A pair where it was asked for, or where x and y differ and nothing was asked."""
-    is_split = found.differs if split_xy is None else split_xy
-    if is_split and found.x is not None and found.y is not None:
-        return found.x, found.y
-    return (found.overall,)
+def _widths(calibration: Calibration, split_xy: bool | None) -> Widths:
+    """Return a pair if ``split_xy``, or if it is None and x and y differ; else the common kerf."""
+    is_split = calibration.differs if split_xy is None else split_xy
+    if is_split and calibration.x is not None and calibration.y is not None:
+        return calibration.x, calibration.y
+    return (calibration.overall,)
 
 
-def _to_paste(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
-    """The lines for the design file; doubt goes with them, so that no bare value is pasted."""
+def _toml_block(table: str, key: str, widths: Widths, warnings: list[str]) -> str:
+    """Return the lines for the design file, with the warnings as comments."""
     values = [f"{estimate.kerf.value:.3f}" for estimate in widths]
     value = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
     doubts = "".join(f"# warning: {warning}\n" for warning in warnings)
     return f"{table}\n{doubts}{key} = {value}\n"
 
 
-def _told(value: Value, unit: str = " mm") -> str:
+def _with_interval(value: Value, unit: str = " mm") -> str:
     low, high = value.interval
     return (
         f"{value.value:.4f}{unit}, standard uncertainty {value.uncertainty:.4f}, "
@@ -153,92 +167,94 @@ def _told(value: Value, unit: str = " mm") -> str:
     )
 
 
-def _remark(found: Calibration, widths: Widths) -> str:
-    if found.difference is None:
-        return "x and y cannot be told apart: measure two sizes along each"
-    if not found.differs:
+def _remark(calibration: Calibration, widths: Widths) -> str:
+    if calibration.difference is None:
+        return "x and y cannot be compared: measure two sizes along each"
+    if not calibration.differs:
         return "x and y do not differ significantly"
-    advice = "" if len(widths) == 2 else ", which one kerf for both does not correct"
-    return f"x and y differ by {_told(found.difference)}{advice}"
+    advice = "" if len(widths) == 2 else "; a common kerf does not correct this"
+    return f"x and y differ by {_with_interval(calibration.difference)}{advice}"
 
 
-def _warnings(found: Calibration, widths: Widths) -> list[str]:
-    """What speaks against cutting with these widths, a sentence each."""
+def _warnings(calibration: Calibration, widths: Widths) -> list[str]:
+    """Return sentences on doubts about these widths."""
     from sbafab.design.films import is_kerf
 
     places = ("",) if len(widths) == 1 else (" along x", " along y")
-    told = [
-        _vague(estimate, place)
+    warnings = [
+        _interval_warning(estimate, place)
         for estimate, place in zip(widths, places, strict=True)
         if estimate.is_vague
     ]
     if not is_kerf(widths[0].kerf.value, widths[-1].kerf.value):
-        told.append(
-            "a design takes no pair of which one is over ten times the other; measure again, or "
-            "take --no-split-xy"
+        warnings.append(
+            "one kerf is over ten times the other, which no design may have; measure again, or use "
+            "--no-split-xy"
         )
-    return [*told, *_not_told(found, widths), *_off_scale(found)]
+    return [*warnings, *_offset_warning(calibration, widths), *_scale_warnings(calibration)]
 
 
-def _vague(estimate: Estimate, place: str) -> str:
+def _interval_warning(estimate: Estimate, place: str) -> str:
     low, high = estimate.kerf.interval
-    why = "may be none" if low <= 0 else "is not known well enough"
+    why = "may be zero" if low <= 0 else "is too uncertain"
     return (
         f"the kerf{place} {why}: its 95 % interval is {low:.3f} to {high:.3f} mm from "
-        f"{estimate.count} sizes; measure more sizes, or each again, before you cut with it"
+        f"{estimate.count} sizes; measure more sizes, or repeat each, before you cut with it"
     )
 
 
-def _not_told(found: Calibration, widths: Widths) -> list[str]:
-    """What these sizes cannot tell from kerf."""
+def _offset_warning(calibration: Calibration, widths: Widths) -> list[str]:
+    """Return a warning if the sizes do not separate a constant reading error from the kerf."""
     if all(estimate.offsets for estimate in widths):
         return []
     along = " along each axis" if len(widths) == 2 else ""
     return [
-        f"these sizes cannot tell a constant reading error from kerf, which is taken to be none; "
+        f"a constant reading error cannot be separated from the kerf and is assumed to be zero; "
         f"measure outsides and windows, three sizes or more{along}"
     ]
 
 
-def _off_scale(found: Calibration) -> list[str]:
-    """What sizes that scale may come of: along x or y where one of them tells, else both."""
-    axes = [(" along x", found.x), (" along y", found.y)]
+def _scale_warnings(calibration: Calibration) -> list[str]:
+    """Return warnings of a scale error: along x or y if it is significant there, else overall."""
+    axes = [(" along x", calibration.x), (" along y", calibration.y)]
     along = [
-        _scaled(estimate, where) for where, estimate in axes if estimate and estimate.is_scaled
+        _scale_warning(estimate, where)
+        for where, estimate in axes
+        if estimate and estimate.is_scaled
     ]
-    if along or not found.overall.is_scaled:
+    if along or not calibration.overall.is_scaled:
         return along
-    return [_scaled(found.overall, "")]
+    return [_scale_warning(calibration.overall, "")]
 
 
-def _scaled(estimate: Estimate, where: str) -> str:
+def _scale_warning(estimate: Estimate, where: str) -> str:
     assert estimate.scale is not None
     scale = estimate.scale.value
     low, high = estimate.scale.interval
     return (
-        f"sizes{where} are {scale:.4f} times what was drawn, 95 % interval {low:.4f} to "
-        f"{high:.4f}, besides kerf and a constant reading error: laser, film or instrument, which "
-        "the coupon cannot tell and no cut file corrects; leave the laser as it is until a gauge "
-        "of known length reads right with this instrument and a second coupon shows the same"
+        f"sizes{where} are {scale:.4f} times the drawn ones, 95 % interval {low:.4f} to "
+        f"{high:.4f}, after correction of kerf and constant reading error. The laser, the film or "
+        "the instrument may cause it; cut files do not correct it. Check the instrument with a "
+        "gauge of known length and cut a second coupon before you adjust the laser"
     )
 
 
-def _readings(estimate: Estimate) -> list[str]:
-    """What each instrument reads too much or too little, where that is sure."""
+def _offset_remarks(estimate: Estimate) -> list[str]:
+    """Return sentences on significant reading errors of the instruments."""
     return [
         f"the {name or 'instrument'} reads {abs(offset.value):.4f} mm too "
         f"{'much' if offset.value > 0 else 'little'} (95 % interval {offset.interval[0]:+.4f} to "
-        f"{offset.interval[1]:+.4f}), which the kerf is corrected for"
+        f"{offset.interval[1]:+.4f}); the kerf is corrected for it"
         for name, offset in estimate.offsets.items()
         if offset.differs_from(0.0)
     ]
 
 
-def _touched(sizes: Sequence[Measurement]) -> list[str]:
-    """What jaws do to film that no fit can see."""
+def _contact_remark(sizes: Sequence[Measurement]) -> list[str]:
+    """Return a remark on calliper jaws if one was used, since no fit detects their effect."""
     if not {size.instrument for size in sizes} & {"", "calliper"}:
         return []
     return [
-        "a calliper's jaws press thin film in: outsides then read small and windows large, which "
-        "no table can tell from kerf; a scan or a microscope touches nothing (--instrument)"
+        "the jaws of a calliper compress thin film: outsides read small and windows large, which "
+        "cannot be separated from the kerf; a scanner or a microscope avoids this (--instrument)"
     ]

@@ -1,4 +1,4 @@
-"""``sbafab map``: force and volume of a design's balloons, for other programs."""
+"""``sbafab map``: force and volume of the balloons over pressure and height."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ from typing import Any
 
 import click
 
-from sbafab.cli import completing
-from sbafab.cli.options import calibration_options, set_option
-from sbafab.cli.quantities import PRESSURE
+from sbafab.cli import options
+from sbafab.cli.options import PRESSURE, calibration_options, set_option
+from sbafab.cli.printing import print_verdict
+from sbafab.errors import DesignError, OutputError
 
 
 @click.command(name="map")
-@click.argument("source", metavar="DESIGN", shell_complete=completing.designs)
+@click.argument("source", metavar="DESIGN", shell_complete=options.designs)
 @set_option
 @click.option(
     "--to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write FILE.csv, FILE.json or FILE.py.  [default: CSV on the screen]",
+    help="Write FILE.csv, FILE.json or FILE.py.  [default: CSV on standard output]",
 )
 @click.option(
     "--pressure",
@@ -27,7 +28,7 @@ from sbafab.cli.quantities import PRESSURE
     default="110 kPa",
     show_default=True,
     metavar="P",
-    help="Map up to this pressure.",
+    help="Highest pressure of the map.",
 )
 @click.option(
     "--points",
@@ -35,7 +36,7 @@ from sbafab.cli.quantities import PRESSURE
     default=31,
     show_default=True,
     metavar="N",
-    help="Pressures, and heights, of CSV and JSON.",
+    help="Number of pressures, and of heights, in CSV and JSON.",
 )
 @calibration_options
 def map_(
@@ -46,26 +47,25 @@ def map_(
     points: int,
     **factors: Any,
 ) -> None:
-    """Map force and volume of a design's balloons.
+    """Map force and volume of the balloons.
 
-    At any pressure and height, for other programs.
+    The map covers all pressures and heights, for use in other programs.
     """
     from sbafab.actuators import load_design
-    from sbafab.errors import DesignError, OutputError
     from sbafab.models.figures import Factors
-    from sbafab.models.force import force
+    from sbafab.models.formulas import force
     from sbafab.models.map_files import FORMATS, map_text
     from sbafab.models.stack import stack
 
     form = "csv" if to is None else to.suffix.removeprefix(".")
     if form not in FORMATS:
-        raise DesignError(f"{to} must end with .{', .'.join(FORMATS)}, which says its format")
+        raise DesignError(f"{to} must end with .{', .'.join(FORMATS)}, which sets the format")
     if pressure <= 0:
-        raise DesignError(f"a map to {pressure:g} kPa holds nothing; give more than 0 kPa")
+        raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
     force(pressure, 0.0)  # raises past the burst pressure
     design = load_design(source, assignments, ())
-    found = stack(design, most_pressure=pressure, factors=Factors(**factors))
-    text = map_text(design.name, found, form, points)
+    actuator = stack(design, most_pressure=pressure, factors=Factors(**factors))
+    text = map_text(design.name, actuator, form, points)
     if to is None:
         click.echo(text, nl=False)
         return
@@ -73,4 +73,4 @@ def map_(
         to.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{to} cannot be written: {error.strerror}") from None
-    click.echo(f"written to {to}")
+    print_verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}")

@@ -1,4 +1,4 @@
-"""``sbafab mesh``: the meshes only, volume and shell meshes for simulation included."""
+"""``sbafab mesh``: the meshes alone, with volume and shell meshes for simulation."""
 
 from __future__ import annotations
 
@@ -6,14 +6,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import Request, run_options
-from sbafab.cli.quantities import LENGTH, VOLUME, OfChamber, by_chamber
-from sbafab.cli.working import run_parts
+from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
+from sbafab.cli.run import run_parts
 
 if TYPE_CHECKING:
-    from sbafab.meshing.conforming.settings import Element, Symmetry
+    from sbafab.meshing.conforming.layup import Element, Symmetry
 
-FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
+
+class MeshEnding(click.Choice[str]):
+    """The endings of mesh formats, read from their table when first used, not by ``--help``."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
+        from sbafab.meshing.formats.table import CONFORMING_ENDINGS
+
+        return CONFORMING_ENDINGS
 
 
 def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
@@ -25,11 +35,11 @@ def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float
 def _fill(
     ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, float], ...]
 ) -> float | dict[str, float] | None:
-    """One volume for every balloon, or one for the balloons of each chamber."""
-    found = by_chamber(ctx, param, values)
-    if "" in found and len(found) > 1:
+    """Return one volume for all balloons, one by chamber, or None."""
+    volumes = by_chamber(ctx, param, values)
+    if "" in volumes and len(volumes) > 1:
         raise click.BadParameter("give one volume for all, or one for each chamber", ctx, param)
-    return found.get("", found) if found else None
+    return volumes.get("", volumes) if volumes else None
 
 
 @click.command()
@@ -42,7 +52,7 @@ def _fill(
     default="0.35",
     show_default=True,
     metavar="MM",
-    help="Side of the triangles.",
+    help="Edge length of the triangles.",
 )
 @click.option(
     "--element",
@@ -56,7 +66,7 @@ def _fill(
     type=click.Choice(["full", "half", "quarter", "sector"]),
     default="full",
     show_default=True,
-    help="Which part is meshed.",
+    help="Part of the actuator that is meshed.",
 )
 @click.option(
     "--fill",
@@ -64,14 +74,14 @@ def _fill(
     type=OfChamber(VOLUME, all_chambers=True).read,
     callback=_fill,
     metavar="UL|CHAMBER=UL",
-    help="Air in each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",
+    help="Air volume of each balloon, e.g. 5ul. Repeatable for chambers.  [default: flat]",
 )
-@click.option("--gaps", is_flag=True, help="Keep films as far apart as the masks hold them.")
-@click.option("--flat", is_flag=True, help="Leave flat what is made for a tube.")
+@click.option("--gaps", is_flag=True, help="Keep films a mask thickness apart.")
+@click.option("--flat", is_flag=True, help="Do not wrap designs for a tube.")
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(FORMATS),
+    type=MeshEnding(),
     multiple=True,
     help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
 )
@@ -87,11 +97,11 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
 ) -> None:
     """Write meshes: solid, cavities, volume and shell.
 
-    The conforming ones take the extra "mesh": pip install "sbafab[mesh]".
+    Volume and shell meshes need the extra "mesh": pip install "sbafab[mesh]".
     """
-    from sbafab.meshing.conforming.settings import MeshSettings
-    from sbafab.output.run import Conforming, Extras
+    from sbafab.meshing.conforming.layup import MeshSettings
+    from sbafab.runs.run import Conforming
 
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
-    conforming = Conforming(settings, formats or FORMATS)
-    run_parts(request, ("mesh",), extras=Extras(conforming))
+    conforming = Conforming(settings, formats or MeshEnding().choices)
+    run_parts(request, ("mesh",), conforming=conforming)

@@ -7,30 +7,80 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
-from sbafab.cli.working import tell
+from sbafab.cli.printing import (
+    console,
+    facts_table,
+    groups_of,
+    notes_of,
+    print_failed,
+    print_line,
+    print_open,
+    print_passed,
+)
+from sbafab.cli.progress import shown_progress
+from sbafab.cli.run import add_batch, finish
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import Curves
+    from sbafab.cutting.properties import Curves
+    from sbafab.runs.run import Run
 
 
 @click.command()
 @several_run_options
-@click.option("--name", default="job", show_default=True, help="Names the folder OUT/<name>/.")
+@click.option("--name", default="job", show_default=True, help="Name of the folder OUT/<name>/.")
 @dxf_options
 @sheet_options
 def nest(request: Request, name: str, curves: Curves) -> None:
     """Cut several designs from the same film sheets.
 
-    OUT/<name>/ gets a folder for each DESIGN and sheets/ with the parts of all. Overrides count
-    for every design; how many of each is its own order.copies, or --copies of every one.
+    OUT/<name>/ receives a folder for each DESIGN, and sheets/ with the parts of all. Overrides
+    apply to every design. Copies: --copies of every design, else each design's order.copies.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import job_json, print_job, shown_progress
-    from sbafab.output.job import generate_job
+    from sbafab.runs.run import RunRequest, generate
 
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs
     ]
     with shown_progress(request.as_json) as progress:
-        job = generate_job(designs, name, request.out, progress, curves)
-    tell(job, request, job_json, print_job)
+        job = generate(RunRequest(designs, request.out, curves=curves, name=name), progress)
+    finish(job, request, job_json, print_job)
+
+
+def print_job(job: Run) -> None:
+    """Print the table of a job, the findings of designs that failed, and the verdict."""
+    table = facts_table()
+    add_batch(table, job)
+    console().print(table)
+    print_line("")
+    for checked in job.checked:
+        if checked.failed:
+            print_line(checked.design.name, "bold red")
+            print_open(checked.findings)
+    if job.failed:
+        findings = [finding for checked in job.checked for finding in checked.findings]
+        consequence = f"Nothing was written; {job.folder} is unchanged"
+        print_failed(job.folder.name, findings, consequence, "designs")
+    else:
+        print_passed(job.folder.name, groups_of(job.checked))
+
+
+def job_json(job: Run) -> dict[str, object]:
+    """Return a job as JSON."""
+    from sbafab.output.schema_ids import NESTED_SCHEMA
+
+    return {
+        "schema": NESTED_SCHEMA,
+        "folder": str(job.folder),
+        "failed": job.failed,
+        "designs": [
+            {
+                "name": checked.design.name,
+                "failed": checked.failed,
+                "findings": [finding.as_dict() for finding in checked.findings],
+                "notes": notes_of([checked]),
+            }
+            for checked in job.checked
+        ],
+        "files": sorted(job.manifest.get("files", ())),
+    }

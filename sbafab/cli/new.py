@@ -1,4 +1,4 @@
-"""``sbafab new``: a commented design file to start from, or the kerf's calibration piece."""
+"""``sbafab new``: a commented design file, a kit, or the calibration piece of the kerf."""
 
 from __future__ import annotations
 
@@ -6,11 +6,20 @@ import shlex
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
-from sbafab.cli.completing import templates
+from sbafab.cli.options import completions
 
 COUPON = "coupon"
 KIT = "kit"
+
+
+def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Complete the names of templates, "coupon" and "kit"."""
+    from sbafab.design.files import template_summaries
+
+    extra = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, laser, limits"}
+    return completions(typed, (template_summaries() | extra).items())
 
 
 @click.command()
@@ -19,11 +28,11 @@ KIT = "kit"
 def new(template: str, file: Path | None) -> None:
     """Write a commented design file to start from.
 
-    FILE is by default TEMPLATE.toml, here.
+    FILE is TEMPLATE.toml in this folder unless given.
 
-    TEMPLATE "coupon" writes the kerf's calibration piece, its picture and its table to fill in
-    (FILE is then a folder: by default coupon). TEMPLATE "kit" writes the paper's films, tubes,
-    press, laser and limits with their sources, to be made your lab's (by default kit.toml).
+    TEMPLATE "coupon" writes the calibration piece of the kerf, its picture and a table to fill in;
+    FILE is then a folder, "coupon" unless given. TEMPLATE "kit" writes the films, tubes, press,
+    laser and limits of the paper with their sources, for you to adapt to your lab (kit.toml).
     """
     if template == COUPON:
         _coupon(file or Path(COUPON))
@@ -31,25 +40,28 @@ def new(template: str, file: Path | None) -> None:
     if template == KIT:
         _kit(file or Path("kit.toml"))
         return
-    from sbafab.design.templates import write_new
+    from sbafab.design.files import write_new
 
     written = write_new(template, file)
     path = shlex.quote(str(written))
-    click.echo(f"{written} is yours to edit; then: sbafab generate {path}")
+    click.echo(f"{written} written. Edit it, then: sbafab generate {path}")
 
 
 def _kit(file: Path) -> None:
     from sbafab.design.kits import write_kit
 
     path = shlex.quote(str(write_kit(file)))
-    click.echo(f'{path} is yours to edit; then: sbafab generate DESIGN --set kit="{path}"')
+    click.echo(f'{path} written. Edit it, then: sbafab generate DESIGN --set kit="{path}"')
 
 
 def _coupon(folder: Path) -> None:
-    from sbafab.cutting.coupon import write_coupon
-    from sbafab.output.settings import GENERATOR
+    from sbafab.cutting.calibration import write_coupon
+    from sbafab.version import GENERATOR
 
     drawing, picture, table = write_coupon(folder, GENERATOR)
-    click.echo(f"Cut {drawing} (picture: {picture}) from each film, with a kerf offset of 0.")
+    click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")
     path = shlex.quote(str(table))
-    click.echo(f"Measure it and fill in {table}; then: sbafab kerf {path} --material tpe")
+    click.echo(
+        f"{folder} written. Measure the pieces, fill in {table}, then: sbafab kerf {path} "
+        "--material tpe"
+    )

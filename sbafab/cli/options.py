@@ -1,21 +1,153 @@
-"""Arguments and options that several commands share."""
+"""Options that commands share: quantities with units, shell completion, DESIGN and -o, --set."""
 
 from __future__ import annotations
 
 import functools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
-from sbafab.cli import completing
-from sbafab.cli.quantities import LENGTH, MODULUS
+from sbafab.design.pressure_units import KILOPASCALS
 
 if TYPE_CHECKING:
-    from sbafab.cutting.dxf_write import DxfProfile
+    from collections.abc import Iterable, Iterator
+
+    from sbafab.cutting.properties import DxfProfile
+
+_WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+
+
+@dataclass(frozen=True)
+class MeasuredQuantity:
+    """A number with or without a unit; ``units`` gives the size of each in the first unit."""
+
+    name: str
+    units: dict[str, float]
+    example: str
+
+    def read(self, written: str) -> float:
+        """Return a quantity in the first unit; raises BadParameter for other text."""
+        match = _WRITTEN.fullmatch(written)
+        unit = match and (match[2] or next(iter(self.units)))
+        if match is None or unit not in self.units:
+            allowed = f"a {self.name} such as {self.example}; the units are {', '.join(self.units)}"
+            raise click.BadParameter(f"{written!r} must be {allowed}")
+        number = float(match[1]) * self.units[unit]
+        if not math.isfinite(number):
+            raise click.BadParameter(f"{written!r} must be a finite {self.name}")
+        return number
+
+
+LENGTH = MeasuredQuantity(
+    "length", {"mm": 1.0, "um": 0.001, "cm": 10.0, "in": 25.4}, '0.35 or "350 um"'
+)
+PRESSURE = MeasuredQuantity("pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
+MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
+VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
+FLOW = MeasuredQuantity(
+    "flow",
+    {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0},
+    '35, "35 ml/min" or "0.6 ml/s"',
+)
+
+
+@dataclass(frozen=True)
+class OfChamber:
+    """``NAME=QUANTITY``, or with ``all_chambers`` a quantity alone, whose name is ""."""
+
+    quantity: MeasuredQuantity
+    all_chambers: bool = False
+
+    def read(self, written: str) -> tuple[str, float]:
+        chamber, equals, text = written.rpartition("=")
+        if not (chamber.strip() if equals else self.all_chambers):
+            short = self.quantity.example.split(",")[0]
+            pattern = f"NAME={self.quantity.name.upper()}"
+            raise click.BadParameter(f"{written!r} must be {pattern}, such as chamber1={short}")
+        return chamber.strip(), self.quantity.read(text)
+
+
+def by_chamber(
+    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, float], ...]
+) -> dict[str, float]:
+    """Return values by chamber: the callback of a repeatable option of type OfChamber."""
+    chambers = dict(values)
+    if len(chambers) < len(values):
+        raise click.BadParameter("each chamber may be given once", ctx, param)
+    return chambers
+
+
+# Shell completion: templates and files, keys with their values, rules.
+
+
+def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Complete the names of templates, and files."""
+    from sbafab.design.files import template_summaries
+
+    templates = [
+        CompletionItem(name, help=summary)
+        for name, summary in template_summaries().items()
+        if name.startswith(typed)
+    ]
+    return [*templates, CompletionItem(typed, type="file")]
+
+
+designs_or_folders = designs
+"""A shell completes folders among files."""
+
+
+def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Complete the names of rules and checks."""
+    from sbafab.rules.explained import EXPLAINED
+
+    return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
+
+
+def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Complete ``KEY=``, and after it the values of a key that has a choice."""
+    key, equals, _ = typed.partition("=")
+    if not equals:
+        return completions(typed, ((f"{name}=", None) for name in _keys()))
+    return completions(typed, ((f"{key}={value}", None) for value in _choices(_keys().get(key))))
+
+
+def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> list[CompletionItem]:
+    """Return the candidates (name, help) that begin with ``typed``."""
+    return [
+        CompletionItem(name, help=summary) for name, summary in candidates if name.startswith(typed)
+    ]
+
+
+def _keys() -> dict[str, object]:
+    """Return the keys of all families that hold a value, with their annotations."""
+    from sbafab.actuators import records
+    from sbafab.design.files import key_paths
+
+    keys: dict[str, object] = {}
+    for record in records().values():
+        keys |= key_paths(record)
+    tables = {path.rpartition(".")[0] for path in keys}
+    return {path: keys[path] for path in sorted(keys) if path not in tables}
+
+
+def _choices(annotation: Any) -> Iterator[str]:
+    """Yield the values of a ``Literal`` or a boolean."""
+    from typing import Literal, get_args, get_origin
+
+    if annotation is bool:
+        yield from ("true", "false")
+    elif get_origin(annotation) is Literal:
+        yield from map(str, get_args(annotation))
+
+
+# Arguments and options.
+
 
 Command = Callable[..., Any]
 
@@ -25,74 +157,70 @@ EXPERIMENTAL = "registration.experimental=true"
 
 
 def set_option(command: Command) -> Command:
-    """``--set`` and ``--experimental``, which sets a key too."""
+    """Add ``--set`` and ``--experimental``, which sets a key."""
 
     @functools.wraps(command)
-    def assigned(assignments: tuple[str, ...], experimental: bool, **others: Any) -> Any:
+    def assigned(assignments: tuple[str, ...], experimental: bool, **parameters: Any) -> Any:
         more = (EXPERIMENTAL,) if experimental else ()
-        return command(assignments=(*assignments, *more), **others)
+        return command(assignments=(*assignments, *more), **parameters)
 
     keys = click.option(
         "--set",
         "assignments",
         metavar="KEY=VALUE",
         multiple=True,
-        shell_complete=completing.assignments,
+        shell_complete=assignments,
         help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
     )
     proposals = click.option(
         "--experimental",
         is_flag=True,
-        help="Allow what no bench has tried: registered sheets. Sets registration.experimental.",
+        help="Allow registered sheets, which are untested. Sets registration.experimental.",
     )
     return keys(proposals(assigned))
 
 
 def calibration_options(command: Command) -> Command:
-    """What was measured of a built actuator, for the elastic models: ``models.figures.Factors``."""
+    """Add the calibration options of the elastic models (``models.figures.Factors``)."""
     lost = click.option(
         "--pocket-loss",
         type=LENGTH.read,
         default="0 mm",
         metavar="L",
-        help="By how much pockets come out smaller in radius than drawn, mm or with a unit, if "
-        "measured; for the elastic models.  [default: 0]",
+        help="Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
+        "models.  [default: 0]",
     )
     modulus = click.option(
         "--modulus",
         "modulus_mpa",
         type=MODULUS.read,
         metavar="E",
-        help="Young's modulus of the film, MPa or with a unit, if measured.  [default: the film's]",
+        help="Measured Young's modulus of the film, MPa or with a unit.  [default: the film's]",
     )
     return lost(modulus(command))
 
 
 def waive_option(words: str) -> Callable[[Command], Command]:
-    """``--waive``, told in the words of the command that it stands in."""
+    """Add ``--waive`` with the help text of a command."""
     return click.option(
         "--waive",
         "waivers",
         metavar="RULE",
         multiple=True,
-        shell_complete=completing.rules,
+        shell_complete=rules,
         help=words,
     )
 
 
-WAIVES = {
-    "press": "Let the schedule be written although this rule fails; it will say so. Repeatable.",
-    "mesh": "Let the meshes be written although this rule fails; the manifest will say so. "
+WAIVE_HELP = {
+    "press": "Write the schedule although this rule fails; it will state it. Repeatable.",
+    "mesh": "Write the meshes although this rule fails; the manifest will state it. Repeatable.",
+    "predict": "Write the prediction although this rule fails and the actuator may leak or burst. "
     "Repeatable.",
-    "predict": "Let the prediction be written although this rule fails, for an actuator that may "
-    "not hold. Repeatable.",
-    "sweep": "Take this rule's failure as accepted in every design; the tables say waived. "
-    "Repeatable.",
-    "simulate": "Simulate although this rule fails, an actuator that may not hold. Repeatable.",
+    "sweep": "Accept the failure of this rule in every design; the tables state it. Repeatable.",
+    "simulate": "Simulate although this rule fails and the actuator may leak or burst. Repeatable.",
 }
-CUT_ALL_THE_SAME = (
-    "Let cut files be written although this rule fails; they will say so. Repeatable."
-)
+WAIVE_CUT = "Write the cut files although this rule fails; they will state it. Repeatable."
 
 out_option = click.option(
     "-o",
@@ -101,15 +229,15 @@ out_option = click.option(
     default=Path("out"),
     show_default=True,
     metavar="OUT",
-    help="Folder that receives OUT/<name>/.",
+    help="Folder in which OUT/<name>/ is written.",
 )
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print results for programs.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 
 
 @dataclass(frozen=True)
 class Request:
-    """What every command that writes a folder is asked for."""
+    """Arguments and options of a command that writes a folder."""
 
     designs: tuple[str, ...]
     out: Path
@@ -119,24 +247,24 @@ class Request:
 
 
 def run_options(command: Command) -> Command:
-    """DESIGN and the options of a writing command, handed over as one Request."""
-    one = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=completing.designs)
-    return _requested(command, one)
+    """Add DESIGN and the options of a writing command, passed to it as a Request."""
+    argument = click.argument("designs", metavar="DESIGN", nargs=1, shell_complete=designs)
+    return _with_request(command, argument)
 
 
 def several_run_options(command: Command) -> Command:
-    """The same with any number of designs."""
-    several = click.argument(
+    """Add any number of DESIGNs and the options of a writing command, passed as a Request."""
+    argument = click.argument(
         "designs",
         metavar="DESIGN...",
         nargs=-1,
         required=True,
-        shell_complete=completing.designs,
+        shell_complete=designs,
     )
-    return _requested(command, several)
+    return _with_request(command, argument)
 
 
-def _requested(command: Command, argument: Callable[[Command], Command]) -> Command:
+def _with_request(command: Command, argument: Callable[[Command], Command]) -> Command:
     @functools.wraps(command)
     def gathered(
         designs: str | tuple[str, ...],
@@ -144,44 +272,44 @@ def _requested(command: Command, argument: Callable[[Command], Command]) -> Comm
         assignments: tuple[str, ...],
         waivers: tuple[str, ...],
         as_json: bool,
-        **others: Any,
+        **parameters: Any,
     ) -> Any:
         named = (designs,) if isinstance(designs, str) else designs
-        return command(request=Request(named, out, assignments, waivers, as_json), **others)
+        return command(request=Request(named, out, assignments, waivers, as_json), **parameters)
 
     decorated: Command = gathered
-    waive = waive_option(WAIVES.get(command.__name__, CUT_ALL_THE_SAME))
+    waive = waive_option(WAIVE_HELP.get(command.__name__, WAIVE_CUT))
     for option in (json_option, waive, set_option, out_option, argument):
         decorated = option(decorated)
     return decorated
 
 
 def sheet_options(command: Command) -> Command:
-    """How many are cut, and what looks for places on film sheets; both are keys of a design."""
+    """Add ``--copies`` and ``--nest``, which set keys of the design."""
 
     @functools.wraps(command)
-    def assigned(request: Request, copies: int | None, nest: str | None, **others: Any) -> Any:
-        said = [] if copies is None else [f"order.copies={copies}"]
-        said += [] if nest is None else [f"sheets.engine={nest}"]
-        request = replace(request, assignments=(*request.assignments, *said))
-        return command(request=request, **others)
+    def assigned(request: Request, copies: int | None, nest: str | None, **parameters: Any) -> Any:
+        keys = [] if copies is None else [f"order.copies={copies}"]
+        keys += [] if nest is None else [f"sheets.engine={nest}"]
+        request = replace(request, assignments=(*request.assignments, *keys))
+        return command(request=request, **parameters)
 
     engine = click.option(
         "--nest",
         type=click.Choice(["bottom-left", "spyrrow"]),
-        help="What looks for places on the film sheets [default: the design's sheets.engine].",
+        help="Nesting engine of the film sheets.  [default: the design's sheets.engine]",
     )
     count = click.option(
         "--copies",
         type=int,
         metavar="K",
-        help="Cut K of each actuator [default: the design's order.copies, 1].",
+        help="Cut K copies of each actuator.  [default: the design's order.copies, 1]",
     )
     return count(engine(assigned))
 
 
-def refuse_given(why: str, *names: str) -> None:
-    """Raises UsageError, which ends with ``why``, for the first of these parameters on the line."""
+def refuse_options(why: str, *names: str) -> None:
+    """Raise UsageError, ending with ``why``, if one of these parameters is on the command line."""
     ctx = click.get_current_context()
     for param in ctx.command.params:
         if param.name in names and ctx.get_parameter_source(param.name) is _GIVEN:
@@ -189,38 +317,39 @@ def refuse_given(why: str, *names: str) -> None:
 
 
 def finite(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
-    """A callback; a range lets nan through, which is neither below nor above."""
+    """Return a finite value or None: a callback, since ``FloatRange`` accepts nan."""
     if value is not None and not math.isfinite(value):
         raise click.BadParameter("must be a finite number", ctx, param)
     return value
 
 
 def dxf_options(command: Command) -> Command:
-    """How arcs are written, for readers that do not know bulges."""
+    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges."""
     chord = click.option(
         "--chord-error",
         type=click.FloatRange(0.0001, 0.1),
         callback=finite,
         metavar="MM",
-        help="Farthest a chord may leave its arc, with --dxf-profile chords.  [default: 0.005]",
+        help="Largest distance of a chord from its arc, with --dxf-profile chords.  "
+        "[default: 0.005]",
     )
     profile = click.option(
         "--dxf-profile",
         type=click.Choice(["bulges", "arcs", "chords"]),
         default="bulges",
         show_default=True,
-        help="Arcs as polyline bulges, as ARC entities, or as chords.",
+        help="Write arcs as polyline bulges, ARC entities or chords.",
     )
 
     @functools.wraps(command)
-    def said(dxf_profile: DxfProfile, chord_error: float | None, **others: Any) -> Any:
+    def with_curves(dxf_profile: DxfProfile, chord_error: float | None, **parameters: Any) -> Any:
         if chord_error is not None and dxf_profile != "chords":
             raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        from sbafab.cutting.dxf_write import Curves
+        from sbafab.cutting.properties import Curves
 
         curves = Curves(dxf_profile)
         if chord_error is not None:
             curves = curves._replace(chord_error=chord_error)
-        return command(curves=curves, **others)
+        return command(curves=curves, **parameters)
 
-    return profile(chord(said))
+    return profile(chord(with_curves))

@@ -1,4 +1,4 @@
-"""``sbafab picture``: the actuator inflated, as picture, moving picture or scene for viewers."""
+"""``sbafab picture``: the inflated actuator as picture, animation or scene."""
 
 from __future__ import annotations
 
@@ -7,11 +7,22 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import finite, refuse_given, set_option
-from sbafab.cli.quantities import PRESSURE, VOLUME, OfChamber, by_chamber
+from sbafab.cli.options import (
+    PRESSURE,
+    VOLUME,
+    OfChamber,
+    by_chamber,
+    finite,
+    refuse_options,
+    set_option,
+)
+from sbafab.cli.printing import print_verdict, print_wrapped
+from sbafab.cli.progress import shown_progress
+from sbafab.errors import OutputError
 
 if TYPE_CHECKING:
-    from sbafab.reports.inflated_picture import Movement
+    from sbafab.design.records import Design
+    from sbafab.reports.inflated_picture import Movement, PictureRequest
 
 
 @click.command()
@@ -33,29 +44,43 @@ if TYPE_CHECKING:
     callback=by_chamber,
     multiple=True,
     metavar="UL|CHAMBER=UL",
-    help="In place of pressures: what a chamber holds, all its balloons together. Repeatable.",
+    help="Instead of pressures: volume of a chamber, all its balloons together. Repeatable.",
 )
 @click.option(
     "--to",
     "path",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="A .png, a moving .gif or .webp, or a .glb.  [default: NAME-inflated.png, or "
-    "NAME-flat.png of what no model inflates]",
+    help="A .png picture, a .gif or .webp animation, or a .glb scene.  [default: "
+    "NAME-inflated.png; NAME-flat.png if no model inflates it]",
 )
 @click.option(
     "--motion",
     type=click.Choice(["inflate", "circle"]),
     default="inflate",
     show_default=True,
-    help="Moving pictures: from flat and back, or pressure going round the chambers.",
+    help="Animation: from flat and back, or pressure circling through the chambers.",
 )
-@click.option("--elevation", type=float, callback=finite, default=18.0, show_default=True)
-@click.option("--azimuth", type=float, callback=finite, default=-60.0, show_default=True)
+@click.option(
+    "--elevation",
+    type=float,
+    callback=finite,
+    default=18.0,
+    show_default=True,
+    help="Viewing angle above the bench, degrees.",
+)
+@click.option(
+    "--azimuth",
+    type=float,
+    callback=finite,
+    default=-60.0,
+    show_default=True,
+    help="Viewing angle round the vertical axis, degrees.",
+)
 @click.option(
     "--width",
     type=click.IntRange(100, 4000),
-    help="Pixels; the height is 4/5 of it.  [default: 1000, moving 480]",
+    help="Pixels; the height is 4/5 of the width.  [default: 1000, animation 480]",
 )
 def picture(  # noqa: PLR0913, PLR0917 - one an option
     design: str,
@@ -68,88 +93,97 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     elevation: float,
     azimuth: float,
 ) -> None:
-    """Draw the inflated actuator, still or moving.
+    """Draw the inflated actuator as picture, animation or scene.
 
-    It stands as the elastic stack says at the given pressures or volumes. Balloons are drawn as
-    they are between their plates; ears are snipped off, and inlet tubes are left out. Elevation and
-    azimuth are degrees over the bench and round it. Drawn pockets that are nearly round are taken
-    for discs of equal area. Other drawn pockets, and oblong ones, no model inflates: they are drawn
-    flat, into NAME-flat.png.
+    The elastic stack computes the pose at the given pressures or volumes. Balloons are drawn as
+    modelled between their plates, without ears and inlet tubes. Drawn pockets that are nearly round
+    are replaced by discs of equal area. No model inflates oblong and other drawn pockets: these are
+    drawn flat, to NAME-flat.png.
     """
-    from sbafab.actuators import build, load_design
-    from sbafab.cli.lines import print_wrapped
-    from sbafab.cli.printing import shown_progress
-    from sbafab.errors import DesignError, OutputError
+    from sbafab.actuators import load_design
+    from sbafab.errors import DesignError
     from sbafab.models.balloons import has_balloons
-    from sbafab.models.counterparts import counterparts_of_pose
-    from sbafab.models.drawn import model_form, near_discs
-    from sbafab.models.stack import stack
-    from sbafab.reports.flat_picture import WHY, write_flat_picture
-    from sbafab.reports.inflated_picture import MOVING, PictureWish, write_picture
+    from sbafab.models.drawn import model_form
+    from sbafab.reports.inflated_picture import (
+        MOVING,
+        WHY,
+        PictureRequest,
+    )
 
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")
     loaded = load_design(design, assignments)
-    form = model_form(loaded)
-    is_inflated = has_balloons(form)
+    is_inflated = has_balloons(model_form(loaded))
     path = path or Path(f"{loaded.name}-{'inflated' if is_inflated else 'flat'}.png")
-    wide = width or (480 if path.suffix.lower() in MOVING else 1000)
-    wish = PictureWish(
+    pixels = width or (480 if path.suffix.lower() in MOVING else 1000)
+    wish = PictureRequest(
         pressures or {"": 5.0},
         volumes or None,
         elevation=elevation,
         azimuth=azimuth,
-        width=wide,
-        height=wide * 4 // 5,
+        width=pixels,
+        height=pixels * 4 // 5,
         motion=motion,
     )
-    _refuse_still(path.suffix.lower())
-    laminate = build(loaded)
+    _refuse_unused(path.suffix.lower())
     if not is_inflated:
-        refuse_given(
+        refuse_options(
             f"is for inflated actuators, and {WHY}: {loaded.name} is drawn flat; leave it out",
             *("pressures", "volumes", "elevation", "azimuth"),
         )
-        try:
-            write_flat_picture(laminate, path, wish.width, wish.height)
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror}") from error
-        click.echo(f"written to {path}: {loaded.name}, flat, not inflated: {WHY}")
-        return
-    with shown_progress(False) as tell:
-        try:
-            shown = write_picture(
-                laminate,
-                stack(loaded, laminate, form=form),
-                wish,
-                path,
-                lambda done, total: tell("frames", done, total),
-            )
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror}") from error
-    kpa = ", ".join(f"{p:.3g}" for p in shown.pressures)
-    held = ", ".join(f"{v:.0f}" for v in shown.volumes)
-    click.echo(
-        f"written to {path}: {kpa} kPa, {held} ul, tip {shown.height:.2f} mm high, "
-        f"bent {shown.bend:.1f} degrees"
-    )
-    discs = near_discs(loaded)
+    try:
+        (_draw_inflated if is_inflated else _draw_flat)(loaded, wish, path)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from error
+
+
+def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
+    from sbafab.actuators import build
+    from sbafab.reports.inflated_picture import WHY, write_flat_picture
+
+    write_flat_picture(build(design), path, wish.width, wish.height)
+    print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}")
+
+
+def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
+    from sbafab.actuators import build
+    from sbafab.models.drawn import model_form, near_discs
+    from sbafab.models.paper import counterparts_of_pose
+    from sbafab.models.stack import stack
+    from sbafab.reports.inflated_picture import write_picture
+
+    laminate = build(design)
+    with shown_progress(False) as progress:
+        pose = write_picture(
+            laminate,
+            stack(design, laminate, form=model_form(design)),
+            wish,
+            path,
+            lambda done, total: progress("frames", done, total),
+        )
+    discs = near_discs(design)
     if discs is not None:
         print_wrapped(
-            f"(the drawn pocket taken for a disc of equal area, d = {discs.equal:.4g} mm; the "
-            f"discs within and round it have {discs.inner:.4g} and {discs.outer:.4g} mm)"
+            f"(the drawn pocket is replaced by a disc of equal area, d = {discs.equal:.4g} mm; its "
+            f"inscribed and circumscribed discs have {discs.inner:.4g} and {discs.outer:.4g} mm)"
         )
-    for row in counterparts_of_pose(len(shown.pressures)).values():
-        print_wrapped(f"({row.sentence()})")
+    for counterpart in counterparts_of_pose(len(pose.pressures)).values():
+        print_wrapped(f"({counterpart.sentence()})")
+    pressures = ", ".join(f"{pressure:.3g}" for pressure in pose.pressures)
+    volumes = ", ".join(f"{volume:.0f}" for volume in pose.volumes)
+    print_verdict(
+        f"{design.name} drawn: {pressures} kPa, {volumes} ul, tip {pose.height:.2f} mm high, "
+        f"bent {pose.bend:.1f} degrees. Written to {path}"
+    )
 
 
-def _refuse_still(ending: str) -> None:
-    """Raises UsageError for options of another kind of picture than ``ending`` says."""
+def _refuse_unused(suffix: str) -> None:
+    """Raise UsageError for options that a file with this suffix does not use."""
     from sbafab.reports.inflated_picture import MOVING
 
-    if ending not in MOVING:
-        moving = f"a moving picture; give --to FILE{MOVING[0]}"
-        refuse_given(f"is for {moving}, or leave it out", "motion")
-    if ending == ".glb":
-        why = "is for a picture, and a .glb is looked at from anywhere; leave it out"
-        refuse_given(why, "elevation", "azimuth", "width")
+    if suffix not in MOVING:
+        reason = f"is for an animation; give --to FILE{MOVING[0]}, or leave it out"
+        refuse_options(reason, "motion")
+    if suffix == ".glb":
+        reason = "is for a picture, and the view of a .glb is chosen in its viewer; leave it out"
+        refuse_options(reason, "elevation", "azimuth", "width")

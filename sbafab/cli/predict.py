@@ -1,29 +1,45 @@
-"""``sbafab predict``: what the actuator will do, by closed formulas."""
+"""``sbafab predict``: the behaviour of an actuator or assembly by closed formulas."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
+    FLOW,
+    PRESSURE,
+    VOLUME,
     Request,
     calibration_options,
     finite,
-    refuse_given,
+    refuse_options,
     run_options,
 )
-from sbafab.cli.quantities import FLOW, PRESSURE, VOLUME
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.printing import (
+    console,
+    print_json,
+    print_line,
+    print_listed,
+    print_verdict,
+    print_wrapped,
+    wrapped,
+)
+from sbafab.cli.progress import shown_progress
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
+    from sbafab.models.figures import Figure, Model, Prediction
+    from sbafab.reports.assembly_prediction import AssemblyPrediction
 
-OF_ELASTIC = ("pocket_loss", "modulus_mpa")
-"""Options that elastic balloons take, and no other model."""
-OF_FORMULAS = ("flow", "volumes", "contact_factor")
-"""Those that a formula of the pocket's form takes."""
+ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa")
+"""Options of the model of elastic balloons alone."""
+FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
+"""Options of formulas that need round or oblong pockets."""
 
 
 @click.command()
@@ -34,7 +50,7 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     type=PRESSURE.read,
     multiple=True,
     metavar="P",
-    help="Force and work at this pressure, kPa or with a unit. Repeatable.  [default: 10, 100]",
+    help="Pressure for force and work, kPa or with a unit. Repeatable.  [default: 10, 100]",
 )
 @click.option(
     "--flow",
@@ -42,7 +58,7 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     default="35 ml/min",
     show_default=True,
     metavar="Q",
-    help="Time to actuate at this flow, ml/min or with a unit.",
+    help="Flow for the actuation time, ml/min or with a unit.",
 )
 @click.option(
     "--volume",
@@ -50,7 +66,7 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     type=VOLUME.read,
     multiple=True,
     metavar="V",
-    help="Stroke with this much in each balloon, ul or with a unit. Repeatable.",
+    help="Volume of each balloon for the stroke, ul or with a unit. Repeatable.",
 )
 @click.option(
     "--press-factor",
@@ -58,7 +74,7 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     default=1.0,
     callback=finite,
     metavar="F",
-    help="Thickness after pressing over that of the films, if measured.  [default: 1, off]",
+    help="Measured ratio of pressed thickness to film thickness.  [default: 1, off]",
 )
 @click.option(
     "--contact-factor",
@@ -66,7 +82,7 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     default=1.0,
     callback=finite,
     metavar="F",
-    help="Measured force over the one of Eqs. 1-4, if measured.  [default: 1, off]",
+    help="Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
 )
 @calibration_options
 @click.option(
@@ -77,11 +93,9 @@ OF_FORMULAS = ("flow", "volumes", "contact_factor")
     default=1.2,
     show_default=True,
     metavar="G",
-    help="Assemblies: mass at the tips, g; the paper's marble by default.",
+    help="Assemblies: mass at the tips, g; the default is the paper's marble.",
 )
-@click.option(
-    "-v", "--verbose", is_flag=True, help="All figures, with their models and what these hold for."
-)
+@click.option("-v", "--verbose", is_flag=True, help="All figures, with their models and validity.")
 def predict(
     request: Request,
     pressures: tuple[float, ...],
@@ -91,99 +105,229 @@ def predict(
     verbose: bool,
     **factors: Any,
 ) -> None:
-    """Predict sizes, stroke, force, time and bending.
+    """Predict size, stroke, force, time and bending.
 
-    Shows a verdict, and what the paper measured beside what is off by more than a quarter; -v and
-    predict.json, which it writes with plots, have every figure with its model and validity. A
-    design that fails a rule is predicted on the screen only (exit code 1). Of an assembly: reach,
-    load, grip in its lumen, and whether inflated parts meet, at one pressure (default 10 kPa), on
-    the screen.
+    Prints the main figures, with the paper's measurements where models differ from them by more
+    than a quarter. -v and predict.json, which is written with plots, hold all figures with their
+    models and validity. A design that fails a rule is predicted on the screen only (exit code 1).
+    Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
+    one pressure (default 10 kPa).
     """
-    from sbafab.assemblies.loading import load
-    from sbafab.cli.printing import print_json, print_listed, shown_progress
-    from sbafab.cli.printing_prediction import print_prediction
+    from sbafab.assemblies.files import load
     from sbafab.design.records import Design
     from sbafab.errors import OutputError
-    from sbafab.models.figures import Asked, Factors
+    from sbafab.models.figures import Factors, PredictionRequest
+    from sbafab.models.formulas import size_phrases
     from sbafab.models.prediction import predict as predicted
-    from sbafab.models.sizes import size_said
-    from sbafab.output.earlier import PREDICTION
-    from sbafab.output.predicting import prediction_json, with_prediction
-    from sbafab.output.run import Extras, generate
+    from sbafab.output.artefacts import prediction_json
+    from sbafab.runs.run import RunRequest, generate
 
     design = load(request.designs[0], request.assignments, request.waivers)
     if not isinstance(design, Design):
         _refuse_for_assembly(design, pressures)
         _predict_assembly(design, request, pressures[0] if pressures else 10.0, load_g)
         return
-    _refuse_for_one(design)
-    wish = Asked(pressures or Asked.pressures_kpa, flow, volumes, Factors(**factors))
-    with shown_progress(request.as_json) as tell:
-        tell("predicting", 0, 1)
-        found = predicted(design, wish)
-        extras = Extras(also=with_prediction(design, found), own=PREDICTION)
+    _refuse_for_design(design)
+    wish = PredictionRequest(
+        pressures or PredictionRequest.pressures_kpa, flow, volumes, Factors(**factors)
+    )
+    with shown_progress(request.as_json) as progress:
+        progress("predicting", 0, 1)
+        prediction = predicted(design, wish)
+        wanted = RunRequest(design, request.out, ("predict",), prediction=prediction)
         try:
-            run = generate(design, request.out, (), tell, extras=extras)
+            run = generate(wanted, progress)
         except OutputError:
-            # What was asked is known, only not written.
+            # The prediction exists, though it cannot be written.
             if not request.as_json:
-                print_prediction(found, verbose)
+                print_prediction(prediction, verbose)
             raise
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
-        print_json({**prediction_json(design, found), "failed": failed, "folder": str(run.folder)})
+        print_json(
+            {**prediction_json(design, prediction), "failed": failed, "folder": str(run.folder)}
+        )
     else:
-        print_listed("size", size_said(design, run.laminate))
-        print_prediction(found, verbose)
+        print_listed("size", size_phrases(design, run.laminate))
+        print_prediction(prediction, verbose)
         if not run.failed:
-            click.echo(f"written to {run.folder}: predict.json, predict/")
+            details = "" if verbose else " Details: -v"
+            print_verdict(
+                f"{design.name} predicted: {len(prediction.figures)} figures with models and "
+                f"validity. Written to {run.folder}: predict.json, predict/.{details}"
+            )
     if run.failed:
-        click.echo(
-            f"sbafab: {', '.join(failed)} failed, so this actuator may not hold and no prediction "
-            "was written; change the design or waive the rule by name",
-            err=True,
+        print_error(
+            f"{design.name} failed: {', '.join(failed)}. It may leak or burst, and no prediction "
+            "was written. Change the design or waive the rule by name"
         )
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _refuse_for_one(design: Design) -> None:
-    """Raises UsageError for an option that no model of the design takes."""
-    from sbafab.design.form import Drawn
+def _refuse_for_design(design: Design) -> None:
+    """Raise UsageError for an option that no model of the design uses."""
+    from sbafab.design.records import Drawn
     from sbafab.models.balloons import has_balloons
     from sbafab.models.drawn import model_form
 
     form = model_form(design)
-    of = f"and {design.name} has other ones; leave it out"
-    refuse_given(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
+    reason = f"and {design.name} has others; leave it out"
+    refuse_options(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
     if not has_balloons(form):
-        refuse_given(f"is for elastic balloons, round pockets on flat plates, {of}", *OF_ELASTIC)
+        refuse_options(
+            f"is for elastic balloons, round pockets on flat plates, {reason}", *ELASTIC_OPTIONS
+        )
     if isinstance(form.pockets, Drawn):
-        refuse_given(f"is for pockets that are round or oblong, {of}", *OF_FORMULAS)
+        refuse_options(f"is for pockets that are round or oblong, {reason}", *FORMULA_OPTIONS)
 
 
 def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> None:
-    """Raises UsageError for an option that only a design's own prediction takes."""
-    one = f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
-    refuse_given(one, *OF_FORMULAS, *OF_ELASTIC, "press_factor")
-    writes = f"is for what is written, and of an assembly nothing is; predict {assembly.name} "
-    refuse_given(f"{writes}without it", "out", "waivers")
+    """Raise UsageError for an option that only the prediction of a single design uses."""
+    reason = (
+        f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
+    )
+    refuse_options(reason, *FORMULA_OPTIONS, *ELASTIC_OPTIONS, "press_factor")
+    reason = f"is for written files, and the prediction of {assembly.name} is only printed"
+    refuse_options(f"{reason}; leave it out", "out", "waivers")
     if len(pressures) > 1:
-        raise click.UsageError("--pressure is given once for an assembly; leave the others out")
+        raise click.UsageError("an assembly is predicted at one pressure; give --pressure once")
 
 
 def _predict_assembly(
     assembly: Assembly, request: Request, pressure_kpa: float, load_g: float
 ) -> None:
     from sbafab.assemblies.build import assemble
-    from sbafab.cli.printing import print_json
-    from sbafab.cli.printing_assembly import print_assembly_prediction
-    from sbafab.output.printed import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
     from sbafab.reports.assembly_prediction import as_json, predict_assembly
 
-    found = predict_assembly(assemble(assembly), pressure_kpa, load_g)
+    prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
-        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **as_json(found)})
+        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **as_json(prediction)})
     else:
-        print_assembly_prediction(found)
-    if found.touches:
+        print_assembly_prediction(prediction)
+    if prediction.touches:
         click.get_current_context().exit(RULE_FAILED)
+
+
+# Printing: the main figures of a design, or with -v all and their models; those of an assembly.
+
+
+NAME_WIDTH, VALUE_WIDTH = 56, 10
+"""Columns of a name, at most, and of a value."""
+MAIN_TITLE = "Figures to design with"
+ALTERNATIVES_TITLE = "Alternative models: design with the figures above"
+
+
+def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
+    """Print the main figures; ``verbose`` also all figures and the validity of their models."""
+    from sbafab.models.figures import LEFT_OUT
+
+    width = console().width
+    label = max((len(line.quantity) for line in prediction.verdict), default=0) + 2
+    previous = ""
+    for line in prediction.verdict:
+        head = "" if line.quantity == previous else f"{line.quantity}:"
+        previous = line.quantity
+        text = f"{line.figure}: {line.note}" if line.quantity == LEFT_OUT else line.figure
+        for row in wrapped(text, width, head.ljust(label), " " * label):
+            print_line(row)
+        if line.quantity != LEFT_OUT:
+            for row in wrapped(line.note, width, " " * (label + 2), " " * (label + 2)):
+                print_line(row)
+    if verbose:
+        _print_figures(prediction)
+
+
+def _print_figures(prediction: Prediction) -> None:
+    """Print all figures, those of alternative models last, and the validity of the models."""
+    width = console().width
+    main = [figure for figure in prediction.figures if not figure.other]
+    alternatives = [figure for figure in prediction.figures if figure.other]
+    models = list(dict.fromkeys(figure.model for figure in (*main, *alternatives)))
+
+    def print_part(title: str, lines: Iterator[str]) -> None:
+        print_line(f"\n{title}", "bold")
+        for line in lines:
+            # The heading of a group starts at the margin.
+            is_head = title in (MAIN_TITLE, ALTERNATIVES_TITLE) and not line.startswith(" ")
+            print_line(line, "bold" if is_head else "")
+
+    print_part(MAIN_TITLE, figure_lines(main, models, width))
+    if alternatives:
+        print_part(ALTERNATIVES_TITLE, figure_lines(alternatives, models, width))
+    print_part("Models and validity", _numbered(models, width))
+    print_line("")
+
+
+def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int) -> Iterator[str]:
+    """Yield a heading for each model of a group, and below it a line for each figure.
+
+    A name that begins like the one above it, up to a comma, has blanks in place of that part.
+    """
+    unit = max((len(figure.unit) for figure in figures), default=0)
+    room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - 4)
+    for group in dict.fromkeys(figure.group for figure in figures):
+        for number, model in enumerate(models, start=1):
+            members = [f for f in figures if f.group == group and f.model == model]
+            if members:
+                yield f"{group}: {model.name} [{number}]"
+            previous = ""
+            for figure in members:
+                head, comma, _ = figure.name.partition(", ")
+                name = figure.name
+                if comma and head == previous:
+                    name = " " * (len(head) + 2) + name.removeprefix(f"{head}, ")
+                previous = head
+                *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
+                yield from (f"  {line}" for line in over)
+                yield f"  {last:{room}}{figure.value:>{VALUE_WIDTH}.4g}  {figure.unit}".rstrip()
+                yield from wrapped(figure.aside, width, "    ", "    ") if figure.aside else ()
+
+
+def _numbered(models: Sequence[Model], width: int) -> Iterator[str]:
+    """Yield the lines of the numbered list of models."""
+    for number, model in enumerate(models, start=1):
+        text = f"{model.title}: {model.trust}"
+        yield from wrapped(text, width, f"[{number}]".ljust(5), " " * 5)
+
+
+def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
+    """Print the figures of an assembly and, last, the parts that collide when inflated."""
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("part", no_wrap=True)
+    table.add_column("figure")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("model")
+    table.add_column("paper")
+    previous = ""
+    for figure in prediction.figures:
+        table.add_row(
+            "" if figure.part == previous else figure.part,
+            Text(figure.name),
+            f"{figure.value:.4g}",
+            figure.unit,
+            Text(figure.model),
+            Text(figure.paper),
+        )
+        previous = figure.part
+    out = console()
+    out.print(Text(f"{prediction.name} at {prediction.pressure_kpa:g} kPa", style="bold"))
+    out.print(table)
+    for measured in dict.fromkeys(
+        figure.measured for figure in prediction.figures if figure.measured
+    ):
+        names = [figure.name for figure in prediction.figures if figure.measured == measured]
+        print_wrapped(f"{'; '.join(dict.fromkeys(names))}: {measured}")
+    for reason in prediction.left_out:
+        print_line(f"left out: {reason}")
+    for sentence in prediction.met():
+        print_line(sentence)
+    pressure = f"at {prediction.pressure_kpa:g} kPa"
+    if prediction.touches:
+        print_line(f"{prediction.name} failed: inflated parts collide {pressure}", "bold red")
+    else:
+        print_verdict(f"{prediction.name} predicted {pressure}: {len(prediction.figures)} figures")

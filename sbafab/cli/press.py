@@ -1,11 +1,11 @@
-"""``sbafab press``: the heat-press schedule only."""
+"""``sbafab press``: the heat-press schedule alone."""
 
 from __future__ import annotations
 
 import click
 
 from sbafab.cli.options import Request, run_options
-from sbafab.cli.working import run_parts
+from sbafab.cli.run import run_parts
 
 
 @click.command()

@@ -1,42 +1,101 @@
-"""What commands print: progress, findings, the closing table."""
+"""Printing that commands share: lines, tables of facts, JSON, findings and verdicts."""
 
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from sbafab.cli.lines import KEPT, console, facts_table, print_facts, print_line, print_wrapped
-from sbafab.progress import Progress, unheard
+from sbafab.rules.finding import counted
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
-    from sbafab.output.planned import Checked
-    from sbafab.output.run import Run
-    from sbafab.rules.finding import Finding
+    from sbafab.output.checked import Checked
+    from sbafab.rules.finding import Finding, Verdict
 
-DECKS = ("calculix/actuator.inp", "sofa/actuator.scn", "mujoco/actuator.xml")
-"""What a simulator opens."""
-LEFT_AS_IT_WAS = (
-    "is unchanged: it holds an earlier design or version; with "
-    "--set name=NAME this one gets its findings and pictures into a folder of its own"
-)
+NO_BREAK = "\u00a0"
+"""No-break space: `print_wrapped` keeps the words on both sides on one line."""
+
+
+def console() -> Console:
+    """Return a console on standard output; 80 columns without a terminal and COLUMNS."""
+    from rich.console import Console
+
+    class PipedConsole(Console):
+        """A console that raises BrokenPipeError when the reader closes the pipe."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return PipedConsole(highlight=False, soft_wrap=False)
+
+
+def wrapped(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
+    """Break a text between words into lines; ``first`` and ``rest`` are their indents."""
+    return textwrap.wrap(
+        text,
+        width,
+        initial_indent=first,
+        subsequent_indent=rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def print_wrapped(text: str, style: str = "", indent: str = "") -> None:
+    """Print a text broken between words, except at ``NO_BREAK``.
+
+    Every line is indented by ``indent``; without it, all but the first by two spaces.
+    """
+    rest = indent or "  "
+    for line in wrapped(text, console().width, indent, rest):
+        print_line(line.replace(NO_BREAK, " "), style)
+
+
+def print_line(text: str, style: str = "") -> None:
+    """Print a line without breaking it."""
+    from rich.text import Text
+
+    console().print(Text(text, style=style), soft_wrap=True)
+
+
+def print_facts(facts: Iterable[tuple[str, str]]) -> None:
+    """Print a table of labels and texts."""
+    from rich.text import Text
+
+    table = facts_table()
+    for label, text in facts:
+        table.add_row(label, Text(text))
+    console().print(table)
+
+
+def facts_table() -> Table:
+    """Return an empty table with a column of bold labels and one of texts."""
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(ratio=1, overflow="fold")
+    return table
+
+
 FILES = "files"
-"""What is to be changed where a folder was checked."""
+"""The thing to change when a folder was checked, for `print_failed`."""
 COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yellow"}
 
 
 def print_json(value: object) -> None:
+    """Print a value as indented JSON."""
     click.echo(json.dumps(value, indent=1, ensure_ascii=False))
 
 
 def print_listed(label: str, phrases: Sequence[str]) -> None:
-    """``label: one, two, three``, over several lines where one would be too long, none torn."""
+    """Print ``label: a, b, c``, with lines broken between phrases only."""
     from rich.text import Text
 
     out = console()
@@ -50,275 +109,149 @@ def print_listed(label: str, phrases: Sequence[str]) -> None:
     out.print(Text(line), soft_wrap=True)
 
 
-@contextmanager
-def shown_progress(quiet: bool) -> Iterator[Progress]:
-    """Tells on standard error how far the work in the block is, as -q and -v ask for.
-
-    A line that stays fresh on a terminal; elsewhere plain lines, the first after some seconds.
-    """
-    from sbafab.cli.progress_line import QUIET, VERBOSE, asked_for, live_line, plain_lines
-
-    if quiet or asked_for(QUIET):
-        yield unheard
-    elif sys.stderr.isatty() and not asked_for(VERBOSE):
-        with live_line() as tell:
-            yield tell
-    else:
-        yield plain_lines(asked_for(VERBOSE))
-
-
 def notes_of(checked: Iterable[Checked]) -> list[str]:
-    """What is to be known of several designs: each sentence once, with the names it is true of."""
+    """Return the notes of designs without repeats, each after the names of its designs.
+
+    A note of all of them stands without names.
+    """
     names: dict[str, list[str]] = {}
     designs = list(checked)
-    for one in designs:
-        for note in one.laminate.notes:
-            names.setdefault(note, []).append(one.design.name)
+    for design in designs:
+        for note in design.laminate.notes:
+            names.setdefault(note, []).append(design.design.name)
     return [
         note if len(of) == len(designs) else f"{', '.join(of)}: {note}"
         for note, of in names.items()
     ]
 
 
-def add_batch(table: Table, run: Run) -> None:
-    """Rows on several designs: how many of each, whether it holds, what was written of them."""
-    from rich.text import Text
-
-    for one in run.checked:
-        warned = sorted({f.rule for f in one.findings if f.verdict == "warn"})
-        said = f"; warns: {', '.join(warned)}" if warned else ""
-        waived = f"; waived: {', '.join(one.waived)}" if one.waived else ""
-        verdict = "a rule failed" if one.failed else "every rule holds"
-        words = f"{one.design.order.quantity} x, {verdict}{waived}{said}"
-        table.add_row(one.design.name, Text(words))
-    for note in notes_of(run.checked):
-        table.add_row("note", Text(note))
-    index = run.manifest
-    for film in index.get("films", ()):
-        table.add_row(f"{film['material']} film", Text(film_said(film, index["sheets"], 1)))
-    for mesh in index.get("meshes", ()):
-        table.add_row("solid", Text(f"{mesh['file']}, a node a part"))
-    for label, text in replaced(run.dropped):
-        table.add_row(label, Text(text))
-    if index:
-        table.add_row("folder", Text(str(run.folder)))
+# Findings, a line a rule; what to do about them; the verdict in the last line.
 
 
-def print_failed(findings: Iterable[Finding], written: str, change: str) -> None:
-    """What failed, what was ``written`` all the same, and the two ways on.
-
-    What lies on disk cannot be waived: its design can.
-    """
-    failed = sorted({finding.rule for finding in findings if finding.verdict == "fail"})
-    explain = f"sbafab explain {failed[0]}".replace(" ", KEPT)
-    waive = " ".join(f"--waive{KEPT}{name}" for name in failed)
-    other = f"waive by name: {waive}" if change != FILES else "regenerate the folder"
-    words = f"{written}: {', '.join(failed)} failed. Change the {change} ({explain}), or {other}"
-    print_wrapped(words, "bold red")
+SHARE_OF = {"pin-fit": "stretch", "registration-yield": "hold"}
+"""Words after the per cent sign, by rule: a film stretches over its pin, builds hold."""
 
 
-def print_run(run: Run) -> None:
-    """The closing table of a run: sizes, what was made, what the rules found."""
-    if not run.kept:
-        print_facts(_made(run))
-        click.echo()
-    print_verdict(run, "design")
+class Group(NamedTuple):
+    """Findings of one design, or between the parts of an assembly."""
+
+    name: str
+    findings: Sequence[Finding]
 
 
-def print_verdict(run: Run, change: str) -> None:
-    """What needs something done, and last whether the design or assembly holds."""
-    from sbafab.cli.verdicts import groups_of, print_open, verdict_said
+def groups_of(
+    checked: Iterable[Checked], between: Sequence[Finding] | None = None
+) -> tuple[Group, ...]:
+    """Return a group of findings for each design, and one for the checks between parts."""
+    groups = tuple(Group(design.design.name, design.findings) for design in checked)
+    return groups if between is None else (*groups, Group("between the parts", between))
 
-    groups = groups_of(run.checked, run.between)
+
+def print_findings(groups: Sequence[Group], verbose: bool = False) -> None:
+    """Print a line for every rule (of several groups only if ``verbose``), and the remedies."""
+    out = console()
     for group in groups:
+        if len(groups) > 1:
+            out.print(f"{group.name}: {counted(group.findings)}", style="bold", markup=False)
+        if verbose:
+            print_lines(group.findings, verbose)
+            continue
+        if len(groups) == 1:
+            print_lines(group.findings)
         print_open(group.findings)
-    if run.failed:
-        print_failed(run.findings, "No cut files were written", change)
-        if run.kept:
-            print_line(f"{run.folder} {LEFT_AS_IT_WAS}")
-        return
-    more = f"sbafab check {run.folder} says more"
-    print_line(verdict_said(run.folder.name, groups, more), "bold")
 
 
-def print_job(job: Run) -> None:
-    """What a job made; for a design that a rule stopped, what the rules found."""
+def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
+    """Print a line for each rule's decisive finding; ``verbose``: for all, with their messages."""
     from rich.text import Text
 
-    from sbafab.cli.verdicts import print_open
+    from sbafab.rules.finding import decisive
 
     out = console()
-    made = facts_table()
-    add_batch(made, job)
-    out.print(made)
-    for one in job.checked:
-        if one.failed:
-            out.print()
-            out.print(Text(one.design.name, style="bold red"))
-            print_open(one.findings)
-    if job.failed:
-        every = (finding for one in job.checked for finding in one.findings)
-        print_failed(every, f"Nothing was written; {job.folder} is as it was", "designs")
+    shown = findings if verbose else list(decisive(findings).values())
+    wide = max((len(finding.rule) for finding in shown), default=0)
+    out.print(Text(f"{'rule':{wide}}  verdict  {'measured':>13}  {'limit':>14}", style="bold"))
+    for finding in shown:
+        line = Text(f"{finding.rule:{wide}}  ")
+        line.append(f"{finding.verdict:7}", style=COLOURS[finding.verdict])
+        measured = short_figure(finding.measured, _unit(finding))
+        line.append(f"  {measured:>13}  {limit_text(finding):>14}")
+        line.rstrip()
+        out.print(line, soft_wrap=True)
+        for row in wrapped(finding.message, out.width, "    ", "    ") if verbose else ():
+            out.print(Text(row), soft_wrap=True)
 
 
-def job_json(job: Run) -> dict[str, object]:
-    """The result of a job for programs."""
-    from sbafab.output.printed import NESTED_SCHEMA
-
-    return {
-        "schema": NESTED_SCHEMA,
-        "folder": str(job.folder),
-        "failed": job.failed,
-        "designs": [
-            {
-                "name": one.design.name,
-                "failed": one.failed,
-                "findings": [finding.as_dict() for finding in one.findings],
-                "notes": notes_of([one]),
-            }
-            for one in job.checked
-        ],
-        "files": sorted(job.manifest.get("files", ())),
-    }
+def print_open(findings: Sequence[Finding]) -> None:
+    """Print the remedy, or the message, of each warning, failure and rule waived by the user."""
+    # Bond and overhang may have one remedy.
+    for sentence, verdict in dict.fromkeys(_open_sentences(findings)):
+        print_wrapped(sentence, COLOURS[verdict])
 
 
-def _made(run: Run) -> Iterator[tuple[str, str]]:
-    from sbafab.pressing.together import batch_times, design_runs
-
-    index = run.manifest
-    lam = run.laminate
-    counts: dict[str, int] = {}
-    for layer in lam.layers:
-        kind = f"{layer.film.material} {layer.role}"
-        counts[kind] = counts.get(kind, 0) + 1
-    sizes = index["sizes"]
-    balloons = "1 balloon" if lam.balloons == 1 else f"{lam.balloons} balloons"
-    yield (
-        "design",
-        f"{lam.name} ({lam.family}, {balloons}), {index['design_sha256'][:12]}",
-    )
-    yield "kit", f"{index['kit']['name']}, version {index['kit']['version']}"
-    yield "sizes", ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in sizes.items()) + " mm"
-    yield (
-        "layers",
-        f"{len(lam.layers)} in {len(lam.patterns)} patterns: "
-        + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
-    )
-    yield from replaced(run.dropped)
-    cut = [layer["file"] for layer in index["layers"] if layer["file"]]
-    if cut:
-        plate = f", and the base plate {index['fixture']}" if index["fixture"] else ""
-        yield (
-            "cut files",
-            f"{len(cut)} in layers/{plate}, each read back and compared with its profile",
-        )
-    panel = index.get("panel")
-    if panel:
-        width, length = panel["size"]
-        batches = "1 batch" if panel["batches"] == 1 else f"{panel['batches']} batches"
-        yield (
-            "panel",
-            f"one sheet a layer, {width:.2f} x {length:.2f} mm; {batches} with places for "
-            f"{len(panel['places'])} each; freed by {panel['second_cut']}",
-        )
-    yield from _ordered(run)
-    for film in index["films"]:
-        if "sheets" in film:
-            yield f"{film['material']} film", film_said(film, index["sheets"], index["copies"])
-    if run.schedule is not None:
-        force = run.schedule.steps[0].force_n / 1000
-        yield (
-            "press",
-            f"{len(run.schedule.steps)} steps, {_minutes(run.schedule.total_press_minutes)} at "
-            f"{run.schedule.steps[0].temperature_c:g} C, {force:.3f} kN; press.json, press.csv",
-        )
-        runs = design_runs(run.design, lam)
-        if runs.copies > 1:
-            took = batch_times(runs, run.schedule)
-            sizes = ", ".join(map(str, dict.fromkeys(runs.cycles)))
-            yield (
-                "batch",
-                f"{runs.copies} copies in {runs.count} press cycle{'s' if runs.count > 1 else ''} "
-                f"of {sizes}: {_minutes(took.press)} in the press, {_minutes(took.total)} in all",
-            )
-    yield from _for_simulation(run)
-    if cut:
-        for said in index["warnings"]:
-            yield "warning", said
-    for note in lam.notes:
-        yield "note", note
-    for warning in run.schedule.warnings if run.schedule is not None else ():
-        yield "warning", warning
-    yield "folder", str(run.folder)
+def _open_sentences(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
+    for finding in findings:
+        if finding.verdict in ("fail", "warn") or finding.by_user:
+            yield f"{finding.rule}: {finding.remedy or finding.message}", finding.verdict
 
 
-def _minutes(value: float | None) -> str:
-    return "minutes not stated" if value is None else f"{value:g} min"
+def print_verdict(sentence: str) -> None:
+    """Print the last line of a command that is done."""
+    print_line(sentence, "bold")
 
 
-def replaced(dropped: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The row on the files of an earlier run that were removed, if there were any."""
-    if dropped:
-        count = "1 stale file" if len(dropped) == 1 else f"{len(dropped)} stale files"
-        names = ", ".join(dict.fromkeys(path.partition("/")[0] for path in dropped))
-        yield (
-            "replaced",
-            f"removed {count} ({names}); --set name=NAME gives a design a folder of its own",
-        )
+def print_passed(name: str, groups: Sequence[Group], details: str = "") -> None:
+    """Print the verdict of a design or assembly that passed; ``details``: the command for more."""
+    more = f" Details: {details}" if details else ""
+    counts = counted(*(group.findings for group in groups))
+    print_verdict(f"{name} passed: {counts}.{more}")
 
 
-def _for_simulation(run: Run) -> Iterator[tuple[str, str]]:
-    index = run.manifest
-    if index["meshes"]:
-        names = ", ".join(mesh["file"] for mesh in index["meshes"])
-        yield "meshes", names
-    decks = [path for path in DECKS if path in index["files"]]
-    if decks:
-        yield "simulators", ", ".join(decks)
-    for name, figures in run.conforming.statistics.items() if run.conforming else ():
-        yield (
-            f"{name} mesh",
-            f"{figures['elements']:,} {figures['element']} elements, {figures['nodes']:,} nodes, "
-            f"least scaled Jacobian {figures['least_scaled_jacobian']:.3f}, worst aspect "
-            f"{figures['worst_aspect']:.1f}, {figures['volume_mm3']:.3f} mm3",
-        )
-    for note in run.conforming.volume.notes if run.conforming else ():
-        yield "", note
-    if run.conforming is not None and run.conforming.fill is not None:
-        yield "", "solid.* and cavity_<chamber>.stl show it flat, skin.* shows it filled."
+def print_failed(name: str, findings: Iterable[Finding], consequence: str, change: str) -> None:
+    """Print the verdict of what failed: the rules, the consequence and two remedies.
 
-
-def _ordered(run: Run) -> Iterator[tuple[str, str]]:
-    """A row on an order of good actuators."""
-    if run.design.order.why:
-        yield "order", run.design.order.why
-
-
-def film_said(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copies: int) -> str:
-    """How a film is used: sheets, their size, density, waste and estimated time."""
-    own = [sheet for sheet in sheets if sheet["material"] == film["material"]]
-    count = f"{len(own)} sheet{'s' if len(own) > 1 else ''}"
-    sizes = dict.fromkeys(f"{sheet['width']:g} x {sheet['length']:g}" for sheet in own)
-    minutes = sum(sheet["estimated_minutes"] for sheet in own)
-    many = f" for {copies} copies" if copies > 1 else ""
-    bare = any(sheet["label"] == "no room" for sheet in own)
-    unlabelled = "; the border has no room for labels, so write on them what they are"
-    return (
-        f"{count} of {', '.join(sizes)} mm{many}, {film['density']:.0%} used, "
-        f"{film['waste'] / 100:.0f} cm2 waste, about {minutes:.1f} min of cutting; "
-        f"{', '.join(sheet['file'] for sheet in own)}{unlabelled if bare else ''}"
+    A rule cannot be waived for files on disk, only for their design (``change`` is FILES).
+    """
+    failed = sorted({finding.rule for finding in findings if finding.verdict == "fail"})
+    explain = f"sbafab explain {failed[0]}".replace(" ", NO_BREAK)
+    waive = " ".join(f"--waive{NO_BREAK}{rule}" for rule in failed)
+    other = f"waive by name: {waive}" if change != FILES else "regenerate the folder"
+    print_wrapped(
+        f"{name} failed: {', '.join(failed)}. {consequence}. Change the {change} ({explain}), "
+        f"or {other}",
+        "bold red",
     )
 
 
-def run_json(run: Run) -> dict[str, object]:
-    """The result of a run for programs."""
-    from sbafab.output.printed import RUN_SCHEMA
+def limit_text(finding: Finding) -> str:
+    """Return a limit behind ">=" if it is a lower one, behind "<=" if it is an upper one."""
+    if finding.limit is None:
+        return "no target" if finding.rule in SHARE_OF else ""
+    sense = "<=" if _is_upper_limit(finding.rule) else ">="
+    return f"{sense} {short_figure(finding.limit, _unit(finding))}"
 
-    return {
-        "schema": RUN_SCHEMA,
-        "folder": str(run.folder),
-        "failed": run.failed,
-        "findings": [finding.as_dict() for finding in run.findings],
-        "notes": notes_of(run.checked),
-        "files": [] if run.kept else sorted(run.manifest["files"]),
-    }
+
+def _unit(finding: Finding) -> str:
+    """Return the unit of a finding's figures; a share's is a per cent sign and its denominator."""
+    return f"% {SHARE_OF[finding.rule]}" if finding.rule in SHARE_OF else finding.unit
+
+
+def _is_upper_limit(rule: str) -> bool:
+    """Return True if the rule's limit is the largest permitted value."""
+    from sbafab.rules.deck import AT_MOST, rule_names
+
+    if rule in rule_names():
+        return rule in AT_MOST
+    from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
+
+    return rule in BETWEEN_PARTS
+
+
+def short_figure(value: float | None, unit: str) -> str:
+    """Return a measured value with its unit as text, "" for None."""
+    if value is None:
+        return ""
+    if unit.startswith("%"):
+        return f"{100 * value:.3g}{unit}"
+    digits = f"{value:.3f}" if unit == "mm" else f"{value:.4g}"
+    return f"{digits} {unit}".strip()

@@ -1,4 +1,4 @@
-"""``sbafab reproduce``: the paper's figures beside ours."""
+"""``sbafab reproduce``: measured values of the paper beside predictions."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import json_option, out_option
+from sbafab.cli.printing import print_json, print_verdict
 
 if TYPE_CHECKING:
-    from sbafab.reproduction.records import Row
+    from sbafab.reproduction.rows import Row
 
 FOLDER = "reproduction"
 
@@ -19,23 +20,27 @@ FOLDER = "reproduction"
 @out_option
 @json_option
 def reproduce(out: Path, as_json: bool) -> None:
-    """Put the paper's figures beside ours.
+    """Compare predictions with the paper's measurements.
 
-    OUT/reproduction/ gets reproduction.md, reproduction.json and a chart for each figure of the
-    paper that is predicted, with the paper's error bars.
+    OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for each predicted
+    figure of the paper, with its error bars.
     """
-    from sbafab.cli.printing import print_json
-    from sbafab.reproduction import write
+    from sbafab.reproduction import page
 
-    found = write.reproduce(out / FOLDER)
+    sections = page.reproduce(out / FOLDER)
     if as_json:
-        print_json({**write.as_json(found), "folder": str(out / FOLDER)})
+        print_json({**page.as_json(sections), "folder": str(out / FOLDER)})
         return
-    for section, rows in found.items():
+    for section, rows in sections.items():
         click.echo(f"\n{section}")
         for row in rows:
-            click.echo(f"  {row.what:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
-    click.echo(f"\nwritten to {out / FOLDER}: reproduction.md, reproduction.json, charts")
+            click.echo(f"  {row.figure:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
+    rows = [row for section in sections.values() for row in section]
+    predicted = sum(row.predicted is not None for row in rows)
+    print_verdict(
+        f"\nPaper reproduced: {predicted} of {len(rows)} values predicted. Written to "
+        f"{out / FOLDER}: reproduction.md, reproduction.json, charts"
+    )
 
 
 def _measured(row: Row) -> str:

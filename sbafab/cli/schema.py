@@ -1,8 +1,10 @@
-"""``sbafab schema``: JSON schemas of design files and of what the program writes."""
+"""``sbafab schema``: JSON schemas of design files and of written files."""
 
 from __future__ import annotations
 
 import click
+
+from sbafab.cli.printing import print_json
 
 FORMATS = (
     *("design", "checks", "manifest", "job", "assembly"),
@@ -10,7 +12,7 @@ FORMATS = (
     *("sweep", "simulate", "assembly-predict", "reproduction"),
     *("balloon-map", "kerf", "explain", "explained", "templates", "error"),
 )
-"""As in ``sbafab.output.schemas``, whose imports would slow ``--help`` down."""
+"""As in ``sbafab.cli.formats``, whose imports would slow ``--help`` down."""
 
 
 @click.command()
@@ -18,9 +20,8 @@ FORMATS = (
 def schema(name: str) -> None:
     """Print a JSON schema, by default that of design files.
 
-    Editors complete and check design files from it; the other formats are what programs read.
+    Editors use it to complete and check design files; the other schemas describe JSON output.
     """
-    from sbafab.cli.printing import print_json
-    from sbafab.output.schemas import schema_of
+    from sbafab.cli.formats import schema_of
 
     print_json(schema_of(name))

@@ -1,4 +1,4 @@
-"""``sbafab simulate``: a real simulator run on the design, its results beside it."""
+"""``sbafab simulate``: a run of an installed simulator, and its results."""
 
 from __future__ import annotations
 
@@ -7,12 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import LENGTH, PRESSURE, VOLUME, OfChamber, by_chamber
-from sbafab.cli.working import RULE_FAILED
+from sbafab.cli.exit import RULE_FAILED, print_error
+from sbafab.cli.options import (
+    LENGTH,
+    PRESSURE,
+    VOLUME,
+    OfChamber,
+    Request,
+    by_chamber,
+    finite,
+    run_options,
+)
+from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
+from sbafab.cli.progress import shown_progress
 
 if TYPE_CHECKING:
-    from sbafab.simulators.simulator import Name, Result, Wish
+    from sbafab.simulators.simulator import Name, Result, SimulationRequest
 
 SIMULATORS = ("calculix", "sofa", "mujoco")
 """As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
@@ -22,13 +32,14 @@ MOST_MINUTES = 10_000
 @click.command()
 @run_options
 @click.option(
-    "--with", "simulator", type=click.Choice(SIMULATORS), required=True, help="The simulator."
+    "--with", "simulator", type=click.Choice(SIMULATORS), required=True, help="Simulator."
 )
 @click.option(
     "--pressure",
     type=PRESSURE.read,
     metavar="P",
-    help='In every chamber, kPa or with a unit ("60 mbar").  [default: calculix 6, others 5]',
+    help='Pressure in all chambers, kPa or with a unit ("60 mbar").  '
+    "[default: calculix 6, others 5]",
 )
 @click.option(
     "--chamber",
@@ -37,7 +48,7 @@ MOST_MINUTES = 10_000
     callback=by_chamber,
     multiple=True,
     metavar="NAME=P",
-    help="Pressure in one chamber; without --pressure the others have none. Repeatable.",
+    help="Pressure in one chamber; the others have --pressure if given, else none. Repeatable.",
 )
 @click.option(
     "--minutes",
@@ -45,31 +56,33 @@ MOST_MINUTES = 10_000
     callback=finite,
     default=120,
     show_default=True,
-    help="Stop then, and keep what has been reached.",
+    help="Time limit, minutes; results up to then are kept.",
 )
-@click.option("--export", is_flag=True, help="Write what the simulator reads, and run nothing.")
+@click.option(
+    "--export", is_flag=True, help="Write the input files of the simulator without running it."
+)
 @click.option("--h", type=LENGTH.read, metavar="MM", help="calculix: mesh size.  [default: 0.35]")
 @click.option(
     "--symmetry",
     type=click.Choice(["full", "half", "quarter", "sector"]),
-    help="calculix: the part that is computed; only all of it wrinkles and bends as it likes."
+    help="calculix: part that is computed; only the full one wrinkles and bends freely."
     "  [default: full]",
 )
 @click.option(
     "--procedure",
     type=click.Choice(["dynamic", "static"]),
-    help="calculix: static is faster, but ends where films wrinkle.  [default: dynamic]",
+    help="calculix: static is faster but stops when films wrinkle.  [default: dynamic]",
 )
 @click.option(
     "--scene",
     type=click.Choice(["shell", "frames", "volume", "beam"]),
-    help="sofa: which of the scenes is run.  [default: shell]",
+    help="sofa: scene that is run.  [default: shell]",
 )
 @click.option(
     "--seconds",
     type=float,
     metavar="S",
-    help="sofa, mujoco: simulated time, for mujoco 2 at least.  [default: 8; 5]",
+    help="sofa, mujoco: simulated time, s; for mujoco at least 2.  [default: sofa 8, mujoco 5]",
 )
 @click.option(
     "--volume",
@@ -78,67 +91,67 @@ MOST_MINUTES = 10_000
     callback=by_chamber,
     multiple=True,
     metavar="NAME=UL",
-    help="sofa, scene volume: what a chamber is given above its start. Repeatable.",
+    help="sofa, scene volume: volume added to a chamber. Repeatable.",
 )
-def simulate(request: Request, simulator: Name, export: bool, **asked: Any) -> None:
-    """Inflate a design in a simulator that is installed.
+def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -> None:
+    """Inflate a design in an installed simulator.
 
-    Into OUT/<name>/calculix/ come stroke, air and wall stress against pressure as table and plot,
-    the deformed shape as VTU and picture; into OUT/<name>/sofa/ or mujoco/ what it has read.
-    result.json holds what each found over time. Exit code 1 if a run stopped early: what it
-    reached is kept.
+    OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as table and
+    plot, and the deformed shape as VTU and picture; OUT/<name>/sofa/ or mujoco/ the input files of
+    the run. result.json holds the results over time. If a run stops early, its results are kept
+    and the exit code is 1.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.printing import print_json, shown_progress
-    from sbafab.cli.verdicts import Group, print_findings
     from sbafab.models.paper import BURST
-    from sbafab.output.checking import checks
-    from sbafab.output.simulating import result_json
-    from sbafab.output.simulating import simulate as run
-    from sbafab.simulators.simulator import Wish
+    from sbafab.output.checked import checks
+    from sbafab.runs.run import result_json
+    from sbafab.runs.run import simulate as run
+    from sbafab.simulators.simulator import SimulationRequest
 
-    wish = Wish(**asked)
+    wish = SimulationRequest(**settings)
     _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    with shown_progress(request.as_json) as tell:
-        made = run(design, simulator, wish, request.out, tell, export)
-    if made.folder is None:
+    with shown_progress(request.as_json) as progress:
+        simulation = run(design, simulator, wish, request.out, progress, export)
+    if simulation.folder is None:
         if request.as_json:
-            print_json(checks(made.findings, "design", design.name))
+            print_json(checks(simulation.findings, "design", design.name))
         else:
-            print_findings([Group(design.name, made.findings)])
+            print_findings([Group(design.name, simulation.findings)])
+            print_failed(design.name, simulation.findings, "It was not simulated", "design")
         click.get_current_context().exit(RULE_FAILED)
-    found = made.result
+    result = simulation.result
     if request.as_json:
-        print_json({**result_json(found), "folder": str(made.folder)})
+        print_json({**result_json(result), "folder": str(simulation.folder)})
     else:
-        _print(found, made.folder)
-    most = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
-    if most > BURST.value:
-        click.echo(
-            f"sbafab: the paper's actuators burst at {BURST.value:g} kPa; no film tears or yields "
-            f"in a simulation, so at {most:g} kPa it shows what will not be",
-            err=True,
+        _print(design.name, result, simulation.folder, export)
+    highest = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
+    if highest > BURST.value:
+        print_error(
+            f"warning: the paper's actuators burst at {BURST.value:g} kPa; films cannot tear or "
+            f"yield in the simulation, so its results at {highest:g} kPa are not physical"
         )
-    if found.stopped is not None:
-        click.echo(f"sbafab: {found.stopped}", err=True)
+    if result.stopped is not None:
+        print_error(result.stopped)
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _refuse_unused(simulator: Name, wish: Wish) -> None:
-    from sbafab.simulators.simulator import simulator as find
+def _refuse_unused(simulator: Name, wish: SimulationRequest) -> None:
+    """Raise UsageError for an option that the simulator does not use."""
+    from sbafab.simulators.simulator import simulator as simulator_module
     from sbafab.simulators.simulator import users
 
-    for name in wish.given:
-        if name not in find(simulator).USES:
+    for name in wish.specific_fields:
+        if name not in simulator_module(simulator).USES:
             option = "volume" if name == "volumes" else name
             raise click.UsageError(
                 f"--{option} is for {' and '.join(users(name))}; leave it out with {simulator}"
             )
 
 
-def _print(found: Result, target: Path) -> None:
-    width = max((len(label) for label, _, _ in found.rows), default=0)
-    for label, value, unit in found.rows:
+def _print(name: str, result: Result, folder: Path, is_export: bool) -> None:
+    width = max((len(label) for label, _, _ in result.rows), default=0)
+    for label, value, unit in result.rows:
         click.echo(f"{label:{width}} {value:10.3f} {unit}")
-    click.echo(f"written to {target}")
+    outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
+    print_verdict(f"{name} {'exported' if is_export else outcome}. Written to {folder}")

@@ -1,4 +1,4 @@
-"""``sbafab studio``: a page in the browser that edits a design and shows it."""
+"""``sbafab studio``: a page in the browser to edit and see a design."""
 
 from __future__ import annotations
 
@@ -6,24 +6,32 @@ from pathlib import Path
 
 import click
 
+from sbafab.cli.printing import print_verdict
+
 
 @click.command()
 @click.argument("source", metavar="[DESIGN|FOLDER|LINK]", required=False)
 @click.option(
-    "--port", type=click.IntRange(1, 65535), help="Port to listen on; 8417 if it is free."
+    "--port",
+    type=click.IntRange(1, 65535),
+    help="Port to listen on.  [default: 8417, or another if it is taken]",
 )
-@click.option("--browser/--no-browser", default=True, help="Whether to open the browser.")
+@click.option(
+    "--browser/--no-browser",
+    default=True,
+    help="Open the page in the browser, or only print its link.",
+)
 @click.option(
     "--static",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Write the page into FOLDER, to run without a server of ours: Python runs in the page.",
+    help="Write the page to FOLDER, to be served by any web server: Python runs in the page.",
 )
 @click.option(
     "--pyodide",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Where Pyodide and its wheels lie, for --static; node_modules/pyodide if not given.",
+    help="With --static: folder of Pyodide and its wheels.  [default: node_modules/pyodide]",
 )
 def studio(
     source: str | None,
@@ -34,24 +42,24 @@ def studio(
 ) -> None:
     """Edit a design in the browser.
 
-    Layers, rules, prediction and actuator follow at once.
+    Layers, rules, prediction and actuator are updated at once.
 
-    The page is served on this machine only and asks for the token in its link. Ctrl-C ends it.
+    The page is served on this machine only, and needs the token in its link. Ctrl-C stops it.
     """
     if static is not None:
         if source is not None:
             raise click.UsageError(
-                f"--static writes a page for any design; leave out {source}, and open it in there"
+                f"--static writes a page for any design; leave out {source} and open it in the page"
             )
         _write(static, pyodide)
         return
     if pyodide is not None:
         raise click.UsageError("--pyodide goes with --static FOLDER")
-    from sbafab.studio.serving import serve
+    from sbafab.studio.app import serve
 
     def announce(link: str) -> None:
         click.echo(f"studio: {link}")
-        click.echo("Ctrl-C ends it.")
+        click.echo("Ctrl-C stops it.")
         if browser:
             import webbrowser
 
@@ -64,10 +72,11 @@ def _write(folder: Path, pyodide: Path | None) -> None:
     from sbafab.studio.without_server import write
 
     page = write(folder, pyodide)
-    click.echo(f"{page.folder}: {page.bytes / 1e6:.1f} MB; any web server can hand it out, such as")
-    click.echo(f"    python -m http.server --bind 127.0.0.1 --directory {page.folder}")
     for name in page.lacks:
         click.echo(
-            f"Without {name} it has no prediction, motion, registration rules and cut files; put "
-            f"the wheel of {name} from Pyodide's distribution beside Pyodide, and write it again."
+            f"Without {name} the page has no prediction, motion, registration rules and cut files; "
+            f"put the wheel of {name} from Pyodide's distribution beside Pyodide and write again"
         )
+    click.echo("Any web server can serve the page, for example:")
+    click.echo(f"    python -m http.server --bind 127.0.0.1 --directory {page.folder}")
+    print_verdict(f"Studio written to {page.folder}: {page.bytes / 1e6:.1f} MB")

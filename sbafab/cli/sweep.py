@@ -1,4 +1,4 @@
-"""``sbafab sweep``: one design with keys varied, every one checked and predicted."""
+"""``sbafab sweep``: a design with varied keys, every variant checked and predicted."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sbafab.cli.options import Request, finite, run_options
-from sbafab.cli.quantities import PRESSURE
+from sbafab.cli.exit import print_error
+from sbafab.cli.options import PRESSURE, Request, finite, run_options
+from sbafab.cli.printing import print_json, print_verdict
+from sbafab.cli.progress import shown_progress
 
 if TYPE_CHECKING:
     from sbafab.search.sweep import SweepRequest, SweptDesigns
@@ -21,17 +23,17 @@ if TYPE_CHECKING:
     metavar="KEY=VALUES",
     multiple=True,
     required=True,
-    help="Vary a key: KEY=START:STOP:STEP or KEY=a,b,c. Repeatable; every value of one is combined "
-    "with every value of the others.",
+    help="Vary a key: KEY=START:STOP:STEP or KEY=a,b,c. Repeatable; all combinations of the values "
+    "are swept.",
 )
 @click.option(
     "--samples",
     type=click.IntRange(1),
     metavar="N",
-    help="Draw N designs by Latin hypercube in place of the whole grid; ranges then need no step.",
+    help="Sample N designs by Latin hypercube instead of the full grid; ranges need no step.",
 )
 @click.option(
-    "--seed", type=int, default=0, show_default=True, metavar="S", help="Of what is drawn."
+    "--seed", type=int, default=0, show_default=True, metavar="S", help="Seed of the sampling."
 )
 @click.option(
     "--pressure",
@@ -45,12 +47,12 @@ if TYPE_CHECKING:
     "--workers",
     type=click.IntRange(1, 256),
     metavar="K",
-    help="Processes that measure side by side.  [default: one a processor]",
+    help="Parallel processes.  [default: one for each processor]",
 )
 @click.option(
     "--dask",
     metavar="ADDRESS",
-    help='Measure on the Dask cluster with this scheduler (pip install "sbafab[dask]").',
+    help='Run on the Dask cluster with this scheduler (pip install "sbafab[dask]").',
 )
 @click.option(
     "--timeout",
@@ -60,79 +62,81 @@ if TYPE_CHECKING:
     default=300.0,
     show_default=True,
     metavar="S",
-    help="Seconds that one design may take.",
+    help="Time limit for one design, seconds.",
 )
 @click.option(
     "--all-columns",
     is_flag=True,
-    help="Tables with every key, rule and figure, not only those varied, asked for and binding.",
+    help="Write every key, rule and figure, not only those varied, requested and binding.",
 )
 def sweep(
-    request: Request, varied: tuple[str, ...], pressures: tuple[float, ...], **asked: Any
+    request: Request, varied: tuple[str, ...], pressures: tuple[float, ...], **settings: Any
 ) -> None:
-    """Check and predict many designs: one with keys varied.
+    """Check and predict variants of a design.
 
-    OUT/<name>-sweep/ gets sweep.csv (and sweep.parquet where pyarrow is installed) with a row a
-    design, times.csv, and the page sweep.html. A run that was stopped goes on where it was.
+    OUT/<name>-sweep/ receives sweep.csv (and sweep.parquet if pyarrow is installed) with a row for
+    each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
+    that was stopped.
     """
     from sbafab.actuators import load_design
-    from sbafab.cli.ending import say
-    from sbafab.cli.printing import print_json, shown_progress
-    from sbafab.models.figures import Asked
-    from sbafab.models.force import force
+    from sbafab.models.figures import PredictionRequest
+    from sbafab.models.formulas import force
     from sbafab.search import sweep as search
     from sbafab.search.vary import read_varied
 
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    kpa = pressures or Asked.pressures_kpa
+    kpa = pressures or PredictionRequest.pressures_kpa
     force(kpa, 0.0)  # raises for pressures out of range
     ranges = tuple(read_varied(text) for text in varied)
-    wanted = search.SweepRequest(design, ranges, pressures_kpa=kpa, **asked)
+    sweep_request = search.SweepRequest(design, ranges, pressures_kpa=kpa, **settings)
     try:
         with shown_progress(request.as_json) as progress:
-            found = search.sweep(wanted, request.out, progress)
+            designs = search.sweep(sweep_request, request.out, progress)
     except search.SweepStopped as stop:
-        say(
-            f"{stop.measured} of {stop.designs} designs are measured; the same command goes on "
-            "from there"
+        print_error(
+            f"{stop.measured} of {stop.designs} designs are computed; run the same command again "
+            "to resume"
         )
         raise
     if request.as_json:
-        print_json(_as_json(found))
+        print_json(_as_json(designs))
     else:
-        _print(wanted, found)
+        _print(sweep_request, designs)
 
 
-def _as_json(found: SweptDesigns) -> dict[str, object]:
-    from sbafab.output.printed import SWEEP_SCHEMA
+def _as_json(designs: SweptDesigns) -> dict[str, object]:
+    from sbafab.output.schema_ids import SWEEP_SCHEMA
 
     return {
         "schema": SWEEP_SCHEMA,
-        "folder": str(found.folder),
-        "designs": found.designs,
-        "measured_now": found.measured,
-        "no_longer_asked": found.no_longer_asked,
-        "outcomes": found.outcomes,
-        "files": list(found.files),
+        "folder": str(designs.folder),
+        "designs": designs.designs,
+        "measured_now": designs.measured,
+        "no_longer_asked": designs.no_longer_asked,
+        "outcomes": designs.outcomes,
+        "files": list(designs.files),
     }
 
 
-def _print(wanted: SweepRequest, found: SweptDesigns) -> None:
-    said = ", ".join(f"{count} {outcome}" for outcome, count in found.outcomes.items())
-    before = found.designs - found.measured
-    earlier = f"; {before} were measured by an earlier run" if before else ""
-    many = "s" if found.designs > 1 else ""
-    click.echo(f"{found.designs} design{many} of {wanted.design.name}: {said}{earlier}")
-    click.echo(f"written to {found.folder}: {', '.join(found.files)}")
-    if found.no_longer_asked:
+def _print(request: SweepRequest, designs: SweptDesigns) -> None:
+    """Print hints on the tables and, last, the verdict."""
+    if designs.no_longer_asked:
         click.echo(
-            f"{found.no_longer_asked} of the designs that an earlier sweep had in these tables are "
-            "not asked for now; its command brings them back from the journal"
+            f"The tables leave out {designs.no_longer_asked} designs of an earlier sweep; its "
+            "command restores them from the journal"
         )
-    if not wanted.all_columns:
+    if not request.all_columns:
         click.echo(
-            "columns: what was varied, asked for and binding; --all-columns has all, and measures "
-            "nothing anew"
+            "columns: varied, requested and binding; --all-columns writes all without computing "
+            "again"
         )
-    if "sweep.parquet" not in found.files:
+    if "sweep.parquet" not in designs.files:
         click.echo('for Parquet as well: pip install "sbafab[parquet]"')
+    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in designs.outcomes.items())
+    resumed = designs.designs - designs.measured
+    earlier = f"; {resumed} from an earlier run" if resumed else ""
+    count = "1 design" if designs.designs == 1 else f"{designs.designs} designs"
+    print_verdict(
+        f"{request.design.name} swept: {count}, {outcomes}{earlier}. Written to {designs.folder}: "
+        f"{', '.join(designs.files)}"
+    )

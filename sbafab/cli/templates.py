@@ -1,18 +1,18 @@
-"""``sbafab templates``: the designs that ship."""
+"""``sbafab templates``: the list of templates."""
 
 from __future__ import annotations
 
 import click
 
 from sbafab.cli.options import json_option
+from sbafab.cli.printing import print_json
 
 
 @click.command()
 @json_option
 def templates(as_json: bool) -> None:
-    """List the designs that ship, a line each."""
-    from sbafab.cli.printing import print_json
-    from sbafab.design.templates import template_summaries
+    """List the templates, a line each."""
+    from sbafab.design.files import template_summaries
 
     summaries = template_summaries()
     if as_json:

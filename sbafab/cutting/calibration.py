@@ -1,4 +1,4 @@
-"""The kerf from what was measured on the calibration piece, with its uncertainty.
+"""The calibration piece, its table of measured sizes, and the kerf from them with its uncertainty.
 
 An outside comes out smaller by the kerf, a window larger; a constant reading error makes both
 larger, and a scale both in proportion. So all three are fitted together, by least squares of
@@ -11,14 +11,30 @@ quadrature, Student's t for the interval.
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.lettering import Stroke, strokes
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import coupon_properties
+from sbafab.cutting.sheets import sheet_svg
+from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region, rectangle, union
+from sbafab.spreadsheet import csv_text
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 MOST_DEGREES = 200
 """Degrees of freedom from which on Student's t is taken as if there were no more."""
@@ -33,8 +49,6 @@ MOST_SUSPECTS = 20
 WIDEST = 0.05
 """mm; half the largest error of laser cutting: a kerf known no better deserves a warning."""
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 SAME_COLUMN = 1e-6
 """Singular values of columns of length 1, below which the sizes do not tell two causes apart."""
@@ -71,7 +85,7 @@ class Measurement:
 
     @property
     def kerf(self) -> float:
-        """What this size alone says of the kerf."""
+        """The kerf by this size alone, mm."""
         return self.sign * (self.measured - self.nominal)
 
     def __str__(self) -> str:
@@ -96,7 +110,7 @@ class Value(NamedTuple):
         return self.value - self.half_width, self.value + self.half_width
 
     def differs_from(self, other: float) -> bool:
-        """Whether the interval leaves ``other`` out."""
+        """Return True if the interval does not hold ``other``."""
         return abs(self.value - other) > self.half_width
 
 
@@ -121,16 +135,16 @@ class Estimate:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether the sizes show a scale other than 1."""
+        """True if the sizes show a scale other than 1."""
         return self.scale is not None and self.scale.differs_from(1.0)
 
     @property
     def is_vague(self) -> bool:
-        """Whether the kerf may as well be none, or is known too badly to compensate with."""
+        """True if the kerf may be none, or is known too badly to compensate with."""
         return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
 
     def gap(self, size: Measurement) -> float:
-        """How far a size lies from what kerf and scale say it should be."""
+        """Return the distance of a size from its value by kerf and scale, mm."""
         scale = 1.0 if self.scale is None else self.scale.value
         scale += size.along_x * self.scale_along_x
         kerf = self.kerf.value + size.along_x * self.kerf_along_x
@@ -152,7 +166,7 @@ class Calibration:
 
     @property
     def differs(self) -> bool:
-        """Whether the kerf along x is another one than along y."""
+        """True if the kerf along x differs from that along y."""
         return self.difference is not None and self.difference.differs_from(0.0)
 
 
@@ -182,30 +196,30 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
         raise DesignError(
             f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
         )
-    found = _fitted(measurements, resolution)
-    if _is_other_unit(found):
-        assert found.scale is not None
+    estimate = _fitted(measurements, resolution)
+    if _is_other_unit(estimate):
+        assert estimate.scale is not None
         raise DesignError(
-            f"the measured sizes{where} are about {found.scale.value:.3g} times the nominal ones; "
-            "give them in millimetres"
+            f"the measured sizes{where} are about {estimate.scale.value:.3g} times the nominal "
+            "ones; give them in millimetres"
         )
-    if not 0 <= found.kerf.value <= LARGEST:
-        kind = "negative" if found.kerf.value < 0 else f"over {LARGEST:g} mm"
+    if not 0 <= estimate.kerf.value <= LARGEST:
+        kind = "negative" if estimate.kerf.value < 0 else f"over {LARGEST:g} mm"
         raise DesignError(
-            f"the kerf{where} comes out as {found.kerf.value:.3f} mm, which is {kind}; check the "
-            "measurements, the unit and which rows are outers and windows"
+            f"the kerf{where} comes out as {estimate.kerf.value:.3f} mm, which is {kind}; check "
+            "the measurements, the unit and which rows are outers and windows"
         )
-    worst = max(measurements, key=found.gap)
-    if found.gap(worst) > LARGEST_SLIP:
+    worst = max(measurements, key=estimate.gap)
+    if estimate.gap(worst) > LARGEST_SLIP:
         raise DesignError(
-            f"{worst} is {found.gap(worst):.2f} mm off what the sizes together say; measure it "
+            f"{worst} is {estimate.gap(worst):.2f} mm off what the sizes together say; measure it "
             "again, and the others too"
         )
-    return found
+    return estimate
 
 
-def _is_other_unit(found: Estimate) -> bool:
-    return found.scale is not None and abs(found.scale.value - 1) > WORST_SCALE
+def _is_other_unit(estimate: Estimate) -> bool:
+    return estimate.scale is not None and abs(estimate.scale.value - 1) > WORST_SCALE
 
 
 def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
@@ -217,18 +231,18 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
         return
     middle = median(m.kerf for m in measurements)
     by_distance = sorted(measurements, key=lambda m: -abs(m.kerf - middle))
-    told: list[tuple[float, float, Measurement]] = []
+    slips: list[tuple[float, float, Measurement]] = []
     for suspect in by_distance[:MOST_SUSPECTS]:
-        others = [m for m in measurements if m is not suspect]
-        if suspect.instrument not in {size.instrument for size in others}:
+        rest = [m for m in measurements if m is not suspect]
+        if suspect.instrument not in {size.instrument for size in rest}:
             continue
-        found = _fitted(others, resolution)
-        spread = max(map(found.gap, others))
-        is_sound = 0 <= found.kerf.value <= LARGEST and not _is_other_unit(found)
-        if is_sound and spread <= LARGEST_SLIP < found.gap(suspect):
-            told.append((spread, found.gap(suspect), suspect))
-    if told:
-        _, off, slip = min(told, key=lambda entry: entry[0])
+        estimate = _fitted(rest, resolution)
+        spread = max(map(estimate.gap, rest))
+        is_sound = 0 <= estimate.kerf.value <= LARGEST and not _is_other_unit(estimate)
+        if is_sound and spread <= LARGEST_SLIP < estimate.gap(suspect):
+            slips.append((spread, estimate.gap(suspect), suspect))
+    if slips:
+        _, off, slip = min(slips, key=lambda entry: entry[0])
         raise DesignError(
             f"{slip} is {off:.2f} mm off what the other sizes say; mend the entry or measure it "
             "again"
@@ -287,7 +301,7 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
 
 
 def _are_apart(columns: NDArray[Any]) -> bool:
-    """Whether the sizes tell what the columns stand for from each other."""
+    """Return True if the sizes tell the causes of the columns from each other."""
     import numpy as np
 
     unit = columns / np.linalg.norm(columns, axis=0)
@@ -303,8 +317,8 @@ def _left_by_rounding(scatter: float, resolution: float) -> float:
     """
     if resolution == 0:
         return 0.0
-    own = max(scatter - resolution**2 / 12, 0.0)
-    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * own / resolution**2)
+    variance = max(scatter - resolution**2 / 12, 0.0)
+    return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * variance / resolution**2)
 
 
 @cache
@@ -328,3 +342,247 @@ def _within(t: float, degrees: int) -> float:
         total += term
         term *= cosine**2 * k / (k + 1)
     return 2 / math.pi * (angle + total) if odd else total
+
+
+# The calibration piece: four frames of film whose sizes tell how wide the beam cuts.
+#
+# A frame's outside comes out smaller by the kerf, its window larger, and the piece that falls out
+# of the window smaller again. Sides along x and y differ, so that a frame that fell out still
+# tells which is which. A window and its piece are drawn alike, so that they tell a reading error,
+# which makes both larger, from kerf; several sizes tell a scale from both.
+
+
+SIZE = 60.0
+"""Side in mm of the film that the piece needs."""
+COLUMNS = ("feature", "axis", "nominal_mm", "measured_mm")
+HINTS = (
+    "# Cut coupon.dxf with kerf offset 0; measure each size in the middle of the side; "
+    "leave what you cannot measure empty",
+    "# A piece is what fell out of the window of A: keep it",
+    "# A scan at 2400 dpi or a microscope touches no edge; a calliper bends thin film",
+)
+LETTER = 2.4
+TITLE = "KERF COUPON"
+
+
+class CouponFrame(NamedTuple):
+    """A frame of film: its name, lower left corner, outside and window along x and y, in mm."""
+
+    name: str
+    corner: Point
+    outer: tuple[float, float]
+    window: tuple[float, float]
+
+    @property
+    def region(self) -> Region:
+        return self._box(self.outer) - self._box(self.window)
+
+    def _box(self, size: tuple[float, float]) -> Region:
+        x, y = self.corner[0] + self.outer[0] / 2, self.corner[1] + self.outer[1] / 2
+        return rectangle((x - size[0] / 2, y - size[1] / 2), (x + size[0] / 2, y + size[1] / 2))
+
+
+FRAMES = (
+    CouponFrame("A", (4.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("B", (32.0, 34.0), (24.0, 20.0), (14.0, 10.0)),
+    CouponFrame("C", (8.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+    CouponFrame("D", (36.0, 12.0), (16.0, 12.0), (8.0, 6.0)),
+)
+
+
+def coupon() -> Region:
+    """The frames, nominal, on a square of film with its lower left corner at the origin."""
+    return union(frame.region for frame in FRAMES)
+
+
+def coupon_csv() -> str:
+    """The table to fill in: a row for each size along each axis."""
+    rows: list[Sequence[str]] = [COLUMNS]
+    for frame in FRAMES:
+        sizes = {"outer": frame.outer, "window": frame.window, "piece": frame.window}
+        rows += [
+            (f"{frame.name} {kind}", axis, f"{nominal:g}", "")
+            for kind, size in sizes.items()
+            for axis, nominal in zip("xy", size, strict=True)
+        ]
+    return "".join(f"{hint}\n" for hint in HINTS) + csv_text(rows)
+
+
+def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
+    """Writes ``coupon.dxf``, ``.svg`` and ``.csv``, read back; never over an old one.
+
+    Raises DesignError where one exists, OutputError where the file does not read back as drawn.
+    """
+    paths = tuple(folder / f"coupon.{ending}" for ending in ("dxf", "svg", "csv"))
+    for path in paths:
+        if path.exists():
+            raise DesignError(f"{path} exists; choose another folder or remove it first")
+    folder.mkdir(parents=True, exist_ok=True)
+    region, properties = coupon(), coupon_properties(generator)
+    contours = cutting_order(region)
+    sheet = Surroundings(engraved=_labels(), frame=(SIZE, SIZE))
+    drawing, picture, table = paths
+    drawing.write_bytes(dxf_text(contours, properties, sheet=sheet).encode())
+    verify_file(drawing, region, properties)
+    check_surroundings(read_profile(drawing), sheet)
+    picture.write_bytes(sheet_svg(contours, sheet, SIZE, SIZE, TITLE).encode())
+    table.write_bytes(coupon_csv().encode())
+    return paths
+
+
+def _labels() -> tuple[Stroke, ...]:
+    """Names in the waste over each frame; a title that shows which way x runs."""
+    names = [strokes(f.name, (f.corner[0], f.corner[1] + f.outer[1] + 1.2), LETTER) for f in FRAMES]
+    title = strokes(f"{TITLE} - X", (8.0, 4.0), LETTER)
+    x, y = 44.5, 4.0 + LETTER / 2
+    tip = (x + 8, y)
+    arrow = (((x, y), tip), ((x + 6.5, y + 1), tip, (x + 6.5, y - 1)))
+    return (*(stroke for name in names for stroke in name), *title, *arrow)
+
+
+# The coupon's filled-in table: read where it can be read in one way, or refused.
+
+
+MOST_BYTES = 1_000_000
+LONGEST = 10_000.0
+"""mm."""
+SEPARATORS = (",", ";", "\t")
+NUMBERS = ("nominal_mm", "measured_mm")
+INSTRUMENT = "instrument"
+"""A column that may be there: what the size was measured with."""
+KINDS: dict[str, Kind] = {"outer": "outer", "window": "window", "piece": "outer"}
+"""Last words of a feature; a piece fell out of a window."""
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
+_WHOLE = re.compile(r"\d+", re.ASCII)
+
+
+def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
+    """The filled rows of a table with the coupon's columns; ``#`` begins a remark.
+
+    ``instrument`` is what all was measured with, unless a column of that name says so row by row.
+    Columns are parted by commas, semicolons or tabs; numbers have a decimal point or comma. A
+    spreadsheet that parts columns by semicolons leaves our commas in its first cell; that is read
+    too. Raises DesignError, also for a row whose decimal commas cannot be told from those between
+    columns.
+    """
+    lines = [
+        (f"{path}, line {number}", line)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
+        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
+    ]
+    separator, names = _header(path, lines[0] if lines else ("", ""))
+    measurements = []
+    for where, line in lines[1:]:
+        cells = _row(line, separator, len(names), where)
+        _refuse_two_ways(cells, names, separator, where)
+        row = dict(zip(names, cells, strict=False))
+        if row["measured_mm"]:
+            measurements.append(_measurement(row, where, instrument))
+    return measurements
+
+
+def table_text(path: Path) -> str:
+    """The text of a table that someone filled in. Raises DesignError where it is none."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise DesignError(
+                f"{path} is larger than {MOST_BYTES:,} bytes; give the table that was filled in"
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as CSV") from None
+
+
+def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
+    """Return the separator of the columns, and their names in small letters."""
+    where, line = first
+    separator = max(SEPARATORS, key=line.count)
+    names = [name.lower() for name in _cells(line, separator, where)]
+    while names and not names[-1]:
+        names.pop()
+    for column in COLUMNS:
+        if names.count(column) != 1:
+            many = "two columns" if column in names else "no column"
+            raise DesignError(
+                f"{path} has {many} {column}; keep the columns {', '.join(COLUMNS)}, once each"
+            )
+    return separator, names
+
+
+def _row(line: str, separator: str, count: int, where: str) -> list[str]:
+    """The cells of a row: parted like the header, or what stands behind a semicolon is the last."""
+    cells = _cells(line, separator, where)
+    if separator != "," or ";" not in line:
+        return cells
+    parted = _cells(line, ";", where)
+    while len(parted) > 1 and not parted[-1]:
+        parted.pop()
+    if len(parted) == count:
+        return parted
+    first = _cells(parted[0], ",", where)
+    if len(parted) == 2 and len(first) == count and not first[-1]:
+        return [*first[:-1], parted[1]]
+    return cells
+
+
+def _cells(line: str, separator: str, where: str) -> list[str]:
+    try:
+        row: Iterator[list[str]] = csv.reader([line], delimiter=separator, strict=True)
+        return [cell.strip() for cell in next(row)]
+    except csv.Error:
+        raise DesignError(f"{where} has a quotation mark without its other; remove it") from None
+
+
+def _refuse_two_ways(cells: list[str], names: list[str], separator: str, where: str) -> None:
+    """Raises DesignError for a row that fits the header not at all, or in more than one way."""
+    remedy = (
+        "; write decimal points, or part the columns by semicolons where commas are decimal"
+        if separator == ","
+        else "; fill in one cell a column"
+    )
+    while len(cells) > len(names) and not cells[-1]:
+        cells = cells[:-1]
+    if len(cells) != len(names):
+        raise DesignError(
+            f"{where} has {len(cells)} cells where the header has {len(names)}{remedy}"
+        )
+    if separator != ",":
+        return
+    for place, name in enumerate(names[:-1]):
+        after = names[place + 1]
+        is_split = name in NUMBERS and after not in NUMBERS and _WHOLE.fullmatch(cells[place])
+        if is_split and _WHOLE.fullmatch(cells[place + 1]):
+            raise DesignError(
+                f"{where} may say {cells[place]} or {cells[place]},{cells[place + 1]} for "
+                f"{name}{remedy}"
+            )
+
+
+def _measurement(row: dict[str, str], where: str, instrument: str) -> Measurement:
+    words = row["feature"].lower().split()
+    axis = row["axis"].lower()
+    kinds = {KINDS[word] for word in words if word in KINDS}
+    if len(kinds) != 1:
+        raise DesignError(f"{where}: feature must end in outer, window or piece")
+    (kind,) = kinds
+    used = row.get(INSTRUMENT, "").lower() or instrument
+    if used and used not in RESOLUTIONS:
+        allowed = ", ".join(RESOLUTIONS)
+        raise DesignError(f"{where}: instrument is {used[:40]!r}; it must be one of {allowed}")
+    if axis not in ("x", "y"):
+        raise DesignError(f"{where}: axis must be x or y")
+    nominal, measured = (_size(row[name], name, where) for name in NUMBERS)
+    return Measurement(kind, "x" if axis == "x" else "y", nominal, measured, where, used)
+
+
+def _size(text: str, column: str, where: str) -> float:
+    if _NUMBER.fullmatch(text) is None:
+        raise DesignError(
+            f"{where}: {column} is {text[:40]!r}, not a number; write it in mm, for example 23.9"
+        )
+    size = float(text.replace(",", "."))
+    if not 0 < size <= LONGEST:
+        raise DesignError(f"{where}: {column} is {text[:40]}; it must be a size in mm above 0")
+    return size

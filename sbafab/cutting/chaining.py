@@ -6,16 +6,20 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
 from sbafab.errors import OutputError
-from sbafab.geometry.copies import COPIED, Copies, between
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, edge_from_bulge
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.contour import COPIED, LEAST_AREA, Contour, Copies, between, circle, tidy
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Point,
+    edge_from_bulge,
+    meeting_points,
+    same_support,
+)
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.runs import same_support
-from sbafab.geometry.shapes import circle
-from sbafab.geometry.tidy import LEAST_AREA, tidy
+from sbafab.geometry.region import Region
 
 CLEAR = 10 * EPSILON
 """mm between two circles from which on they surely do not touch."""
@@ -50,17 +54,17 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
                 f"{len(ends)} edges end at x {x:.3f}, y {y:.3f}, where a contour has two; "
                 "remove what is drawn twice."
             )
-    left = set(range(len(snapped)))
+    unused = set(range(len(snapped)))
     contours = []
     for index, edge in enumerate(snapped):
-        if index not in left:
+        if index not in unused:
             continue
-        left.remove(index)
+        unused.remove(index)
         loop = [edge]
         while loop[-1].end != edge.start:
             here = loop[-1].end
-            follower = next(i for i in at[here] if i in left)
-            left.remove(follower)
+            follower = next(i for i in at[here] if i in unused)
+            unused.remove(follower)
             step = snapped[follower]
             loop.append(step if step.start == here else step.reversed())
         contours.append(Contour(tuple(loop)))
@@ -68,7 +72,7 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
 
 
 def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
-    """Where each end is taken to lie.
+    """Return the joint that each end is taken to lie on.
 
     Two ends that meet by themselves stay where they are, however near others lie; what is left
     over is joined within JOINED.
@@ -105,9 +109,9 @@ def _between(edge: Edge, start: Point, end: Point) -> Edge:
 
 
 def check_clear(contours: Sequence[Contour], copies: Copies | None = None) -> None:
-    """Raises OutputError where an edge is drawn twice or contours touch or cross.
+    """Raise OutputError where an edge is drawn twice or contours touch or cross.
 
-    ``copies``: where what is known of their shapes is kept.
+    ``copies`` caches the shapes of equal contours.
     """
     rounds = [_full_circle(contour) for contour in contours]
     copies = copies or Copies()
@@ -120,8 +124,8 @@ def check_clear(contours: Sequence[Contour], copies: Copies | None = None) -> No
     for i, j in close_pairs([contour.bounds for contour in contours], EPSILON):
         if _are_clear(rounds[i], rounds[j]):
             continue
-        (one, here), (other, there) = lying[i], lying[j]
-        pair = one, other, between(here, there)
+        (first, here), (second, there) = lying[i], lying[j]
+        pair = first, second, between(here, there)
         if pair not in clear:
             _check_two(contours[i], contours[j])
             clear.add(pair)
@@ -136,7 +140,9 @@ def _full_circle(contour: Contour) -> tuple[Point, float] | None:
 
 
 def _are_clear(a: tuple[Point, float] | None, b: tuple[Point, float] | None) -> bool:
-    """Whether two circles surely do not meet: one within the other, or each aside of the other."""
+    """Return True if two circles surely do not meet: one within the other, or each aside of the
+    other.
+    """
     if a is None or b is None:
         return False
     between = math.dist(a[0], b[0])
@@ -154,12 +160,12 @@ def _check_own(contour: Contour) -> None:
             _check_edges(a, b, neighbours)
 
 
-def _check_two(one: Contour, other: Contour) -> None:
+def _check_two(first: Contour, second: Contour) -> None:
     # The one of more edges first: of a plate hardly one comes near a hole.
-    if len(one.edges) < len(other.edges):
-        one, other = other, one
-    ours = _reaching(one, other)
-    theirs = _reaching(other, one) if ours else []
+    if len(first.edges) < len(second.edges):
+        first, second = second, first
+    ours = _reaching(first, second)
+    theirs = _reaching(second, first) if ours else []
     if not theirs:
         return
     edges = [*ours, *theirs]
@@ -168,12 +174,12 @@ def _check_two(one: Contour, other: Contour) -> None:
             _check_edges(edges[pair[0]], edges[pair[1]], False)
 
 
-def _reaching(one: Contour, other: Contour) -> list[Edge]:
+def _reaching(contour: Contour, neighbour: Contour) -> list[Edge]:
     """The edges of a contour that reach into the box of another."""
-    left, bottom, right, top = widened(other.bounds, EPSILON)
+    left, bottom, right, top = widened(neighbour.bounds, EPSILON)
     return [
         edge
-        for edge, (low_x, low_y, high_x, high_y) in zip(one.edges, one.boxes, strict=True)
+        for edge, (low_x, low_y, high_x, high_y) in zip(contour.edges, contour.boxes, strict=True)
         if low_x <= right and high_x >= left and low_y <= top and high_y >= bottom
     ]
 
@@ -205,9 +211,9 @@ def nested_region(
         is_hole = index < len(inner)
         x, y = contour.edges[0].start
         if (depth % 2 == 1) != is_hole:
-            found, layer = ("an outline", CUT_INNER) if is_hole else ("a hole", CUT_OUTER)
+            role, layer = ("an outline", CUT_INNER) if is_hole else ("a hole", CUT_OUTER)
             raise OutputError(
-                f"contour at x {x:.3f}, y {y:.3f} is {found} but on {layer}; move it to "
+                f"contour at x {x:.3f}, y {y:.3f} is {role} but on {layer}; move it to "
                 f"{CUT_OUTER if is_hole else CUT_INNER}."
             )
         if abs(contour.area) < LEAST_AREA:
@@ -223,22 +229,24 @@ def nested_region(
     return Region(tuple(turned))
 
 
-def _turn(edges: Sequence[Edge], others: Sequence[Edge]) -> int | None:
+def _turn(edges: Sequence[Edge], neighbours: Sequence[Edge]) -> int | None:
     """From which of the edges on the others are these; None where they are others."""
-    turn = next((i for i, edge in enumerate(edges) if _alike(edge, others[0])), 0)
+    turn = next((i for i, edge in enumerate(edges) if _run_equally(edge, neighbours[0])), 0)
     turned = (*edges[turn:], *edges[:turn])
-    is_same = len(turned) == len(others) and all(map(_alike, turned, others))
+    is_same = len(turned) == len(neighbours) and all(map(_run_equally, turned, neighbours))
     return turn if is_same else None
 
 
-def _alike(one: Edge, other: Edge) -> bool:
-    """Whether edges of two contours, each of which ends where the next one starts, run alike."""
-    if math.dist(one.start, other.start) > COPIED or type(one) is not type(other):
+def _run_equally(first: Edge, second: Edge) -> bool:
+    """Return True if edges of two contours, each of which ends where the next one starts, run
+    equally.
+    """
+    if math.dist(first.start, second.start) > COPIED or type(first) is not type(second):
         return False
-    return not (isinstance(one, Arc) and isinstance(other, Arc)) or (
-        math.dist(one.centre, other.centre) <= COPIED
-        and abs(one.radius - other.radius) <= COPIED
-        and one.ccw == other.ccw
+    return not (isinstance(first, Arc) and isinstance(second, Arc)) or (
+        math.dist(first.centre, second.centre) <= COPIED
+        and abs(first.radius - second.radius) <= COPIED
+        and first.ccw == second.ccw
     )
 
 
@@ -262,18 +270,18 @@ def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
 
 
 def _depths(contours: Sequence[Contour], copies: Copies) -> list[int]:
-    """How many of the others hold each contour."""
+    """Return the number of other contours that enclose each contour."""
     count = len(contours)
     places = [contour.edges[0].at(0.5) for contour in contours]
     depths = [0] * count
     boxes = [*(contour.bounds for contour in contours), *((*p, *p) for p in places)]
-    known: dict[tuple[int, tuple[int, int]], bool] = {}
+    by_pair: dict[tuple[int, tuple[int, int]], bool] = {}
     for pair in close_pairs(boxes, 0.0):
-        holder, held = min(pair), max(pair) - count
-        if holder < count and held >= 0 and held != holder:
+        holder, inner = min(pair), max(pair) - count
+        if holder < count and inner >= 0 and inner != holder:
             shape, here = copies.lying(contours[holder])
-            place = shape, between(here, places[held])
-            if place not in known:
-                known[place] = contours[holder].winding(places[held]) != 0
-            depths[held] += known[place]
+            place = shape, between(here, places[inner])
+            if place not in by_pair:
+                by_pair[place] = contours[holder].winding(places[inner]) != 0
+            depths[inner] += by_pair[place]
     return depths

@@ -1,34 +1,328 @@
-"""Cut files read back into exact contours, and refused where they could not be cut.
-
-Those that stand letter by letter as this program writes them are read by that form; of all others,
-and so of all that was touched by hand or another program, ezdxf says what they hold.
-"""
+"""Cut files read back: entities, appearance, this program's form or ezdxf's, exact contours."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.cutting.appearance import check_appearance, check_space
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
-from sbafab.cutting.cut_layers import COLOURS, CUT_INNER, CUT_OUTER
-from sbafab.cutting.dxf_own import as_written
-from sbafab.cutting.dxf_shapes import DrawnEntity, arc, of_polyline, polyline
+from sbafab.cutting.dxf_write import skeleton
+from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE
 from sbafab.errors import OutputError
-from sbafab.geometry.copies import Copies
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle
+from sbafab.geometry.contour import Contour, Copies, circle
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs
+from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
     from ezdxf.entities.dxfentity import DXFEntity
+    from ezdxf.entities.dxfgfx import DXFGraphic
+    from ezdxf.entities.layer import Layer
     from ezdxf.entities.polyline import Polyline
+
+QUARTER = math.tan(math.pi / 8)
+"""The bulge of a quarter turn."""
+
+
+class DrawnEntity(NamedTuple):
+    """The drawing of one entity on a layer: the closed contour, or else the loose edges."""
+
+    kind: str
+    layer: str
+    contour: Contour | None
+    edges: Sequence[Edge]
+
+
+def of_polyline(kind: str, layer: str, edges: Sequence[Edge], closed: bool) -> DrawnEntity:
+    """Return the drawing of a polyline of these edges."""
+    if closed:
+        return DrawnEntity(kind, layer, Contour(tuple(edges)), ())
+    return DrawnEntity(kind, layer, None, edges)
+
+
+def arc(centre: Point, radius: float, first_degrees: float, last_degrees: float) -> list[Edge]:
+    """An ARC, counter-clockwise from one angle to the other, in quarters."""
+    first = math.radians(first_degrees)
+    sweep = math.radians((last_degrees - first_degrees) % 360.0)
+    start, end = (
+        (centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle))
+        for angle in (first, first + sweep)
+    )
+    return quarter_arcs(start, end, centre, radius, sweep)
+
+
+def polyline(
+    rows: Sequence[tuple[float, ...]], closed: bool, width: float, may_be_open: bool
+) -> list[Edge]:
+    """The edges of a polyline's rows: x, y, start and end width, bulge."""
+    x, y = rows[0][:2] if rows else (0.0, 0.0)
+    place = f"polyline at x {x:.3f}, y {y:.3f}"
+    if len(rows) < 2 or not (closed or may_be_open):
+        raise OutputError(f"{place} is open; close it.")
+    if width or any(row[2] or row[3] for row in rows):
+        raise OutputError(f"{place} has a width; draw the cut's middle without width.")
+    edges: list[Edge] = []
+    followers = [*rows[1:], rows[0]] if closed else rows[1:]
+    for row, following in zip(rows, followers, strict=False):
+        start, end = (row[0], row[1]), (following[0], following[1])
+        if start == end:
+            raise OutputError(
+                f"{place} repeats its vertex x {row[0]:.3f}, y {row[1]:.3f}; remove one."
+            )
+        edges += _bulge_edges(start, end, row[4])
+    return edges
+
+
+def _bulge_edges(start: Point, end: Point, bulge: float) -> list[Edge]:
+    """Return edges from a vertex of a polyline to the next; arcs may turn more than half round."""
+    edge = edge_from_bulge(start, end, bulge)
+    if isinstance(edge, Line) or abs(bulge) <= QUARTER:
+        return [edge]
+    return quarter_arcs(start, end, edge.centre, edge.radius, 4 * math.atan(bulge))
+
+
+# Appearance: entities are shown, plotted and coloured as the shop takes them.
+
+
+BY_LAYER = 256
+PAPER = re.compile(r"(?m)^ *67\r?\n *1\r?$")
+"""Where an entity may be marked as one of paper space."""
+SOLID = ("continuous", "bylayer")
+"""Linetypes that are drawn without gaps, in small letters; no model space entity has a block's."""
+
+
+def check_appearance(document: Drawing) -> None:
+    """Raises OutputError where a laser program would skip, break or re-order what is drawn.
+
+    Every entity has to be visible, in an unbroken line, on a layer that is on, thawed and (but
+    REFERENCE) plotted, and in that layer's colour. Other programs may say this in their own words:
+    a colour of the entity that is the layer's, a true colour of the same red, green and blue,
+    ``ByLayer`` in any letters. Layers that nothing is drawn on may look as they like, and so may
+    line weights.
+    """
+    entities = list(document.modelspace())
+    for name in dict.fromkeys(entity.dxf.layer for entity in entities):
+        if name in COLOURS:
+            if name not in document.layers:
+                raise OutputError(f"layer {name} is not in the layer table; regenerate it.")
+            _check_layer(document.layers.get(name), name)
+    for entity in entities:
+        if entity.dxf.layer in COLOURS:
+            _check_entity(entity)
+
+
+def check_space(text: str) -> None:
+    """Raises OutputError for an entity that says it is in paper space, in a DXF text.
+
+    ezdxf goes by an entity's owner alone, other programs by this.
+    """
+    if PAPER.search(text) is None:
+        return
+    lines = [line.strip() for line in text.splitlines()]
+    kind, is_drawn = "", False
+    for code, value in zip(lines[::2], lines[1::2], strict=False):
+        if code == "0":
+            kind = value
+        elif code == "2" and kind == "SECTION":
+            is_drawn = value == "ENTITIES"
+        elif is_drawn and code == "67" and value != "0" and kind != "VIEWPORT":
+            raise OutputError(f"a {kind} is in paper space; draw in model space only.")
+
+
+def _check_layer(layer: Layer, name: str) -> None:
+    states = (
+        ("off", layer.is_off()),
+        ("frozen", layer.is_frozen()),
+        ("not plotted", name != REFERENCE and not layer.dxf.get("plot", 1)),
+    )
+    for state, holds in states:
+        if holds:
+            raise OutputError(f"layer {name} is {state}, so it would not be cut; regenerate it.")
+    colour, linetype = abs(layer.dxf.color), layer.dxf.get("linetype", "Continuous")
+    if colour != COLOURS[name] or not _is_true(layer.dxf.get("true_color"), name):
+        raise OutputError(
+            f"layer {name} has the colour {_shown(layer)}, not {COLOURS[name]}; regenerate it."
+        )
+    if linetype.lower() not in SOLID:
+        raise OutputError(f"layer {name} has the linetype {linetype}; make it Continuous.")
+
+
+def _check_entity(entity: DXFGraphic) -> None:
+    dxf, layer = entity.dxf, entity.dxf.layer
+    place = f"{entity.dxftype()} (handle {dxf.handle}) on layer {layer}"
+    if dxf.get("invisible", 0):
+        raise OutputError(f"{place} is invisible; show it or remove it.")
+    if dxf.get("transparency") and entity.transparency > 0:
+        raise OutputError(f"{place} is transparent; make it solid.")
+    if dxf.get("color", BY_LAYER) not in (BY_LAYER, COLOURS[layer]) or not _is_true(
+        dxf.get("true_color"), layer
+    ):
+        raise OutputError(
+            f"{place} has the colour {_shown(entity)}, not its layer's; regenerate it."
+        )
+    linetype = dxf.get("linetype", "ByLayer")
+    if linetype.lower() not in SOLID:
+        raise OutputError(f"{place} has the linetype {linetype}; make it Continuous.")
+    if dxf.get("thickness", 0.0):
+        raise OutputError(f"{place} stands {dxf.thickness:g} mm high; make it flat.")
+
+
+def _is_true(colour: int | None, layer: str) -> bool:
+    """Return True if a true colour, if there is one, is that of the layer's index."""
+    if colour is None:
+        return True
+    from ezdxf.colors import aci2rgb, int2rgb
+
+    layer_colour = {tuple(aci2rgb(COLOURS[layer]))}
+    # Index 7 is black on white and white on black.
+    both = {(0, 0, 0), (255, 255, 255)}
+    return tuple(int2rgb(colour & 0xFFFFFF)) in (both if COLOURS[layer] == 7 else layer_colour)
+
+
+def _shown(item: Layer | DXFGraphic) -> str:
+    colour = item.dxf.get("true_color")
+    return str(item.dxf.get("color")) if colour is None else f"#{colour & 0xFFFFFF:06x}"
+
+
+# Reading by the form in which this program writes, and by no other.
+#
+# All but numbers, properties and entities has to be the packaged empty document, letter by letter,
+# and every entity one of the four that are written, with the handle that is its turn. What such a
+# text holds for ezdxf is therefore known; ``tests/cutting/test_dxf_own.py`` compares the two.
+
+
+_NUMBER = r"-?\d{1,7}\.\d{1,9}"
+_VALUE = rf"({_NUMBER})\n"
+_PROPERTY = re.compile(
+    r"  9\n\$CUSTOMPROPERTYTAG\n  1\n([^\n]*)\n  9\n\$CUSTOMPROPERTY\n  1\n([^\n]*)\n"
+)
+_UNSURE = re.compile(r"\A\s|\s\Z|[\\^%]")
+"""In a property: what a reader of DXF may take for a code, or leave out."""
+_LOW, _HIGH = (f" 10\n{_NUMBER}\n 20\n{_NUMBER}\n",) * 2
+_EXTENTS = re.compile(
+    rf"  9\n\$EXTMIN\n{_LOW} 30\n0\.0\n  9\n\$EXTMAX\n{_HIGH} 30\n0\.0\n"
+    rf"  9\n\$LIMMIN\n{_LOW}  9\n\$LIMMAX\n{_HIGH}"
+)
+ROUND = {"CIRCLE": ("x", "y", "radius"), "ARC": ("x", "y", "radius", "from", "to")}
+"""What round entities are drawn with."""
+_HANDLE = re.compile(r"[0-9A-F]{1,8}")
+_ROW = re.compile(rf" 10\n{_VALUE} 20\n{_VALUE}(?: 42\n{_VALUE})?")
+
+
+class OwnFile(NamedTuple):
+    """The content of a file in this program's form."""
+
+    properties: dict[str, str]
+    drawn: list[DrawnEntity]
+
+
+def as_written(text: str) -> OwnFile | None:
+    """Return the content of a file in this program's form; None for other text, and for a polyline
+    that cannot be cut.
+    """
+    form = skeleton()
+    if not (text.startswith(form.before_properties) and text.endswith(form.tail)):
+        return None
+    properties, place = _properties(text, len(form.before_properties))
+    if properties is None or not text.startswith(form.before_extents, place):
+        return None
+    extents = _EXTENTS.match(text, place + len(form.before_extents))
+    if extents is None or not text.startswith(form.before_seed, extents.end()):
+        return None
+    seed = _HANDLE.match(text, extents.end() + len(form.before_seed))
+    if seed is None or not text.startswith(form.before_entities, seed.end()):
+        return None
+    entities = text[seed.end() + len(form.before_entities) : len(text) - len(form.tail)]
+    try:
+        drawn = _entities(entities, form.first_handle, int(seed[0], 16))
+    except OutputError:
+        return None
+    return OwnFile(properties, drawn) if drawn is not None else None
+
+
+def _properties(text: str, place: int) -> tuple[dict[str, str] | None, int]:
+    """The custom properties from a place on, and where they end; None where they may be others."""
+    properties: dict[str, str] = {}
+    while match := _PROPERTY.match(text, place):
+        name, value = match.groups()
+        if name in properties or any(
+            _UNSURE.search(string) or not string.isprintable() for string in (name, value)
+        ):
+            return None, place
+        properties[name] = value
+        place = match.end()
+    return properties, place
+
+
+@cache
+def _entity(model_space: str) -> re.Pattern[str]:
+    """One entity: kind, handle, layer and what it is drawn with."""
+    kinds = (
+        rf"AcDbPolyline\n 90\n(\d+)\n 70\n([01])\n((?: 10\n{_NUMBER}\n 20\n{_NUMBER}\n"
+        rf"(?: 42\n{_NUMBER}\n)?)+)",
+        rf"AcDbCircle\n 10\n{_VALUE} 20\n{_VALUE} 30\n0\.0\n 40\n{_VALUE}"
+        rf"(?:100\nAcDbArc\n 50\n{_VALUE} 51\n{_VALUE})?",
+        rf"AcDbLine\n 10\n{_VALUE} 20\n{_VALUE} 30\n0\.0\n 11\n{_VALUE} 21\n{_VALUE} 31\n0\.0\n",
+    )
+    return re.compile(
+        rf"  0\n(LWPOLYLINE|CIRCLE|LINE|ARC)\n  5\n([0-9A-F]+)\n330\n{model_space}\n100\n"
+        rf"AcDbEntity\n  8\n({'|'.join(COLOURS)})\n100\n(?:{'|'.join(kinds)})"
+    )
+
+
+def _entities(text: str, first_handle: int, seed: int) -> list[DrawnEntity] | None:
+    """All entities of a text of nothing else, their handles counted up to the ``seed``."""
+    drawn: list[DrawnEntity] = []
+    place = 0
+    for match in _entity(skeleton().model_space).finditer(text):
+        if match.start() != place or match[2] != f"{first_handle + len(drawn):X}":
+            return None
+        entity = _drawn_by_own_form(match)
+        if entity is None:
+            return None
+        drawn.append(entity)
+        place = match.end()
+    return drawn if place == len(text) and first_handle + len(drawn) == seed else None
+
+
+def _drawn_by_own_form(match: re.Match[str]) -> DrawnEntity | None:
+    kind, _, layer, count, closed, rows, *numbers = match.groups()
+    values = [float(number) for number in numbers if number is not None]
+    if kind == "LWPOLYLINE" and rows is not None:
+        points = list(_rows(rows))
+        if len(points) != int(count):
+            return None
+        edges = polyline(points, closed == "1", 0.0, layer not in (CUT_INNER, CUT_OUTER))
+        return of_polyline(kind, layer, edges, closed == "1")
+    is_round = numbers[0] is not None and len(values) == len(ROUND.get(kind, ""))
+    if is_round and values[2] > 0:
+        x, y, radius, *turn = values
+        if kind == "CIRCLE":
+            return DrawnEntity(kind, layer, circle((x, y), radius), ())
+        return DrawnEntity(kind, layer, None, arc((x, y), radius, *turn))
+    if kind == "LINE" and numbers[-1] is not None:
+        x, y, u, v = values
+        return DrawnEntity(kind, layer, None, [Line((x, y), (u, v))])
+    return None
+
+
+def _rows(text: str) -> Iterator[tuple[float, ...]]:
+    """Vertices as an LWPOLYLINE has them: x, y, start and end width, bulge."""
+    for x, y, bulge in _ROW.findall(text):
+        yield float(x), float(y), 0.0, 0.0, float(bulge or 0.0)
+
+
+# Reading back into exact contours, refused where they could not be cut.
+#
+# Those that stand letter by letter as this program writes them are read by that form; of all
+# others, and so of all that was touched by hand or another program, ezdxf says what they hold.
+
 
 DRAWN = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "LINE", "ARC")
 R12 = "AC1009"
@@ -40,7 +334,7 @@ FLAT = 1e-9
 
 @dataclass(frozen=True)
 class ReadBack:
-    """What a cut file holds.
+    """The content of a cut file.
 
     ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties,
     which a DXF before R2004 has none of; ``units`` is "mm", or empty in R12, which cannot say;
@@ -75,14 +369,14 @@ def _read_text(text: str) -> ReadBack:
     """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
     and again, from the disk, when it checks the folder.
     """
-    own = as_written(text)
-    if own is not None:
-        return _put_together(own.drawn, own.properties, "mm")
+    own_file = as_written(text)
+    if own_file is not None:
+        return _put_together(own_file.drawn, own_file.properties, "mm")
     return read_with_ezdxf(text)
 
 
 def read_with_ezdxf(text: str) -> ReadBack:
-    """What ezdxf says that a text holds. Raises OutputError as ``read_profile`` does."""
+    """Read a text with ezdxf. Raises OutputError as ``read_profile`` does."""
     check_space(text)
     document = _parsed(text)
     units = document.header.get("$INSUNITS"), document.header.get("$MEASUREMENT")
@@ -136,7 +430,7 @@ def _put_together(
     closed: dict[str, list[Contour]] = {CUT_INNER: [], CUT_OUTER: []}
     loose: dict[str, list[Edge]] = {CUT_INNER: [], CUT_OUTER: []}
     layers: list[str] = []
-    other: list[str] = []
+    other_kinds: list[str] = []
     strokes: list[tuple[str, tuple[Edge, ...]]] = []
     for kind, layer, contour, edges in entities:
         drawn = contour.edges if contour else edges
@@ -147,7 +441,7 @@ def _put_together(
             raise OutputError(f"{_place(kind, drawn)} {on}")
         layers.append(layer)
         if layer not in closed:
-            other.append(kind)
+            other_kinds.append(kind)
             strokes.append((layer, tuple(drawn)))
         elif contour:
             closed[layer].append(contour)
@@ -159,7 +453,7 @@ def _put_together(
     copies = Copies()
     check_clear([*contours[CUT_INNER], *contours[CUT_OUTER]], copies)
     region = nested_region(contours[CUT_INNER], contours[CUT_OUTER], copies)
-    return ReadBack(region, properties, units, tuple(layers), tuple(other), tuple(strokes))
+    return ReadBack(region, properties, units, tuple(layers), tuple(other_kinds), tuple(strokes))
 
 
 def _place(kind: str, drawn: Sequence[Edge]) -> str:
@@ -168,7 +462,9 @@ def _place(kind: str, drawn: Sequence[Edge]) -> str:
 
 
 def _is_short(edge: Edge) -> bool:
-    """Whether an edge has no length: none is shorter than its chord, but for a radius below 0."""
+    """Return True if an edge has no length: none is shorter than its chord, but for a radius below
+    0.
+    """
     may_be = math.dist(edge.start, edge.end) < EPSILON or (
         isinstance(edge, Arc) and edge.radius < EPSILON
     )
@@ -176,7 +472,7 @@ def _is_short(edge: Edge) -> bool:
 
 
 def _drawn(entity: DXFEntity) -> DrawnEntity:
-    """What an entity draws; polylines on the layers of strokes may be open."""
+    """Return the drawing of an entity; polylines on the layers of strokes may be open."""
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
 
@@ -223,7 +519,9 @@ def _numbers(entity: DXFEntity) -> Iterator[float]:
 
 
 def _is_plain(entity: Polyline) -> bool:
-    """Whether an old polyline is flat and drawn as it stands: no mesh, no curve fitted to it."""
+    """Return True if an old polyline is flat and drawn as it stands: no mesh, no curve fitted to
+    it.
+    """
     return bool(entity.is_2d_polyline) and not entity.dxf.flags & ~CLOSED
 
 

@@ -6,28 +6,21 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Literal, NamedTuple
+from io import StringIO
+from pathlib import Path
+from typing import NamedTuple
 
-from sbafab.cutting.cut_layers import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
+from sbafab.cutting.properties import (
+    COLOURS,
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SHEET,
+    ENGRAVE,
+    REFERENCE,
+    DxfProfile,
+)
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
-from sbafab.geometry.region import Contour
-
-DxfProfile = Literal["bulges", "arcs", "chords"]
-
-
-class Curves(NamedTuple):
-    """How cut files draw arcs; ``chord_error`` in mm counts for chords only."""
-
-    profile: DxfProfile = "bulges"
-    chord_error: float = 0.005
-
-    @property
-    def in_chords(self) -> bool:
-        return self.profile == "chords"
-
-
-TRUE_ARCS = Curves()
-"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
 
 QUARTER = math.sqrt(2)
 """The chord of a quarter turn, in radii."""
@@ -36,10 +29,8 @@ DATUM_ARM = 1.0
 
 
 class Surroundings(NamedTuple):
-    """What a film sheet has beside its parts: open runs of points, and its frame's far corner.
-
-    ``engraved`` strokes are burnt into the waste; ``parting`` cuts the sheet off its roll; the
-    frame from the origin to ``frame`` is for reference, as a check of scale, and so are ``marks``.
+    """The drawing of a film sheet beside its parts: open runs of points, and its frame's far
+    corner.
     """
 
     engraved: Sequence[Sequence[Point]] = ()
@@ -232,8 +223,6 @@ def _extents(boxes: Sequence[Bounds]) -> str:
 @cache
 def skeleton() -> Skeleton:
     """The packaged empty document, cut open where files differ."""
-    from sbafab.cutting.skeleton import SKELETON
-
     text = SKELETON.read_text(encoding="utf-8")
     before_properties, base, text = text.partition("  9\n$INSBASE\n")
     before_extents, _, text = text.partition("  9\n$EXTMIN\n")
@@ -255,3 +244,39 @@ def skeleton() -> Skeleton:
         record[1],
         int(seed, 16),
     )
+
+
+# The empty DXF document that every cut file is filled into.
+#
+# ``python -m sbafab.cutting.dxf_write`` regenerates it with ezdxf. Keeping it as a file means that
+# writing a cut file costs no import of ezdxf, nor does reading one back in this program's own form.
+
+
+SKELETON = Path(__file__).with_name("skeleton.dxf")
+
+
+def skeleton_text() -> str:
+    """An empty R2010 document in millimetres with the cut layers and fixed metadata."""
+    from ezdxf import options  # type: ignore[attr-defined]
+    from ezdxf.filemanagement import new
+
+    # The switch holds for the whole process, so it goes back to what it was.
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        document = new("R2010", units=4)
+        document.header["$MEASUREMENT"] = 1
+        for name, colour in COLOURS.items():
+            document.layers.add(name, color=colour, plot=name != REFERENCE)
+        # ezdxf adds classes in the order of a set; those that are there it leaves in place.
+        document.classes.add_required_classes(document.dxfversion)
+        document.classes.classes = dict(sorted(document.classes.classes.items()))
+        stream = StringIO()
+        document.write(stream)
+    finally:
+        options.write_fixed_meta_data_for_testing = before
+    return stream.getvalue()
+
+
+if __name__ == "__main__":
+    SKELETON.write_text(skeleton_text(), encoding="utf-8", newline="\n")

@@ -8,17 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.kerf import compensate
+from sbafab.cutting.kerf import compensate, in_chords
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.beam import widths
+from sbafab.geometry.offset import widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.progress import Counted
+from sbafab.process import Counted
 
 
 @dataclass(frozen=True)

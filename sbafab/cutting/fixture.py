@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, fixture_properties
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle
+from sbafab.geometry.region import Region, disc, polygon, rectangle, union
 from sbafab.laminate.assembly import PLATE_MARGIN
 from sbafab.laminate.laminate import Laminate
 
@@ -118,8 +116,8 @@ def write_fixture(
     path = folder / PATH
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(text.encode())
-    found = verify_file(path, plate, properties)
-    if len(found.strokes) != 2 + len(written):
+    read = verify_file(path, plate, properties)
+    if len(read.strokes) != 2 + len(written):
         raise OutputError(f"{path.name}: its notes are not whole. Regenerate it.")
     return PATH
 

@@ -1,12 +1,15 @@
-"""Kerf: moving the cut half its width into the waste, so that the part keeps its size."""
+"""Kerf and chords: cuts moved into the waste by half their width, arcs drawn as safe chords."""
 
 from __future__ import annotations
 
 from sbafab.cutting.properties import kerf_text
-from sbafab.errors import DesignError
-from sbafab.geometry.beam import Kerf, Lost, beam_path, place_of, widths
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import DesignError, GeometryError
+from sbafab.geometry.contour import Contour, run_chords, tidy
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
+from sbafab.geometry.offset import Kerf, Lost, beam_path, widths
 from sbafab.geometry.region import Region
+from sbafab.geometry.width import place_of
+from sbafab.laminate.laminate import Role
 
 
 def compensate(region: Region, kerf: Kerf) -> Region:
@@ -36,3 +39,52 @@ def _refused(region: Region, lost: Lost, kerf: Kerf) -> DesignError:
         f"with a kerf of {kerf_text(kerf)} mm the {kind} at x {x + 0.0:.3f}, y {y + 0.0:.3f} "
         f"{lost.fate}; a narrower kerf, or more room there, would keep it."
     )
+
+
+# Arcs drawn as chords, on the side of them that keeps bonds, overhangs and pins.
+#
+# What bounds a bond or overhang on one side gives way, and what bounds it on the other side stays
+# nearer to its arcs than anything measures: films and round holes stay, masks give way.
+
+
+FINE = 0.0004
+"""mm: chords of films and of round holes stay nearer, so that pins fit as in arcs, and a mask's
+edge that gives way has nothing to make up for."""
+
+
+def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
+    """The path of a layer (None: the base plate) with chords for arcs, within ``error`` mm of them.
+
+    Outlines of chamber masks shrink, those of separator masks grow, holes open; films grow and
+    round holes open by less than FINE. Straight edges stay. Arcs of the radius ``beam``, half the
+    kerf in mm, are led round corners of the part, which stay where they are.
+    """
+    is_film = role is None or not role.endswith("-mask")
+    fine = min(error, FINE)
+    return Region(
+        (
+            *(
+                _contour(outer, role != "chamber-mask", fine if is_film else error, beam)
+                for outer in path.outers
+            ),
+            *(
+                _contour(hole, False, fine if is_film or hole.circle else error, beam)
+                for hole in path.holes
+            ),
+        )
+    )
+
+
+def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contour:
+    """The contour as lines that leave its material no less (``grows``), or no more, anywhere."""
+    points = [
+        p
+        for run in contour.runs
+        for p in run_chords(run, grows or _rounds_corner(run[0], beam), error)
+    ]
+    loop = [Line(p, q) for p, q in zip(points, (*points[1:], points[0]), strict=True) if p != q]
+    return tidy(loop) or Contour(tuple(loop))
+
+
+def _rounds_corner(edge: Edge, beam: float) -> bool:
+    return isinstance(edge, Arc) and edge.ccw and beam > 0 and abs(edge.radius - beam) < EPSILON

@@ -79,7 +79,7 @@ def strokes(text: str, at: Point, height: float) -> tuple[Stroke, ...]:
 
 
 def width(text: str, height: float) -> float:
-    """How long a line of text is, in mm."""
+    """Return the length of a line of text, mm."""
     return max(0, ADVANCE * len(text) - 2) * height / CAP_HEIGHT
 
 

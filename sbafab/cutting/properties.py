@@ -1,16 +1,34 @@
-"""The custom properties that every cut file carries: what it is of, and how it was cut."""
+"""Layers, colours, names and custom properties of cut files, and how they draw arcs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
 from sbafab.design.films import is_kerf
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, widths
+from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
+
+DxfProfile = Literal["bulges", "arcs", "chords"]
+
+
+class Curves(NamedTuple):
+    """The drawing of arcs in cut files; ``chord_error`` in mm counts for chords only."""
+
+    profile: DxfProfile = "bulges"
+    chord_error: float = 0.005
+
+    @property
+    def in_chords(self) -> bool:
+        return self.profile == "chords"
+
+
+TRUE_ARCS = Curves()
+"""How curves are written: polylines with bulges, LINE and ARC, or polylines of short chords."""
+
 
 UNCALIBRATED = "uncalibrated: nominal edges"
 COMPENSATED = "compensated"
@@ -21,15 +39,7 @@ FOLDER = "layers"
 
 @dataclass(frozen=True)
 class CutSettings:
-    """What the cut files need to know beside the laminate.
-
-    ``kerf_widths``: full width in mm (or along x and along y) by material, None or absent where
-    it was not measured.
-    ``waived``: names of the waived rules; ``lowered``: limits below the usual ones, as
-    ``rules.lowered`` says them.
-    ``generator``: program and version, for example ``sbafab 1.0.0``. ``warnings``: what the files
-    of a material must say. ``platen``: size of the base plate in mm.
-    """
+    """The settings of the cut files beside the laminate."""
 
     design: str
     design_sha256: str
@@ -79,8 +89,8 @@ def second_cut_properties(
 ) -> dict[str, str]:
     """Custom properties of the second cut of registered sheets, through ``films`` and ``masks``."""
     properties = _properties(settings, ", ".join(films), "second cut", kerf)
-    said = dict.fromkeys(settings.warnings.get(material) for material in (*films, *masks))
-    return {**properties, **warning_property(" ".join(words for words in said if words))}
+    warnings = dict.fromkeys(settings.warnings.get(material) for material in (*films, *masks))
+    return {**properties, **warning_property(" ".join(words for words in warnings if words))}
 
 
 def coupon_properties(generator: str) -> dict[str, str]:
@@ -112,18 +122,18 @@ def _properties(
     }
 
 
-def warning_property(said: str | None) -> dict[str, str]:
-    """What a cut file says of the dangers of its film."""
-    return {"WARNING": said} if said else {}
+def warning_property(text: str | None) -> dict[str, str]:
+    """Return a cut file's warning of the dangers of its film."""
+    return {"WARNING": text} if text else {}
 
 
 def limit_properties(lowered: Sequence[str]) -> dict[str, str]:
-    """What a cut file says of lowered limits: nothing where there are none."""
+    """Return a cut file's note on lowered limits: nothing where there are none."""
     return {LIMITS: ", ".join(lowered)} if lowered else {}
 
 
 def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
-    """What a cut file says of its kerf."""
+    """Return a cut file's statement on its kerf."""
     if kerf is None:
         return {"KERF_STATE": UNCALIBRATED, "KERF_WIDTH": "none"}
     return {"KERF_STATE": COMPENSATED, "KERF_WIDTH": kerf_text(kerf)}
@@ -157,29 +167,31 @@ def kerf_text(kerf: Kerf) -> str:
 
 
 def kerf_suffix(kerf: Kerf | None) -> str:
-    """What the name of a compensated cut file ends in: ``_kerf0.12``, ``_kerf0.12x0.1``."""
+    """Return the end of a compensated cut file's name: ``_kerf0.12``, ``_kerf0.12x0.1``."""
     return "" if kerf is None else f"_kerf{kerf_text(kerf).replace(' ', '')}"
 
 
 def layer_path(name: str, kerf: Kerf | None) -> str:
-    """Where the cut file of the layer of this name lies in an output folder."""
+    """Return the path in an output folder of the cut file of the layer of this name."""
     return f"{FOLDER}/{name}{kerf_suffix(kerf)}.dxf"
 
 
 def said_of(curves: Curves) -> str | None:
-    """What files and manifest say of chords; nothing of true arcs."""
+    """Return the statement on chords in files and manifest; None for true arcs."""
     return f"{CHORDS} {curves.chord_error:g} mm" if curves.in_chords else None
 
 
-def curves_of(said: str | None) -> Curves:
-    """How arcs are drawn where a manifest says that. Raises OutputError as ``chord_error_of``."""
-    error = chord_error_of(curves_property(said))
+def curves_of(text: str | None) -> Curves:
+    """Return the drawing of arcs by a manifest's statement. Raises OutputError as
+    ``chord_error_of``.
+    """
+    error = chord_error_of(curves_property(text))
     return Curves("chords", error) if error else TRUE_ARCS
 
 
-def curves_property(said: str | None) -> dict[str, str]:
+def curves_property(text: str | None) -> dict[str, str]:
     """The custom property of that: only what departs from true arcs has to be said."""
-    return {} if said is None else {"CURVES": said}
+    return {} if text is None else {"CURVES": text}
 
 
 def chord_error_of(properties: Mapping[str, str]) -> float:
@@ -187,16 +199,32 @@ def chord_error_of(properties: Mapping[str, str]) -> float:
 
     Raises OutputError where the property cannot be understood.
     """
-    said = properties.get("CURVES")
-    if said is None:
+    text = properties.get("CURVES")
+    if text is None:
         return 0.0
-    number = said.removeprefix(CHORDS).removesuffix(" mm")
+    number = text.removeprefix(CHORDS).removesuffix(" mm")
     try:
         error = float(number)
     except ValueError:
         error = 0.0
     if not 0 < error <= 0.1:
         raise OutputError(
-            f"custom property CURVES is {said!r}, not {CHORDS} up to 0.1 mm; regenerate it."
+            f"custom property CURVES is {text!r}, not {CHORDS} up to 0.1 mm; regenerate it."
         )
     return error
+
+
+# The layers of a cut file, in the order a laser program takes them.
+
+
+ENGRAVE = "ENGRAVE"
+CUT_INNER = "CUT_INNER"
+CUT_OUTER = "CUT_OUTER"
+CUT_SHEET = "CUT_SHEET"
+REFERENCE = "REFERENCE"
+
+COLOURS = {ENGRAVE: 7, CUT_INNER: 5, CUT_OUTER: 1, CUT_SHEET: 6, REFERENCE: 8}
+"""AutoCAD colour index of every layer; REFERENCE is neither cut nor plotted."""
+
+CUT_SEQUENCE = (ENGRAVE, CUT_INNER, CUT_OUTER, CUT_SHEET)
+"""What is cut first comes first: a hole cut after its outline would be cut in a loose part."""

@@ -11,13 +11,11 @@ from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, second_cut_properties
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.beam import Kerf, widths
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import rectangle
+from sbafab.geometry.offset import Kerf, widths
+from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Material
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import SheetPanel
+from sbafab.laminate.laminate import Laminate, SheetPanel
 
 PATH = "sheets/second_cut.dxf"
 ROOM = 10.0
@@ -33,7 +31,7 @@ def second_path(panel: SheetPanel, kerf: Kerf) -> Region:
 
 
 def marks(panel: SheetPanel) -> Surroundings:
-    """What is drawn for reference: the sheet's edge, its datum and a cross in every fiducial."""
+    """Return the reference drawing: the sheet's edge, its datum and a cross in every fiducial."""
     outline = [edge.start for edge in panel.outline.edges]
     crosses = [run for p in ((0.0, 0.0), *panel.fiducials) for run in _cross(p)]
     return Surroundings(marks=((*outline, outline[0]), *crosses))
@@ -50,10 +48,10 @@ def stack_kerf(kerfs: Mapping[Material, Kerf | None], films: Sequence[Material])
     None where that of any was not measured. A beam that is narrower leaves the parts a little
     larger at their bridges; one that is wider would take of them.
     """
-    known = [kerf for kerf in map(kerfs.get, films) if kerf is not None]
-    if len(known) < len(films):
+    measured = [kerf for kerf in map(kerfs.get, films) if kerf is not None]
+    if len(measured) < len(films):
         return None
-    x, y = (max(widths(kerf)[axis] for kerf in known) for axis in (0, 1))
+    x, y = (max(widths(kerf)[axis] for kerf in measured) for axis in (0, 1))
     return x if x == y else (x, y)
 
 
@@ -82,9 +80,9 @@ def write_second_cut(laminate: Laminate, folder: Path, settings: CutSettings) ->
     target = folder / PATH
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(text.encode())
-    found = verify_file(target, path, properties)
+    read = verify_file(target, path, properties)
     try:
-        check_surroundings(found, around)
+        check_surroundings(read, around)
     except OutputError as error:
         raise OutputError(f"{target.name}: {error}") from error
     return PATH

@@ -1,30 +1,39 @@
-"""Film sheets: the parts of a nest as one cut file a sheet, with a picture beside it."""
+"""Film sheets: parts of a nest as one cut file a sheet, with label, cutting time and picture."""
 
 from __future__ import annotations
 
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.label import label
-from sbafab.cutting.lightburn import ENDING, project_text
-from sbafab.cutting.lightburn_verify import verify_project
+from sbafab.cutting.lettering import Stroke, strokes, width
+from sbafab.cutting.lightburn import ENDING, project_text, verify_project
 from sbafab.cutting.order import cutting_order, travel
-from sbafab.cutting.properties import CutSettings, kerf_suffix, sheet_properties
-from sbafab.cutting.svg_write import sheet_svg
+from sbafab.cutting.properties import (
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SHEET,
+    ENGRAVE,
+    REFERENCE,
+    CutSettings,
+    kerf_suffix,
+    sheet_properties,
+)
 from sbafab.cutting.verify import check_surroundings, verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.films import Material
-from sbafab.nesting.records import Nest, Placement
-from sbafab.progress import Counted
+from sbafab.nesting.records import Nest, Placement, Stock
+from sbafab.process import Counted
 
 FOLDER = "sheets"
 
@@ -34,7 +43,7 @@ LabelState = Literal["engraved", "no room", "off"]
 
 @dataclass(frozen=True)
 class Machine:
-    """What the estimate of cutting time assumes; mm/s, seconds and mm."""
+    """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
 
     cut_speed: float = 20.0
     travel_speed: float = 200.0
@@ -121,8 +130,8 @@ def _write_sheet(
     text = dxf_text(contours, properties, settings.curves.profile, around)
     path.write_bytes(text.encode())
     # In the order of the file, so that each contour is compared with its own first.
-    found = verify_file(path, Region(contours), properties)
-    _verify_surroundings(path.name, found, around)
+    read = verify_file(path, Region(contours), properties)
+    _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
     project.write_bytes(project_text(contours, around, properties).encode())
     verify_project(project, contours, around)
@@ -174,7 +183,7 @@ def _surroundings(
 
 
 def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, ...], ...]:
-    """What is engraved into the border, if there is room for it between the pins."""
+    """Return the engraving of the border, if there is room for it between the pins."""
     kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
     waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
     lowered = f" limits: {', '.join(settings.lowered)}" if settings.lowered else ""
@@ -186,11 +195,11 @@ def _label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[tuple[Point, 
 
 
 def _counts(nest: Nest, placements: Sequence[Placement]) -> tuple[tuple[str, str, int], ...]:
-    found = Counter(
+    counts = Counter(
         (nest.parts[placement.part].design, nest.parts[placement.part].pattern)
         for placement in placements
     )
-    return tuple((design, pattern, count) for (design, pattern), count in sorted(found.items()))
+    return tuple((design, pattern, count) for (design, pattern), count in sorted(counts.items()))
 
 
 def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
@@ -199,9 +208,177 @@ def _parts_said(nest: Nest, placements: Sequence[Placement]) -> str:
     )
 
 
-def _verify_surroundings(name: str, found: ReadBack, around: Surroundings) -> None:
-    """What the written sheet has beside its parts: frame, engraving, parting cut."""
+def _verify_surroundings(name: str, read: ReadBack, around: Surroundings) -> None:
+    """Check the written sheet's frame, engraving and parting cut."""
     try:
-        check_surroundings(found, around)
+        check_surroundings(read, around)
     except OutputError as error:
         raise OutputError(f"{name}: {error}") from error
+
+
+# The label that is engraved into a sheet's border, where parts and pins leave room for it.
+
+
+LETTERS = 4.0
+"""Most height of engraved letters in mm."""
+LEAST_LETTERS = 1.5
+MOST_LINES = 3
+PITCH = 1.4
+"""From line to line, in heights of a letter."""
+ONE_LINE, SEVERAL_LINES = 0.5, 0.7
+"""Share of the border's width that a line, or several, may take."""
+
+
+class _Margin(NamedTuple):
+    """A strip of border: its reading direction runs from ``corner`` along x, or along y upward.
+
+    Lines are ``room`` long at most and stand over each other away from ``corner``.
+    """
+
+    corner: Point
+    upward: bool
+    room: float
+
+    def at(self, p: Point) -> Point:
+        (x, y), (u, v) = self.corner, p
+        return (x - v, y + u) if self.upward else (x + u, y + v)
+
+
+def label(text: str, stock: Stock, length: float) -> tuple[Stroke, ...]:
+    """The strokes of a sheet's label; none where its border has no room.
+
+    In one line along the lower edge if it can, else along another, else in up to three lines.
+    """
+    for count in range(1, MOST_LINES + 1):
+        lines = _wrapped(text, count)
+        for margin in _margins(stock, length):
+            written = _written(lines, margin, stock)
+            if written:
+                return written
+    return ()
+
+
+def _margins(stock: Stock, length: float) -> Iterator[_Margin]:
+    """The border's four strips: below, left, above, right."""
+    edge = stock.border
+    along, up = stock.width - 2 * edge, length - 2 * edge
+    yield _Margin((edge, 0.0), False, along)
+    yield _Margin((edge, edge), True, up)
+    yield _Margin((edge, length - edge), False, along)
+    yield _Margin((stock.width, edge), True, up)
+
+
+def _written(lines: Sequence[str], margin: _Margin, stock: Stock) -> tuple[Stroke, ...]:
+    longest = max(width(line, 1.0) for line in lines)
+    block = 1 + PITCH * (len(lines) - 1)
+    share = ONE_LINE if len(lines) == 1 else SEVERAL_LINES
+    height = min(LETTERS, share * stock.border / block, margin.room / max(longest, 1e-9))
+    if height < LEAST_LETTERS:
+        return ()
+    low = (stock.border - height * block) / 2
+    ends = margin.at((0.0, low)), margin.at((height * longest, low + height * block))
+    if not all(_is_clear(ends, pin) for pin in stock.pins):
+        return ()
+    rows = [low + height * PITCH * row for row in reversed(range(len(lines)))]
+    return tuple(
+        tuple(map(margin.at, stroke))
+        for line, row in zip(lines, rows, strict=True)
+        for stroke in strokes(line, (0.0, row), height)
+    )
+
+
+def _is_clear(ends: tuple[Point, Point], pin: tuple[float, float, float]) -> bool:
+    """Return True if the box between two corners keeps off a pin's."""
+    low_x, low_y, high_x, high_y = _box(ends)
+    x, y, r = pin[0], pin[1], pin[2] / 2
+    return x + r < low_x or x - r > high_x or y + r < low_y or y - r > high_y
+
+
+def _box(ends: tuple[Point, Point]) -> Bounds:
+    (ax, ay), (bx, by) = ends
+    return min(ax, bx), min(ay, by), max(ax, bx), max(ay, by)
+
+
+def _wrapped(text: str, count: int) -> list[str]:
+    """The text in at most so many lines, the longest as short as words allow."""
+    words = text.split()
+    for most in range(max(map(len, words)), len(text) + 1):
+        lines = [words[0]]
+        for word in words[1:]:
+            if len(lines[-1]) + 1 + len(word) <= most:
+                lines[-1] += f" {word}"
+            else:
+                lines.append(word)
+        if len(lines) <= count:
+            return lines
+    return [text]
+
+
+# The picture beside a cut file: SVG in physical millimetres, in the colours of its layers.
+
+
+COLOURS = {
+    ENGRAVE: "#000000",
+    CUT_INNER: "#0000ff",
+    CUT_OUTER: "#ff0000",
+    CUT_SHEET: "#ff00ff",
+    REFERENCE: "#808080",
+}
+"""The DXF colours of the layers; ENGRAVE is black, as that colour is on white."""
+STROKE = 0.1
+"""Width of the lines in mm; the cut runs along their middle."""
+
+
+def sheet_svg(
+    contours: Sequence[Contour], sheet: Surroundings, width: float, height: float, title: str
+) -> str:
+    """The contours in the order given, with what surrounds them, on a page of this size in mm.
+
+    The page's lower left corner is the origin; true arcs, coordinates without transforms.
+    """
+    frame = [] if sheet.frame is None else _rectangle(*sheet.frame)
+    drawn = {
+        ENGRAVE: [_run(run, height) for run in sheet.engraved],
+        CUT_INNER: [_closed(c, height) for c in contours if c.is_hole],
+        CUT_OUTER: [_closed(c, height) for c in contours if not c.is_hole],
+        CUT_SHEET: [_run(run, height) for run in sheet.parting],
+        REFERENCE: [_run(frame, height)] if frame else [],
+    }
+    return "\n".join(
+        (
+            f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width)}mm" '
+            f'height="{coord(height)}mm" viewBox="0 0 {coord(width)} {coord(height)}">',
+            f"<title>{escape(title)}</title>",
+            *_groups(drawn),
+            "</svg>\n",
+        )
+    )
+
+
+def _groups(drawn: dict[str, list[str]]) -> Iterator[str]:
+    for layer, shapes in drawn.items():
+        if shapes:
+            yield (
+                f'<g id="{layer}" fill="none" stroke="{COLOURS[layer]}" '
+                f'stroke-width="{coord(STROKE)}">'
+            )
+            yield from shapes
+            yield "</g>"
+
+
+def _rectangle(x: float, y: float) -> list[Point]:
+    return [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)]
+
+
+def _closed(contour: Contour, height: float) -> str:
+    if contour.circle is not None:
+        (x, y), radius = contour.circle
+        return f'<circle cx="{coord(x)}" cy="{coord(height - y)}" r="{coord(radius)}"/>'
+    flipped = Region((contour,)).mapped(lambda p: (p[0], height - p[1]), 1.0, True)
+    return f'<path d="{path_data(flipped)}"/>'
+
+
+def _run(run: Sequence[Point], height: float) -> str:
+    points = [f"{coord(x)} {coord(height - y)}" for x, y in run]
+    closed = "Z" if run[0] == run[-1] else ""
+    return f'<path d="M{"L".join(points[:-1] if closed else points)}{closed}"/>'

@@ -1,4 +1,4 @@
-"""Every cut file is read back and compared with the profile it was written from."""
+"""Verification: every cut file is read back and compared with the profile it was written from."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from sbafab.cutting.cut_layers import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import DATUM_ARM, Surroundings
-from sbafab.cutting.remaining import PointsLeft
+from sbafab.cutting.order import PointsLeft
+from sbafab.cutting.properties import CUT_SEQUENCE, CUT_SHEET, ENGRAVE, REFERENCE
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 
 TOLERANCE = 0.001
 """Written contours lie within this of the exact ones, in mm."""
@@ -32,20 +33,20 @@ def verify_file(
 
     Raises OutputError with the file, the worst deviation and its place.
     """
-    found = read_profile(path)
+    read = read_profile(path)
     try:
-        if found.units != "mm":
+        if read.units != "mm":
             raise OutputError("it does not say that its units are millimetres.")
-        _check_properties(found.properties, expected_properties)
-        _check_sequence(found)
-        check_contours(found.region, expected, TOLERANCE)
-        _check_area(found.region, expected)
+        _check_properties(read.properties, expected_properties)
+        _check_sequence(read)
+        check_contours(read.region, expected, TOLERANCE)
+        _check_area(read.region, expected)
     except OutputError as error:
         raise OutputError(f"{path.name}: {error} Regenerate it.") from error
-    return found
+    return read
 
 
-def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
+def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
     """Compares what a sheet has beside its parts: engraving in the waste, parting cut, frame.
 
     Raises OutputError with the layer and place of what differs, or of engraving inside a part.
@@ -62,7 +63,7 @@ def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
             ],
         ),
     ):
-        drawn = [edges for name, edges in found.strokes if name == layer]
+        drawn = [edges for name, edges in read.strokes if name == layer]
         if len(drawn) != len(runs):
             raise OutputError(f"{layer} has {len(drawn)} strokes, not {len(runs)}.")
         for edges, run in zip(drawn, runs, strict=True):
@@ -74,8 +75,8 @@ def check_surroundings(found: ReadBack, expected: Surroundings) -> None:
                 raise OutputError(
                     f"the stroke on {layer} at x {x:.3f}, y {y:.3f} differs from what was written."
                 )
-    engraved = [edge for name, edges in found.strokes if name == ENGRAVE for edge in edges]
-    near = _near(found.region, engraved)
+    engraved = [edge for name, edges in read.strokes if name == ENGRAVE for edge in edges]
+    near = _near(read.region, engraved)
     for edge in engraved:
         if near.contains(edge.at(0.5)) or near.contains(edge.start):
             x, y = edge.start
@@ -95,57 +96,57 @@ def _near(region: Region, edges: Sequence[Edge]) -> Region:
     )
 
 
-def check_datum(found: ReadBack) -> None:
+def check_datum(read: ReadBack) -> None:
     """Raises OutputError where a layer's file has more beside its contours than the datum cross.
 
     Nor may it have less: the cross is what layers are laid over each other by.
     """
     arm = DATUM_ARM
-    wanted = [((-arm, 0.0), (arm, 0.0)), ((0.0, -arm), (0.0, arm))]
-    for layer, edges in found.strokes:
+    expected = [((-arm, 0.0), (arm, 0.0)), ((0.0, -arm), (0.0, arm))]
+    for layer, edges in read.strokes:
         ends = edges[0].start, edges[-1].end
-        own = next(
+        datum = next(
             (
                 line
-                for line in wanted
-                if min(_apart(line, ends), _apart(line, ends[::-1])) <= TOLERANCE
+                for line in expected
+                if min(_distance(line, ends), _distance(line, ends[::-1])) <= TOLERANCE
             ),
             None,
         )
-        if layer != REFERENCE or len(edges) != 1 or own is None:
+        if layer != REFERENCE or len(edges) != 1 or datum is None:
             x, y = ends[0]
             raise OutputError(
                 f"a stroke on {layer} at x {x:.3f}, y {y:.3f} is not the datum cross; remove it."
             )
-        wanted.remove(own)
-    if wanted:
+        expected.remove(datum)
+    if expected:
         raise OutputError("the datum cross at x 0, y 0 is not whole; regenerate it.")
 
 
-def _apart(line: Sequence[Point], other: Sequence[Point]) -> float:
-    return max(math.dist(p, q) for p, q in zip(line, other, strict=True))
+def _distance(line: Sequence[Point], second: Sequence[Point]) -> float:
+    return max(math.dist(p, q) for p, q in zip(line, second, strict=True))
 
 
-def _check_properties(found: Mapping[str, str], expected: Mapping[str, str]) -> None:
-    for name in (*expected, *found):
-        if found.get(name) != expected.get(name):
+def _check_properties(properties: Mapping[str, str], expected: Mapping[str, str]) -> None:
+    for name in (*expected, *properties):
+        if properties.get(name) != expected.get(name):
             raise OutputError(
-                f"custom property {name} is {found.get(name)!r}, not {expected.get(name)!r}."
+                f"custom property {name} is {properties.get(name)!r}, not {expected.get(name)!r}."
             )
 
 
-def _check_sequence(found: ReadBack) -> None:
-    ranks = [CUT_SEQUENCE.index(layer) for layer in found.layers if layer in CUT_SEQUENCE]
+def _check_sequence(read: ReadBack) -> None:
+    ranks = [CUT_SEQUENCE.index(layer) for layer in read.layers if layer in CUT_SEQUENCE]
     for before, after in pairwise(ranks):
         if before > after:
             raise OutputError(f"{CUT_SEQUENCE[before]} is cut before {CUT_SEQUENCE[after]}.")
 
 
-def check_contours(found: Region, expected: Region, tolerance: float) -> None:
+def check_contours(region: Region, expected: Region, tolerance: float) -> None:
     """Raises OutputError where a contour is missing, or off by more than ``tolerance`` mm."""
     for kind, ours, theirs in (
-        ("holes", expected.holes, found.holes),
-        ("outlines", expected.outers, found.outers),
+        ("holes", expected.holes, region.holes),
+        ("outlines", expected.outers, region.outers),
     ):
         if len(ours) != len(theirs):
             raise OutputError(f"it has {len(theirs)} {kind}, not {len(ours)}.")
@@ -177,13 +178,9 @@ def _paired(
         yield contour, theirs[rest.take(box[:2], unlike)]
 
 
-def _same(contour: Contour, other: Contour) -> bool:
-    """Whether two contours have the same edges, from whichever vertex, all but for rounding.
-
-    Ends, centres and radii within ``ROUNDING`` leave no point of an edge farther than a few times
-    that from the other: what is not the same so is sampled.
-    """
-    ours, theirs = contour.edges, other.edges
+def _same(contour: Contour, second: Contour) -> bool:
+    """Return True if two contours have equal edges, from whichever vertex, but for rounding."""
+    ours, theirs = contour.edges, second.edges
     if len(ours) != len(theirs):
         return False
     start = ours[0].start
@@ -205,18 +202,18 @@ def _same_edge(a: Edge, b: Edge) -> bool:
     )
 
 
-def _check_area(found: Region, expected: Region) -> None:
-    off = abs(found.area - expected.area)
+def _check_area(region: Region, expected: Region) -> None:
+    off = abs(region.area - expected.area)
     if off > AREA_TOLERANCE * expected.area:
-        raise OutputError(f"its area is {found.area:.6f} mm2, not {expected.area:.6f}.")
+        raise OutputError(f"its area is {region.area:.6f} mm2, not {expected.area:.6f}.")
 
 
-def _deviation(contour: Contour, other: Contour) -> tuple[float, Point]:
+def _deviation(contour: Contour, second: Contour) -> tuple[float, Point]:
     """The largest distance of sampled points of a contour from the other, and where."""
     worst, place = 0.0, contour.edges[0].start
     near = 0
     for p in _samples(contour):
-        distance, near = _nearest(other, p, near)
+        distance, near = _nearest(second, p, near)
         if distance > worst:
             worst, place = distance, p
     return worst, place

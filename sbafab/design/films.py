@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from sbafab.design.section import Section
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.geometry.beam import Kerf
+from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import (
     PAPER_PRODUCT,
     PAPER_THICKNESS,
@@ -34,7 +34,7 @@ HOTTEST = 400.0
 
 
 def is_kerf(x: float, y: float) -> bool:
-    """Whether a beam may be so wide: up to a millimetre, and nowhere ten times as wide."""
+    """Return True for a possible beam width: up to a millimetre, and nowhere ten times as wide."""
     return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
 
 
@@ -204,7 +204,7 @@ class Films(Section):
         """Every film by the name of its table: TPE, PTFE, then the others."""
         tpe, ptfe = self.tpe, self.ptfe
         limit = ptfe.temperature_limit
-        found = {
+        films = {
             "tpe": Film(
                 "TPE",
                 tpe.product,
@@ -226,7 +226,7 @@ class Films(Section):
             ),
         }
         for name, film in self.others.items():
-            found[name] = Film(
+            films[name] = Film(
                 material=material(name),
                 product=film.product,
                 thickness=film.thickness,
@@ -236,10 +236,10 @@ class Films(Section):
                 kind=film.kind,
                 warning=film.warning,
                 elastic=_elastic(film),
-                shade=sum(known.kind == film.kind for known in found.values()),
+                shade=sum(limits.kind == film.kind for limits in films.values()),
                 stays_solid=film.kind == "structural" and film.melting_point is None,
             )
-        return found
+        return films
 
 
 def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
@@ -256,14 +256,14 @@ def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any])
     kind, sheet and kerf: thickness, density and the rest are those of the first product. PTFE is
     one polymer under any name, and keeps them.
     """
-    left = dict(table)
+    rest = dict(table)
     for name, film in table.items():
-        own = changed.get(name)
-        if name == "ptfe" or not (isinstance(film, Mapping) and isinstance(own, Mapping)):
+        changes = changed.get(name)
+        if name == "ptfe" or not (isinstance(film, Mapping) and isinstance(changes, Mapping)):
             continue
-        if own.get("product", film.get("product")) != film.get("product"):
-            left[name] = {key: film[key] for key in ("kind", "sheet", "kerf") if key in film}
-    return left
+        if changes.get("product", film.get("product")) != film.get("product"):
+            rest[name] = {key: film[key] for key in ("kind", "sheet", "kerf") if key in film}
+    return rest
 
 
 def material(name: str) -> Material:

@@ -1,4 +1,4 @@
-"""Kits: what a lab works with, in one file with a source for every number.
+"""Kits: a lab's films, tubes, press, laser and limits, in one file with a source for every number.
 
 A kit gives a design every key of films, layup, registration, press, acceptance, laser, sheets and
 rules that the design itself leaves out, and the tube and adhesive of its inlets.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,31 +16,34 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from sbafab.design.files import (
+    KITS,
+    checked,
+    kit_names,
+    listed,
+    read_toml,
+    shown,
+    templates_folder,
+    write_copy,
+)
 from sbafab.design.films import Films, LayerFilms, without_other_products
-from sbafab.design.messages import listed, shown
-from sbafab.design.reading import checked, read_toml
-from sbafab.design.records import (
+from sbafab.design.section import Section, writable
+from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
-    Design,
     Laser,
     Press,
     Registration,
     Rules,
     Sheets,
 )
-from sbafab.design.section import Section, writable
-from sbafab.design.templates import KITS, kit_names, templates_folder, write_copy
 from sbafab.design.units import Length, millimetres
-from sbafab.design.writing import plain_tables, resolved
 from sbafab.errors import DesignError
 
 DEFAULT = "paper"
 SCHEMA = "sbafab/kit@1"
 FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
-OTHER_TUBE = "tubing of your choice"
-"""What a tube is called whose name stands for another size in the kit."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = (*("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),)
 """Sections of a design that a kit fills in."""
@@ -75,7 +78,7 @@ class Adhesive(Section):
     """Hours until it holds."""
 
 
-class _File(Section):
+class KitFile(Section):
     """All tables of a kit's file, sources taken out."""
 
     schema_name: Literal["sbafab/kit@1"] = Field(alias="schema")
@@ -96,8 +99,10 @@ class _File(Section):
 
 @dataclass(frozen=True)
 class Kit:
-    """A lab's kit. ``tables`` hold the keys that it gives a design, ``sources`` say by dotted key
-    where its numbers are from; ``sha256`` is that of all it says.
+    """A lab's kit.
+
+    ``tables`` hold the keys that it gives a design, ``sources`` the origin of its numbers by dotted
+    key; ``sha256`` is that of all tables.
     """
 
     name: str
@@ -113,7 +118,7 @@ class Kit:
 
 
 def kit_path(kit: object, folder: Path) -> Path:
-    """The file of the kit that a design in ``folder`` names. Raises DesignError."""
+    """Return the file of the kit that a design in ``folder`` names. Raises DesignError."""
     if not isinstance(kit, str):
         raise DesignError(f"kit = {shown(kit)} must be a text in quotes: a kit's name or its file")
     try:
@@ -136,7 +141,7 @@ def kit_path(kit: object, folder: Path) -> Path:
 
 
 def read_kit(path: Path) -> Kit:
-    """A kit's file. Raises DesignError with one sentence for what is wrong in it."""
+    """Return the kit of a file. Raises DesignError with one sentence for a fault in it."""
     tables = read_toml(path)
     sources: dict[str, str] = {}
     plain = _without_sources(tables, "", sources, path)
@@ -145,20 +150,20 @@ def read_kit(path: Path) -> Kit:
         if name in _table(plain, section):
             raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
     try:
-        found = checked(_File, plain, {})
+        record = checked(KitFile, plain, {})
     except DesignError as error:
-        said = str(error).replace("a design file", "a kit").replace("the design file", "the kit")
-        raise DesignError(f"{path}: {said}") from None
+        message = str(error).replace("a design file", "a kit").replace("the design file", "the kit")
+        raise DesignError(f"{path}: {message}") from None
     text = json.dumps(tables, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return Kit(
-        name=found.name,
-        version=found.version,
-        about=found.about,
+        name=record.name,
+        version=record.version,
+        about=record.about,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         tables={section: plain[section] for section in SECTIONS if section in plain},
         sources=sources,
-        tubes=found.tubes,
-        adhesives=found.adhesives,
+        tubes=record.tubes,
+        adhesives=record.adhesives,
         text=path.read_bytes(),
     )
 
@@ -168,14 +173,9 @@ def _shipped(path: Path) -> Kit:
     return read_kit(path)
 
 
-def _kit(kit: object, folder: Path) -> Kit:
+def load_kit(kit: object, folder: Path) -> Kit:
     path = kit_path(kit, folder)
     return _shipped(path) if kit in kit_names() else read_kit(path)
-
-
-def kit_of(design: Design) -> Kit:
-    """The kit that a design names. Raises DesignError."""
-    return _kit(design.kit, design.folder)
 
 
 def _without_sources(
@@ -206,7 +206,7 @@ def _without_sources(
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value is a number, a length with its unit, or a list with one in it."""
+    """Return True if a value is a number, a length with its unit, or a list with one in it."""
     if isinstance(value, list):
         return any(map(_is_number, value))
     if isinstance(value, str):
@@ -219,138 +219,58 @@ def _is_number(value: object) -> bool:
 
 
 def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """A design's tables with every key filled in that its kit gives and the design leaves out.
+    """Return a design's tables with every key filled in that its kit gives and the design lacks.
 
-    Raises DesignError where there is no such kit, it is not sound, or it lacks the tube.
+    Raises DesignError where there is no such kit, it is faulty, or it lacks the tube.
     """
-    kit = _kit(data.get("kit", DEFAULT), folder)
+    kit = load_kit(data.get("kit", DEFAULT), folder)
     filled = {**data}
-    for section, given in kit.tables.items():
-        own = data.get(section, {})
-        is_of_films = section == "films" and isinstance(own, dict)
-        table = without_other_products(given, own) if is_of_films else given
+    for section, kit_table in kit.tables.items():
+        design_table = data.get(section, {})
+        is_of_films = section == "films" and isinstance(design_table, dict)
+        table = without_other_products(kit_table, design_table) if is_of_films else kit_table
         # What is no table is refused later, in the words for it.
-        filled[section] = _merged(table, own) if isinstance(own, dict) else own
+        filled[section] = (
+            _merged(table, design_table) if isinstance(design_table, dict) else design_table
+        )
     inlet = data.get("inlet", {})
     if isinstance(inlet, dict):
-        filled["inlet"] = {**_inlet(kit, inlet, "kit" in data), **inlet}
+        filled["inlet"] = {**inlet_of_kit(kit, inlet, "kit" in data), **inlet}
     return filled
 
 
-def _merged(table: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """The table with all that ``own`` says in its place, table by table."""
-    merged = {**table, **own}
-    for key, value in own.items():
+def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The table with all ``overrides`` in place, table by table."""
+    merged = {**table, **overrides}
+    for key, value in overrides.items():
         if isinstance(value, dict) and isinstance(table.get(key), dict):
             merged[key] = _merged(table[key], value)
     return merged
 
 
-def _inlet(kit: Kit, own: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
-    """The kit's tube and adhesive: the first of each, or the size of the one that is asked for."""
-    given: dict[str, Any] = {}
+def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
+    """Kit's tube and adhesive: the first of each, or the size of the tube that the inlet names."""
+    values: dict[str, Any] = {}
     if kit.adhesives:
-        given["adhesive"] = next(iter(kit.adhesives))
+        values["adhesive"] = next(iter(kit.adhesives))
     if not kit.tubes:
-        return given
-    name = own.get("tube", next(iter(kit.tubes)))
+        return values
+    name = inlet.get("tube", next(iter(kit.tubes)))
     if isinstance(name, str) and name in kit.tubes:
-        return {**given, "tube": name, "tube_outer_diameter": kit.tubes[name].outer_diameter}
-    if is_named and "tube_outer_diameter" not in own:
+        return {**values, "tube": name, "tube_outer_diameter": kit.tubes[name].outer_diameter}
+    if is_named and "tube_outer_diameter" not in inlet:
         raise DesignError(
             f"inlet.tube = {shown(name)} is not in kit {kit.name} ({listed(kit.tubes)}); name one "
             "of those, add it to the kit, or give inlet.tube_outer_diameter"
         )
-    return given
-
-
-def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """A design's tables without values that its kit or a default gives: another kit may."""
-    kit = kit_of(design)
-    given = {**kit.tables, "inlet": _inlet(kit, {}, False)}
-    usual = type(design).model_validate({"name": "x", "family": design.family, **given})
-    tables = {key: table for key, table in data.items() if isinstance(table, dict)}
-    return {**data, **{key: {} for key in tables}, **_less(tables, plain_tables(usual))}
-
-
-def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """What differs from the usual values, tables that are left with nothing taken out."""
-    left: dict[str, Any] = {}
-    for key, value in data.items():
-        inner = usual.get(key)
-        own = _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
-        if own not in (inner, {}):
-            left[key] = own
-    return left
-
-
-def departures(design: Design) -> list[str]:
-    """The dotted keys that a design sets otherwise than its kit."""
-    kit = kit_of(design)
-    own, given = resolved(design), dict(_values(kit))
-    found = [key for key, value in given.items() if _at(own, key) != value]
-    tube = kit.tubes.get(design.inlet.tube)
-    if kit.tubes and tube is None:
-        found.append("inlet.tube")
-    elif tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
-        found.append("inlet.tube_outer_diameter")
-    if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
-        found.append("inlet.adhesive")
-    return found
-
-
-def tube_name(design: Design) -> str:
-    """The tubing to take: the design's, unless a tube of that name has another size in the kit."""
-    tube = kit_of(design).tubes.get(design.inlet.tube)
-    if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
-        return OTHER_TUBE
-    return design.inlet.tube
-
-
-def _values(kit: Kit) -> Iterator[tuple[str, object]]:
-    """Every key that a kit gives, and its value as a design would have it."""
-    found = checked(_File, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
-    usual = found.model_dump(mode="json")
-    for key in _dotted(kit.tables):
-        yield key, _at(usual, key)
-
-
-def _dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _dotted(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}"
-
-
-def _at(table: Any, key: str) -> object:
-    for part in key.split("."):
-        table = table.get(part) if isinstance(table, dict) else None
-    return table
+    return values
 
 
 def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
-    found = tables.get(section)
-    return found if isinstance(found, dict) else {}
-
-
-def citation(design: Design) -> dict[str, Any]:
-    """What manifest and checks say of a design's kit: name, version, hash, what departs from it."""
-    kit = kit_of(design)
-    return {
-        "name": kit.name,
-        "version": kit.version,
-        "sha256": kit.sha256,
-        "departures": departures(design),
-    }
-
-
-def cited(design: Design) -> str:
-    """The same in words."""
-    kit = kit_of(design)
-    return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"
+    table = tables.get(section)
+    return table if isinstance(table, dict) else {}
 
 
 def write_kit(file: Path) -> Path:
-    """Copies the paper's kit, named after the new file. Raises DesignError if it exists."""
+    """Copy the paper's kit, named after the new file. Raises DesignError if it exists."""
     return write_copy(templates_folder() / KITS / f"{DEFAULT}.toml", file)

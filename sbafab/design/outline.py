@@ -3,20 +3,37 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sbafab.design.strands import JOIN, Strand, Traced, counted, joined, sealed, widest_gap
+from sbafab.design.strands import (
+    JOIN,
+    Strand,
+    Traced,
+    counted,
+    joined,
+    place,
+    polyline,
+    refuse_more_than_limit,
+    sealed,
+    widest_gap,
+)
 from sbafab.errors import DesignError
-from sbafab.geometry.biarc import FitError
-from sbafab.geometry.centroid import centroid
-from sbafab.geometry.edges import EPSILON, Point
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.arcs import FitError, elliptical_arc, fit_arcs
+from sbafab.geometry.arrangement import split_edges
+from sbafab.geometry.contour import Contour, tidy
+from sbafab.geometry.edges import EPSILON, Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import close_pairs
-from sbafab.geometry.pieces import split_edges
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.tidy import tidy
+from sbafab.geometry.region import Region, centroid
+
+if TYPE_CHECKING:
+    from ezdxf.document import Drawing
+    from ezdxf.layouts.layout import Modelspace
+    from ezdxf.math import BSpline
 
 MOST_BYTES = 2_000_000
 LARGEST = 150.0
@@ -25,10 +42,10 @@ SMALLEST = 1.0
 
 
 class Outline(NamedTuple):
-    """A drawn outline, and one sentence on the size that was understood."""
+    """A drawn outline, and one sentence on its size."""
 
     region: Region
-    said: str
+    description: str
 
 
 def read_outline(path: Path) -> Region:
@@ -43,7 +60,7 @@ def read_outline(path: Path) -> Region:
 
 
 def understood(path: Path) -> Outline:
-    """The same with the size that was understood, in words. Raises DesignError."""
+    """Return a drawn outline with its size in words. Raises DesignError."""
     try:
         return _understood(path, _content(path))
     except FitError as error:
@@ -64,7 +81,7 @@ def _understood(path: Path, content: bytes) -> Outline:
 
 
 def _content(path: Path) -> bytes:
-    """What the file holds, if it is no larger than an outline may be."""
+    """Content of the file, if it is no larger than an outline may be."""
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0
@@ -82,8 +99,6 @@ def _content(path: Path) -> bytes:
 def _traced(path: Path) -> Traced:
     # Each reader brings its own library, loaded for the format at hand only.
     if path.suffix.lower() == ".dxf":
-        from sbafab.design.outline_dxf import dxf_strands
-
         return dxf_strands(path)
     if path.suffix.lower() == ".svg":
         from sbafab.design.outline_svg import svg_strands
@@ -111,17 +126,17 @@ def _one_loop(strands: list[Strand]) -> Strand:
 
 
 def _refuse_doubles(strands: list[Strand]) -> None:
-    seen = set()
+    drawn = set()
     for strand in strands:
         for edge in strand:
             x, y = edge.at(0.5)
             ends = sorted((round(px, 4), round(py, 4)) for px, py in (edge.start, edge.end))
             key = (*ends, round(x, 4), round(y, 4))
-            if key in seen:
+            if key in drawn:
                 raise DesignError(
                     f"draws an edge twice, at x {x:.4f}, y {y:.4f}; delete one of the two"
                 )
-            seen.add(key)
+            drawn.add(key)
 
 
 def _checked(loop: Strand) -> Region:
@@ -180,3 +195,288 @@ def _crossing(p: Point) -> DesignError:
     return DesignError(
         f"crosses or touches itself at x {p[0]:.4f}, y {p[1]:.4f}; draw it without the loop"
     )
+
+
+# The strands of a DXF drawing: what its model space holds, in mm.
+
+
+MM_PER_UNIT = {0: 1.0, 1: 25.4, 4: 1.0, 5: 10.0, 6: 1000.0}
+"""By $INSUNITS: none (taken as mm), inch, mm, cm, m."""
+SCALES = {
+    0: "read at 1 mm a unit, for the file names no unit ($INSUNITS)",
+    1: "drawn in inches",
+    4: "drawn in mm",
+    5: "drawn in cm",
+    6: "drawn in m",
+}
+NO_PATHS = frozenset(
+    {
+        *("ACAD_TABLE", "ACIDBLOCKREFERENCE", "ARC_DIMENSION", "ATTDEF", "ATTRIB", "DIMENSION"),
+        *("HATCH", "IMAGE", "LARGE_RADIAL_DIMENSION", "LEADER", "LIGHT", "MLEADER", "MPOLYGON"),
+        *("MTEXT", "MULTILEADER", "OLE2FRAME", "OLEFRAME", "PDFUNDERLAY", "POINT", "SUN", "TEXT"),
+        *("TOLERANCE", "VIEWPORT", "WIPEOUT"),
+    }
+)
+"""Lettering, dimensions, fills and pictures: no outline, whatever they show."""
+COMPENSATED = "compensated"
+"""What a cut file's custom property KERF_STATE says where its edges are moved."""
+LEVEL = 1e-6
+HIGHEST_DEGREE = 10
+MOST_ITEMS = 20_000
+"""Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
+
+
+def dxf_strands(path: Path) -> Traced:
+    """Every line, arc, circle, polyline, ellipse and spline that the model space shows.
+
+    They must lie in one plane at one height. Raises DesignError, also for what draws by other
+    means, such as block references.
+    """
+    content = path.read_bytes()
+    _refuse_excess(content)
+    drawing, space = _drawing(path)
+    _refuse_compensated(drawing)
+    # Where a file has no header at all, the reader makes one up that says metres.
+    unit = drawing.header.get("$INSUNITS", 0) if b"$INSUNITS" in content else 0
+    if unit not in MM_PER_UNIT:
+        raise DesignError(
+            f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
+            "inches (1)"
+        )
+    return Traced(_strands(drawing, space, MM_PER_UNIT[unit]), SCALES[unit])
+
+
+def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Strand]:
+    level: float | None = None
+    drawn = [entity for entity in space if entity.dxftype() not in NO_PATHS]
+    shown = [entity for entity in drawn if _is_shown(entity, drawing)]
+    if drawn and not shown:
+        raise DesignError("holds hidden entities only; thaw and switch on the outline's layer")
+    for entity in shown:
+        kind = entity.dxftype()
+        if kind not in READERS:
+            raise DesignError(
+                f"holds an entity {kind}, which is not read; explode blocks and the like to lines, "
+                "arcs and curves, or delete it"
+            )
+        for height in _heights(entity):
+            level = height if level is None else level
+            if not abs(height - level) * factor <= LEVEL:
+                raise DesignError(
+                    f"holds a {kind} at z {height:g} where another point is at z {level:g}; lay "
+                    "the whole outline flat"
+                )
+        yield _read(entity, factor)
+
+
+def _is_shown(entity: Any, drawing: Drawing) -> bool:
+    """Return True if a program shows the entity: it is visible, and its layer on and thawed."""
+    if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
+        return True  # no entity at all, such as a BLOCK: refused by its kind
+    name = str(entity.dxf.get("layer", "0"))
+    if entity.dxf.get("invisible", 0) or name not in drawing.layers:
+        return not entity.dxf.get("invisible", 0)
+    layer = drawing.layers.get(name)
+    return not (layer.is_off() or layer.is_frozen())
+
+
+def _refuse_excess(content: bytes) -> None:
+    """Raises DesignError for a drawing that would take long to read."""
+    if content.startswith(b"AutoCAD Binary DXF"):
+        items = len(re.findall(rb"\0[A-Z]", content))
+    else:
+        items = sum(line.strip() == b"0" for line in content.splitlines())
+    if items > MOST_ITEMS:
+        raise DesignError(
+            f"has more than {MOST_ITEMS:,} entities and settings; save a drawing of the outline "
+            "alone"
+        )
+
+
+def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
+    from ezdxf.filemanagement import readfile
+
+    try:
+        drawing = readfile(path)
+        return drawing, drawing.modelspace()
+    except Exception as error:
+        # A damaged file fails anywhere in the parser, with any of the built-in errors.
+        kind = type(error).__name__
+        raise DesignError(
+            f"is not a DXF file that can be read ({kind}); save it again as DXF R2010"
+        ) from None
+
+
+def _refuse_compensated(drawing: Drawing) -> None:
+    """Raises DesignError for a cut path: it would be compensated for its kerf once more."""
+    properties = dict(drawing.header.custom_vars.properties)
+    if properties.get("KERF_STATE") == COMPENSATED:
+        raise DesignError(
+            f"is a cut file compensated for a kerf of {properties.get('KERF_WIDTH')} mm; give the "
+            "outline itself, without kerf"
+        )
+
+
+def _read(entity: Any, factor: float) -> Strand:
+    try:
+        return READERS[entity.dxftype()](entity, factor)
+    except (DesignError, FitError):
+        raise
+    except Exception:
+        # As above: what a damaged entity lacks shows itself anywhere.
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
+
+
+def _heights(entity: Any) -> list[float]:
+    """The z of every point that an entity is drawn by, in its own units."""
+    try:
+        return [float(z) for z in HEIGHTS[entity.dxftype()](entity)]
+    except Exception:
+        raise DesignError(f"holds a damaged {entity.dxftype()}; draw it again") from None
+
+
+def _facing(entity: Any) -> float:
+    """1, or -1 where an entity's own z runs down."""
+    return -1.0 if entity.dxf.extrusion.z < 0 else 1.0
+
+
+def _polyline_heights(entity: Any) -> list[float]:
+    if entity.is_2d_polyline:
+        elevation = entity.dxf.get("elevation")
+        return [_facing(entity) * elevation.z if elevation is not None else 0.0]
+    return [vertex.dxf.location.z for vertex in entity.vertices]
+
+
+def _spline_heights(entity: Any) -> list[float]:
+    points = [*entity.control_points, *entity.fit_points]
+    return [float(point[2]) for point in points]
+
+
+def _side(entity: Any) -> float:
+    """1, or -1 for an entity drawn on the back of the plane (its x runs the other way)."""
+    x, y, z = entity.dxf.extrusion
+    if abs(x) > LEVEL or abs(y) > LEVEL or abs(abs(z) - 1) > LEVEL:
+        raise DesignError(
+            f"holds a {entity.dxftype()} that is tilted out of the xy plane; lay it flat"
+        )
+    return 1.0 if z > 0 else -1.0
+
+
+def _line(entity: Any, factor: float) -> Strand:
+    start, end = entity.dxf.start, entity.dxf.end
+    edge = Line(place(start.x * factor, start.y * factor), place(end.x * factor, end.y * factor))
+    return (edge,) if edge.length > EPSILON else ()
+
+
+def _arc(entity: Any, factor: float) -> Strand:
+    first = math.radians(entity.dxf.get("start_angle", 0.0))
+    last = math.radians(entity.dxf.get("end_angle", 360.0))
+    place(first, last)
+    turn = (last - first) % math.tau or math.tau
+    return _turn(entity, factor, first, first + turn)
+
+
+def _circle(entity: Any, factor: float) -> Strand:
+    return _turn(entity, factor, 0.0, math.tau)
+
+
+def _turn(entity: Any, factor: float, first: float, last: float) -> Strand:
+    side, radius = _side(entity), entity.dxf.radius * factor
+    place(radius, 0.0)
+    if radius <= 0:
+        raise DesignError(f"holds a {entity.dxftype()} of radius {radius:g}; delete it")
+    centre = place(side * entity.dxf.center.x * factor, entity.dxf.center.y * factor)
+    return elliptical_arc(centre, (side * radius, 0.0), (0.0, radius), first, last)
+
+
+def _light_polyline(entity: Any, factor: float) -> Strand:
+    return _through(entity.get_points("xyb"), _side(entity), factor, entity.closed)
+
+
+def _heavy_polyline(entity: Any, factor: float) -> Strand:
+    if not (entity.is_2d_polyline or entity.is_3d_polyline):
+        raise DesignError("holds a POLYLINE that is a mesh; draw the outline alone")
+    # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
+    points = [
+        (vertex.dxf.location.x, vertex.dxf.location.y, vertex.dxf.get("bulge", 0.0))
+        for vertex in entity.vertices
+        if not vertex.dxf.flags & 16
+    ]
+    side = _side(entity) if entity.is_2d_polyline else 1.0
+    return _through(points, side, factor, entity.is_closed)
+
+
+def _through(points: Any, side: float, factor: float, closed: bool) -> Strand:
+    vertices = []
+    for x, y, bulge in (map(float, point) for point in points):
+        place(bulge, 0.0)
+        vertices.append((*place(side * x * factor, y * factor), side * bulge))
+    refuse_more_than_limit(len(vertices))
+    return polyline(vertices, closed)
+
+
+def _ellipse(entity: Any, factor: float) -> Strand:
+    _side(entity)
+    tool = entity.construction_tool()
+    place(tool.start_param, tool.end_param)
+    first = tool.start_param
+    turn = (tool.end_param - first) % math.tau or math.tau
+    centre, major, minor = (
+        place(v.x * factor, v.y * factor) for v in (tool.center, tool.major_axis, tool.minor_axis)
+    )
+    if min(math.hypot(*major), math.hypot(*minor)) == 0:
+        raise DesignError("holds an ELLIPSE without width; delete it")
+    return elliptical_arc(centre, major, minor, first, first + turn)
+
+
+def _spline(entity: Any, factor: float) -> Strand:
+    refuse_more_than_limit(max(len(entity.control_points), len(entity.fit_points)))
+    if entity.dxf.degree > HIGHEST_DEGREE:
+        raise DesignError(
+            f"holds a SPLINE of degree {entity.dxf.degree}, where at most {HIGHEST_DEGREE} is "
+            "allowed; draw it with degree 3"
+        )
+    tool: BSpline = entity.construction_tool()
+    for point in tool.control_points:
+        place(point.x * factor, point.y * factor)
+
+    evaluator = tool.evaluator
+
+    def curve(t: float) -> tuple[Point, Point]:
+        at, rate = evaluator.derivative(t, 1)
+        return (at.x * factor, at.y * factor), (rate.x * factor, rate.y * factor)
+
+    knots = list(tool.knots())
+    first, last = knots[tool.degree], knots[tool.count]
+    # A knot as often repeated as the degree lets the curve turn a corner there.
+    corners = sorted(
+        {knot for knot in knots if first < knot < last and knots.count(knot) >= tool.degree}
+    )
+    stops = [first, *corners, last]
+    edges: list[Edge] = []
+    for a, b in pairwise(stops):
+        edges += fit_arcs(curve, a, b)
+        refuse_more_than_limit(len(edges))
+    return tuple(edges)
+
+
+READERS = {
+    "LINE": _line,
+    "ARC": _arc,
+    "CIRCLE": _circle,
+    "LWPOLYLINE": _light_polyline,
+    "POLYLINE": _heavy_polyline,
+    "ELLIPSE": _ellipse,
+    "SPLINE": _spline,
+}
+HEIGHTS = {
+    "LINE": lambda e: [e.dxf.start.z, e.dxf.end.z],
+    "ARC": lambda e: [_facing(e) * e.dxf.center.z],
+    "CIRCLE": lambda e: [_facing(e) * e.dxf.center.z],
+    "LWPOLYLINE": lambda e: [_facing(e) * e.dxf.get("elevation", 0.0)],
+    "POLYLINE": _polyline_heights,
+    # Both lie in the coordinates of the world; an axis that rises is an ellipse that is tilted.
+    "ELLIPSE": lambda e: [e.dxf.center.z, e.dxf.center.z + e.dxf.major_axis.z],
+    "SPLINE": _spline_heights,
+}
+"""By type of entity, where its points lie."""

@@ -1,4 +1,4 @@
-"""What a user can ask for: the sections that every family's design file shares.
+"""Records of a design file: the sections that all families share, and the form of an actuator.
 
 Every field has the paper's value as default (paper Sec. 2) or, where the paper is silent, ours,
 and says so. Lengths are mm.
@@ -6,384 +6,62 @@ and says so. Lengths are mm.
 
 from __future__ import annotations
 
+import difflib
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self, TypeVar
 
 from pydantic import (
-    AfterValidator,
-    BeforeValidator,
     Field,
     PrivateAttr,
-    ValidationInfo,
-    field_validator,
 )
 
-from sbafab.design.films import UNCALIBRATED, Films, KerfWidth, LayerFilms, Sheet
-from sbafab.design.form import Form, Free
-from sbafab.design.order import Order
-from sbafab.design.section import Section, writable
-from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
-from sbafab.laminate.base_plate import PlateMachine, lone_pin_error, pin_error
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
+from sbafab.design.files import (
+    ASSEMBLY,
+    FITS,
+    KIT,
+    Change,
+    changed_keys,
+    checked,
+    listed,
+    open_what_fits,
+    override,
+    shown,
+    suggest_from_user_folder,
+)
+from sbafab.design.films import (
+    Films,
+    LayerFilms,
+    without_other_products,
+)
+from sbafab.design.kits import inlet_of_kit, load_kit, under_kit
+from sbafab.design.section import Section
+from sbafab.design.sections import (
+    NAME_PATTERN,
+    Acceptance,
+    Bond,
+    Bore,
+    Chamber,
+    Fillet,
+    Inlet,
+    Laser,
+    Mask,
+    Order,
+    PanelSection,
+    Press,
+    Registration,
+    Rules,
+    Sheets,
+    Stack,
+)
+from sbafab.errors import DesignError
+from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
-PAPER_FILM = film_name(PAPER_PRODUCT, PAPER_THICKNESS)
-FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
-"""For the paper's tube of 0.635 mm bore, which it stretches by 13 %; 23 G (0.641 mm) by 1 %."""
-NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
-RuleName = Literal[
-    "bond-width",
-    "mask-overhang",
-    "facing-films",
-    "sealing",
-    "channel-clear",
-    "tube-fit",
-    "piece-count",
-    "pin-holes",
-    "pin-fit",
-    "bridges",
-    "scrap",
-    "film-limits",
-    "press-fit",
-    "registration-nominal",
-    "registration-worst-case",
-    "registration-yield",
-]
-
-
-class Bond(Section):
-    """Where two structural films melt together."""
-
-    width: Length = 0.75
-    """Width of every bonded ring, web and strip edge."""
-
-
-class Mask(Section):
-    """The Teflon that keeps films apart."""
-
-    overhang: Length = 0.5
-    """How far a mask reaches past the edges of the TPE layers it keeps apart."""
-
-
-class Bore(Section):
-    """The channel along the axis of a chamber."""
-
-    diameter: Length = 1.04
-    """Channel between the balloons of a chamber, and hole for its dowel pin (the paper gives
-    none)."""
-    clearance: Annotated[float, Millimetres(0, 1)] = 0.04
-    """By how much the bore is wider than its dowel pin. Ours: what registration leaves, for 0.75 -
-    2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must be left of a bond at worst."""
-    pin_diameter: Length | None = None
-    """Dowel pin of the bore; by default the bore less the clearance."""
-
-    @property
-    def pin(self) -> float:
-        """Diameter of the bore's dowel pin."""
-        if self.pin_diameter is not None:
-            return self.pin_diameter
-        return round(max(self.diameter - self.clearance, self.diameter / 2), 6)
-
-
-class Fillet(Section):
-    """Rounded corners."""
-
-    radius: LengthOrZero = 1.0
-    """Rounding of the concave corners of outlines (the paper gives none); 0 leaves them sharp."""
-
-
-class Inlet(Section):
-    """Tab, strip and tube through which a chamber is filled."""
-
-    tube: str = Field(default="Braintree RPT040", max_length=80)
-    """The tubing to order."""
-    tube_outer_diameter: Length = 1.016
-    """Outer diameter of the tubing."""
-    adhesive: str = Field(
-        default="Loctite Vinyl, Fabric & Plastic Flexible Adhesive", min_length=1, max_length=120
-    )
-    """What seals tube and mouth (paper Sec. 2)."""
-    width: Length | None = None
-    """Width of the inlet strip; by default what tube and strip need together, with cutting error
-    and an unknown kerf taken off, rounded up to 0.05."""
-    tab_length: Length = 5.0
-    """How far the inlet tab reaches past the outline (the paper gives none)."""
-
-
-class Registration(Section):
-    """What keeps the layers in register, and how far off they may lie."""
-
-    method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
-    """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
-    paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
-    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
-    which registration.experimental allows."""
-    experimental: bool = Field(default=False, validate_default=True)
-    """Whether a proposal that no bench has tried may be made, as --experimental says."""
-    pin_diameter: Length = 1.5
-    """Dowel pins of the ears, and of the corners of registered sheets."""
-    full_bond_pins: Literal["out", "in"] = "out"
-    """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
-    bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
-    coat. Neither was tried."""
-    pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
-    """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
-    pin_stretch: float = Field(default=0.3, ge=0, le=2)
-    """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
-    less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
-    D3369, Table 1); skived film stands less, TPE more."""
-    pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
-    """Whose diameters and lengths the dowel pins have; order them ground to m6."""
-    pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
-    """Lengths of pins that you have, in place of the standard's."""
-    cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
-    """The most by which a cut edge lies off its place (paper Sec. 2)."""
-    plate_made_by: PlateMachine = "jig-borer"
-    """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
-    pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
-    pin_error: Annotated[float, Millimetres(0, 1)] | None = None
-    """The most by which a layer on its pins lies off its place; by default what plate_made_by
-    gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
-    of a plate's only pin does not count: there each gives 0.004."""
-    hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
-    """The most by which what no pin holds lies off what it is laid on. The paper gives none: this,
-    with hand_turn, is calibrated so that the designs it built keep their limits as often as it
-    succeeded, nine times in ten. A rougher hand takes larger values of both."""
-    hand_turn: float = Field(default=0.4, ge=0, le=10)
-    """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
-    hand_placement."""
-
-    @field_validator("experimental")
-    @classmethod
-    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
-        if info.data.get("method") == "sheet" and not experimental:
-            raise ValueError(
-                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
-                'add --experimental, or set it to true, to have it all the same, or use "ears"'
-            )
-        return experimental
-
-    @property
-    def hole_diameter(self) -> float:
-        """Diameter of the holes in ears and tails."""
-        return self.pin_diameter + self.pin_clearance
-
-
-class PanelSection(Section):
-    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
-
-    bridge_width: Length = 1.0
-    """Width of the bridges that hold a film's part in its sheet until the second cut."""
-    stub: LengthOrZero = 0.25
-    """How far past the outline the second cut goes through a bridge."""
-    margin: Annotated[float, Millimetres(10, 100)] = 12.0
-    """Sheet round all copies, for pins and fiducials."""
-    web: Annotated[float, Millimetres(1, 100)] = 4.0
-    """Sheet between two copies."""
-    carrier: str = Field(default="transfer film of low tack", max_length=80)
-    """What holds the masks in register until they are tacked to their film."""
-    carrier_adhesive: str = Field(default="", max_length=80)
-    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
-    blank."""
-    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
-    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
-    default, and the traveller leaves a blank."""
-    tack_minutes: float = Field(default=1.0, gt=0, le=60)
-    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
-    sheet_error: LengthOrZero = 0.05
-    """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
-    second_cut_error: LengthOrZero = 0.2
-    """The most by which the second cut lies off the first."""
-
-
-NOT_MEASURED: Literal["not measured"] = "not measured"
-LONGEST_CONSTANT = 120.0
-"""Minutes, of a plate between platens."""
-
-
-def named_film(text: str) -> tuple[str, float]:
-    """Return product and thickness (mm) of a text such as "Stretchlon 200, 0.038 mm".
-
-    Raises ValueError with a sentence that says what is allowed.
-    """
-    product, _, thickness = text.rpartition(",")
-    try:
-        thick = millimetres(thickness)
-    except ValueError:
-        thick = 0.0
-    if not product.strip() or not SHORTEST <= thick <= 1:
-        raise ValueError(f'must be product and thickness of a film, such as "{PAPER_FILM}"')
-    return product.strip(), thick
-
-
-def _named_film(text: str) -> str:
-    writable(text)
-    named_film(text)
-    return text
-
-
-def _time_constant(value: object) -> object:
-    if value == NOT_MEASURED:
-        return value
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not is_number or not 0 < float(str(value)) <= LONGEST_CONSTANT:
-        raise ValueError(
-            f'must be minutes, more than 0 and at most {LONGEST_CONSTANT:g}, or "{NOT_MEASURED}"'
-        )
-    return float(str(value))
-
-
-TimeConstant = Annotated[float | Literal["not measured"], BeforeValidator(_time_constant)]
-"""Minutes, or "not measured"."""
-
-
-class Press(Section):
-    """The heat press: temperature, pressure, minutes, platen."""
-
-    temperature_c: float = Field(default=135.0, gt=0, le=500)
-    """C; between the TPE's melting point and the PTFE's limit."""
-    pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
-    """On the whole platen."""
-    platen_width: Length = 152.4
-    """Heated area; the paper's press has 6 x 6 in."""
-    platen_length: Length = 152.4
-    """Heated area, the other way."""
-    plate_material: str = Field(default="steel", max_length=80)
-    """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
-    plate_thickness: Length | None = None
-    """Of the base plate; by default the thinnest plate sold, from 6 mm, that takes the pins."""
-    release_film: str = Field(default="PTFE film", max_length=80)
-    """What TPE does not stick to, one sheet below and one above (the paper names none)."""
-    release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
-    """Thickness of one release film; PTFE film is sold in this thickness."""
-    underlay_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.1
-    """Thickness of the printed underlay, where one lies on the plate; plain paper of 80 g/m2."""
-    pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
-    """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
-    pad_thickness: Length | None = None
-    """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
-    pad_hardness: float = Field(default=10.0, ge=5, le=90)
-    """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
-    D; sheets of solid silicone rubber have 40 to 70."""
-    flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
-    """Step 1: the bottom balloon's upper two layers."""
-    bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
-    """Step 2: the bottom balloon, full bond."""
-    flash_middle_minutes: float = Field(default=10.0, gt=0, le=600)
-    """Step 3: all layers between the bottom balloon and the top layer."""
-    bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
-    """Step 4: the whole laminate, full bond."""
-    minutes_for: tuple[Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...] = (
-        Field(default=(PAPER_FILM,), max_length=20, strict=False)
-    )
-    """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
-    other structural film gets no minutes: blanks on the traveller, null in press.json."""
-    time_constant: TimeConstant = NOT_MEASURED
-    """Minutes in which the edge of the base plate, laid cold between the hot platens under the
-    pad, makes 63 % of its way; measured once at the bench."""
-
-
-class Acceptance(Section):
-    """What an actuator must stand before it is handed on: all ours but the burst that it stays
-    below.
-    """
-
-    leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
-    """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""
-    leak_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """How long it is held."""
-    proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
-    """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower where 60 % of the
-    estimated burst pressure is less."""
-    proof_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """How long it is held."""
-    fitting: str = Field(default=FITTING, min_length=1, max_length=200)
-    """What joins the tube to a syringe, regulator or gauge."""
-
-
-HoldDown = Literal["border", "carrier", "vacuum"]
-"""What holds a film under the beam."""
-
-
-class Laser(Section):
-    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
-
-    least_feature: Length = 0.2
-    """The narrowest slot or web the laser cuts well."""
-    cut_speed: float = Field(default=20.0, gt=0, le=5000)
-    """mm/s; for estimates of time only, no setting of a machine."""
-    travel_speed: float = Field(default=200.0, gt=0, le=5000)
-    """mm/s between cuts; for estimates of time only."""
-    pierce_seconds: float = Field(default=0.1, ge=0, le=60)
-    """Time to begin a contour; for estimates only."""
-    heat_distance: LengthOrZero = 3.0
-    """Parts nearer to each other than this are not cut one right after the other."""
-    kerf_tpe: KerfWidth = UNCALIBRATED
-    """Full kerf width in TPE, measured, or [along x, along y]; "uncalibrated" writes nominal edges
-    and says so."""
-    kerf_ptfe: KerfWidth = UNCALIBRATED
-    """Full kerf width in PTFE, measured, likewise."""
-    hold_tpe: HoldDown = "border"
-    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
-    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
-    stays in a bond may leak."""
-    hold_ptfe: HoldDown = "carrier"
-    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
-    nothing bonds to them."""
-    unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
-    """What a kerf that was not measured may take off the width of a part: ours."""
-
-
-class Sheets(Section):
-    """The film sheets to cut from, and how parts are placed on them."""
-
-    tpe: Sheet = Sheet.model_construct()
-    ptfe: Sheet = Sheet.model_construct()
-    engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
-    """What looks for places; "spyrrow" (an extra) packs tighter and takes its time."""
-    seconds: float = Field(default=20.0, gt=0, le=3600)
-    """How long spyrrow looks, for each sheet."""
-    label: bool = True
-    """Whether name, material, number and design hash are engraved into the border."""
-
-
-class Rules(Section):
-    """Limits of the rule deck, and what is waived."""
-
-    bond_width: Length = 0.75
-    """Every bond must be at least this wide."""
-    mask_overhang: Length = 0.5
-    """Every mask must reach at least this far past the edges it keeps apart."""
-    worst_bond_width: LengthOrZero = 0.5
-    """What must be left of every bond with all errors of cutting and registration at worst."""
-    worst_mask_overhang: LengthOrZero = 0.25
-    """What must be left of every overhang with all errors at worst."""
-    target_yield: float | None = Field(default=None, gt=0, lt=1)
-    """The share of random builds that must keep the two limits above; none asked for by default."""
-    yield_builds: Annotated[int, Field(ge=100, le=1_000_000)] | None = None
-    """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
-    validated_balloons: int = Field(default=20, ge=1, le=1000)
-    """More balloons than this draw a warning (paper Sec. 6)."""
-    waive: tuple[RuleName, ...] = Field(default=(), strict=False)
-    """Rules whose failure shall not stop the cut files; every file then says so."""
-
-
-class Stack(Section):
-    """How high the actuator is."""
-
-    balloons: int = Field(default=6, ge=1, le=1000)
-    """Balloons in each chamber, bottom to top."""
-
-
-class Chamber(Section):
-    """The pockets of one chamber; a family adds their sizes."""
-
-    outline: str | None = Field(default=None, max_length=1000)
-    """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
-    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""
+# How many are made: of actuators, for so many good ones, and of parts, with spares.
 
 
 class Design(Section):
@@ -419,12 +97,12 @@ class Design(Section):
 
     @property
     def folder(self) -> Path:
-        """Where relative paths of the design start: the folder of its file."""
+        """Folder of the design's file, at which relative paths start."""
         return self._folder
 
     @property
     def is_solved(self) -> bool:
-        """Whether ``chamber.diameter`` was solved from what the design must fit."""
+        """True if ``chamber.diameter`` was solved from ``fits``."""
         return self._is_solved
 
     @property
@@ -439,19 +117,19 @@ class Design(Section):
 
     @property
     def pin_error(self) -> float:
-        """The most by which a layer on several pins lies off its place, mm."""
-        own = self.registration
-        if own.pin_error is not None:
-            return own.pin_error
-        return pin_error(self.thickest_pin, own.plate_made_by)
+        """Largest displacement of a layer on several pins, mm."""
+        registration = self.registration
+        if registration.pin_error is not None:
+            return registration.pin_error
+        return pin_error(self.thickest_pin, registration.plate_made_by)
 
     @property
     def lone_pin_error(self) -> float:
-        """The same where the plate has one pin, whose own place does not count, mm."""
-        own = self.registration
-        if own.pin_error is not None:
-            return own.pin_error
-        return lone_pin_error(self.thickest_pin, own.plate_made_by)
+        """Largest displacement of a layer on a single pin, whose place does not count, mm."""
+        registration = self.registration
+        if registration.pin_error is not None:
+            return registration.pin_error
+        return lone_pin_error(self.thickest_pin, registration.plate_made_by)
 
     @property
     def strip_width(self) -> float:
@@ -467,19 +145,20 @@ class Design(Section):
 
     @property
     def strip_loss(self) -> float:
-        """By how much a strip may come out narrower than drawn, mm, whether a kerf is known or not:
-        one that is measured later changes no strip.
+        """Width by which a strip may come out narrower than drawn, mm, for any kerf.
+
+        A kerf that is measured later changes no strip.
         """
         return 2 * self.registration.cutting_error + self.laser.unknown_kerf
 
     @property
     @abstractmethod
     def form(self) -> Form:
-        """What the actuator is like, for models, checks and pages. Raises DesignError."""
+        """Form of the actuator, for models, checks and pages. Raises DesignError."""
 
     @property
     def free(self) -> tuple[Free, ...]:
-        """The keys that a search may change unless it is told otherwise; a family adds its own."""
+        """Keys that a search may change by default; a family adds its own."""
         most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
         return (
             Free("stack.balloons", 2, most, 1),
@@ -488,43 +167,249 @@ class Design(Section):
         )
 
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
-        """The same design with keys changed, checked like a design file.
+        """Return the design with keys changed, checked like a design file.
 
         ``design.with_("stack.balloons=6")``, ``design.with_({"stack.balloons": 6})`` and
-        ``design.with_(stack={"balloons": 6})`` say the same. Raises DesignError with one sentence.
+        ``design.with_(stack={"balloons": 6})`` are equal. Raises DesignError with one sentence.
         """
-        from sbafab.design.reading import changed
-
         return changed(self, [*changes, tables])
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r}, {self.stack.balloons} balloons)"
 
     def _repr_html_(self) -> str:
-        from sbafab.design.writing import keys_of
 
         return table_html(("key", "value", "default"), keys_of(self), self.name)
 
     def completed(self) -> Self:
-        """The same design with every default that depends on another value filled in."""
+        """Return the design with every default that depends on another value filled in."""
         inlet = self.inlet.model_copy(update={"width": self.strip_width})
         return self.model_copy(update={"inlet": inlet})
 
     def fitted(self) -> Self:
-        """The same design with what it must fit solved for. Raises DesignError where nothing does.
+        """Return the design with its chamber solved from ``fits``, in families that have it.
 
-        A family that knows ``fits`` does so.
+        Raises DesignError where no chamber fits.
         """
         return self
 
     def solved(self) -> Self:
-        """The same design, of which ``chamber.diameter`` is known to be solved, not given."""
+        """Return the design with ``chamber.diameter`` marked as solved, not given."""
         copy = self.model_copy()
         copy._is_solved = True
         return copy
 
     def placed(self, folder: Path) -> Self:
-        """The same design with relative paths starting at ``folder``."""
+        """Return the design with relative paths starting at ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy
+
+
+# The form of an actuator: what a family says of a design to all who do not know the family.
+
+
+@dataclass(frozen=True)
+class Discs:
+    """Round pockets on one axis a stack: their diameters in mm, one a balloon, bottom to top."""
+
+    diameters: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Slots:
+    """Oblong pockets of every balloon: half discs of ``width`` and a straight ``run``, mm."""
+
+    width: float
+    run: float
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Pockets of an outline that the user drew."""
+
+
+Pockets = Discs | Slots | Drawn
+
+
+@dataclass(frozen=True)
+class Wrap:
+    """A laminate that is wrapped round a tube.
+
+    ``tube_diameter`` is the outer one and ``pitch`` that of the stacks round it, mm; ``glue`` is
+    the adhesive that holds it there, and ``overlap`` the width (mm) by which the sheet's ends
+    overlap.
+    """
+
+    tube_diameter: float
+    pitch: float
+    glue: str
+    overlap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Form:
+    """Form of an actuator of any family.
+
+    ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
+    same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
+    ``lumen_pin`` its dowel pin's.
+    """
+
+    words: str
+    stacks: int
+    pockets: Pockets
+    lumen: float | None = None
+    lumen_pin: float | None = None
+    wrap: Wrap | None = None
+
+    @property
+    def is_parallel(self) -> bool:
+        """True if stacks on common plates push one way: unequal strokes then bend the actuator."""
+        return self.stacks > 1 and self.wrap is None
+
+    @property
+    def pushing(self) -> int:
+        """Number of stacks that push one way: all on common plates, one of those round a tube."""
+        return self.stacks if self.wrap is None else 1
+
+
+@dataclass(frozen=True)
+class Free:
+    """A key that a search may change: from ``low`` to ``high`` in steps.
+
+    ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
+    ends are where a search begins, and may move.
+    """
+
+    key: str
+    low: float
+    high: float
+    step: float
+    asked: str = ""
+    widens: bool = False
+
+
+def degrees_of_freedom(stacks: int) -> str:
+    """Words for round stacks on common plates: one lengthens (1-DoF), three also bend (3-DoF)."""
+    suffix = {1: " (1-DoF)", 3: " (3-DoF)"}.get(stacks, "")
+    return f"stacked balloon actuator with {stacks} chamber{'s' if stacks > 1 else ''}{suffix}"
+
+
+AnyDesign = TypeVar("AnyDesign", bound=Design)
+
+
+def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
+    """Return the design with changes made to its keys. Raises DesignError with one sentence."""
+    changes = list(changes)
+    data = plain_tables(design)
+    if KIT in changed_keys(changes):
+        data = without_kit(data, design)
+    films = override({"films": {}}, changes).get("films")
+    if isinstance(films, dict):
+        data["films"] = without_other_products(data.get("films", {}), films)
+    data = override(data, changes)
+    suggest_from_user_folder(data, changes)
+    open_what_fits(data, changes)
+    data = under_kit(data, design.folder)
+    family = type(design)
+    return checked(family, data, {design.family: family}).placed(design.folder).fitted()
+
+
+def validated(
+    data: Mapping[str, Any], families: Mapping[str, type[Design]], folder: Path
+) -> Design:
+    """Return the design record of the family that ``data`` names.
+
+    Raises DesignError with one sentence: field, value, allowed values, remedy.
+    """
+    family = data.get("family")
+    if family is None:
+        raise DesignError(f"family is missing; add family = one of {listed(families)}")
+    if family == ASSEMBLY:
+        raise DesignError(
+            f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
+            "with generate, check, predict and studio, and other commands take one of its designs"
+        )
+    if not isinstance(family, str) or family not in families:
+        near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
+    return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
+
+
+def resolved(design: Design) -> dict[str, Any]:
+    """Return the design with every default written out, as plain TOML values."""
+    return _tables(design.completed())
+
+
+def plain_tables(design: Design) -> dict[str, Any]:
+    """The design as tables of a TOML file, defaults that depend on other values left open."""
+    tables = _tables(design)
+    if design.is_solved:
+        del tables["chamber"]["diameter"]
+    return tables
+
+
+def _tables(design: Design) -> dict[str, Any]:
+    tables = without_none(design.model_dump(mode="json"))
+    if not tables.get(FITS):
+        # Nothing is asked for: an empty table would say nothing.
+        tables.pop(FITS, None)
+    return tables
+
+
+def without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def keys_of(design: Design) -> list[tuple[str, object, object]]:
+    """Return dotted key, value and default of every key, the default only if the value differs."""
+    plain = type(design).model_validate({"name": design.name, "family": design.family})
+    usual = dict(dotted(resolved(plain)))
+    return [
+        (key, value, usual.get(key) if usual.get(key) != value else None)
+        for key, value in dotted(resolved(design))
+    ]
+
+
+def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield dotted key and value of every key of nested tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def design_toml(design: Design) -> str:
+    """Return the text of ``design.toml`` of an output folder."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(design))
+
+
+def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
+    """Return a design's tables without values that its kit or a default gives: another kit may."""
+    kit = load_kit(design.kit, design.folder)
+    kit_values = {**kit.tables, "inlet": inlet_of_kit(kit, {}, False)}
+    usual = type(design).model_validate({"name": "x", "family": design.family, **kit_values})
+    tables = {key: table for key, table in data.items() if isinstance(table, dict)}
+    return {**data, **{key: {} for key in tables}, **_less(tables, plain_tables(usual))}
+
+
+def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that differ from the usual ones; tables that become empty are removed."""
+    rest: dict[str, Any] = {}
+    for key, value in data.items():
+        inner = usual.get(key)
+        difference = (
+            _less(value, inner) if isinstance(value, dict) and isinstance(inner, dict) else value
+        )
+        if difference not in (inner, {}):
+            rest[key] = difference
+    return rest

@@ -43,32 +43,32 @@ class Section(BaseModel):
                 type(field.default).model_rebuild()
         schema = handler(core)
         keys = handler.resolve_ref_schema(schema).get("properties", {})
-        for record in (one for one in cls.__mro__ if one is not Section):
+        for record in (base for base in cls.__mro__ if base is not Section):
             if issubclass(record, Section):
-                for name, said in _said(record):
+                for name, description in _descriptions(record):
                     key = cls.model_fields[name].alias or name
-                    keys.get(key, {}).setdefault("description", said)
+                    keys.get(key, {}).setdefault("description", description)
         return schema
 
 
-def _said(record: type[Section]) -> Iterator[tuple[str, str]]:
+def _descriptions(record: type[Section]) -> Iterator[tuple[str, str]]:
     """The keys of a record, those that it inherits aside, and their docstrings."""
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
     assert isinstance(body, ast.ClassDef)
-    for key, said in pairwise(body.body):
+    for key, description in pairwise(body.body):
         if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
-            match said:
+            match description:
                 case ast.Expr(value=ast.Constant(value=str(text))):
                     if key.target.id in record.model_fields:
                         yield key.target.id, inspect.cleandoc(text)
 
 
 def writable(value: object) -> object:
-    """The same value. Raises ValueError for a text that pages and pictures cannot hold."""
-    found = _UNWRITABLE.search(value) if isinstance(value, str) else None
-    if found is not None:
+    """Return the value. Raises ValueError for a text that pages and pictures cannot hold."""
+    match = _UNWRITABLE.search(value) if isinstance(value, str) else None
+    if match is not None:
         raise ValueError(
-            f"must be plain text; remove the character U+{ord(found[0]):04X} "
-            f"at place {found.start() + 1}"
+            f"must be plain text; remove the character U+{ord(match[0]):04X} "
+            f"at place {match.start() + 1}"
         )
     return value

@@ -22,7 +22,7 @@ FARTHEST = 10_000.0
 
 
 class Traced(NamedTuple):
-    """What a drawing holds, in mm, and in words how large its unit was taken to be."""
+    """Strands of a drawing in mm, and the size of its unit in words."""
 
     strands: Iterator[Strand]
     scale: str
@@ -103,14 +103,14 @@ def joined(strands: Iterable[Strand]) -> tuple[list[Strand], list[Strand]]:
 def _extended(strand: Strand, rest: list[Strand]) -> Strand:
     """The strand with every strand of ``rest`` that continues it; those are taken out."""
     while not is_closed(strand):
-        for other in rest:
-            if _near(strand[-1].end, other[0].start):
-                follower = other
-            elif _near(strand[-1].end, other[-1].end):
-                follower = reverse(other)
+        for candidate in rest:
+            if _near(strand[-1].end, candidate[0].start):
+                follower = candidate
+            elif _near(strand[-1].end, candidate[-1].end):
+                follower = reverse(candidate)
             else:
                 continue
-            rest.remove(other)
+            rest.remove(candidate)
             strand += follower
             break
         else:
@@ -124,15 +124,15 @@ def _near(a: Point, b: Point) -> bool:
 
 def sealed(loop: Strand) -> Strand:
     """The loop with ends that meet exactly and no edge shorter than JOIN."""
-    kept: list[Edge] = []
+    edges: list[Edge] = []
     here = loop[-1].end
     for edge in loop:
         if edge.length > 2 * JOIN or not _near(here, edge.end):
-            kept.append(_from(here, edge))
+            edges.append(_from(here, edge))
             here = edge.end
-    if kept:
-        kept[0] = _from(here, kept[0])
-    return tuple(kept)
+    if edges:
+        edges[0] = _from(here, edges[0])
+    return tuple(edges)
 
 
 def _from(start: Point, edge: Edge) -> Edge:
@@ -146,6 +146,6 @@ def _from(start: Point, edge: Edge) -> Edge:
 def widest_gap(opens: Sequence[Strand]) -> tuple[float, Point]:
     """The least distance from the first strand's last end to another loose end, and that end."""
     here = opens[0][-1].end
-    others = [opens[0][0].start]
-    others += [end for strand in opens[1:] for end in (strand[0].start, strand[-1].end)]
-    return min(math.dist(here, other) for other in others), here
+    ends = [opens[0][0].start]
+    ends += [end for strand in opens[1:] for end in (strand[0].start, strand[-1].end)]
+    return min(math.dist(here, other_end) for other_end in ends), here

@@ -1,57 +1,382 @@
-"""Closed chains of edges laid over each other, and how often they wind round what.
-
-How often the chains wind round the faces on both sides of a piece is told once for each connected
-group of pieces and then carried round their common points, from face to face: wherever two ways
-lead to a face they must agree, so what comes out is consistent or it is not returned.
-"""
+"""Edges cut where they meet, and the winding numbers on both sides of each piece."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from functools import cmp_to_key
-from typing import Final, final
+from itertools import pairwise
+from typing import NamedTuple
 
+from sbafab.errors import InconsistentError
 from sbafab.geometry.edges import (
+    BENT,
     EPSILON,
+    SAME,
     Arc,
+    Bounds,
     Edge,
     Point,
     distance_to,
     from_end_to_end,
     left_normal,
+    meeting_points,
     turns_round,
 )
-from sbafab.geometry.inconsistent import InconsistentError
-from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.pieces import Overlay
+from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 
-NEAR: Final = 0.05
+CELLS = 16
+"""Width of a grid cell in tolerances, so that most points touch one cell only."""
+
+
+ASLANT = 0.7548776662466927
+"""Slope of a line along which points of drawings hardly ever lie side by side."""
+
+
+class PointPool:
+    """Clusters of points that hang together by steps shorter than ``same``, in any order.
+
+    A cluster is represented by its first point (least x, then least y) among ``ends``, or by its
+    first among ``inner`` where it holds no end.
+    """
+
+    def __init__(
+        self, ends: Iterable[Point], inner: Iterable[Point] = (), same: float = SAME
+    ) -> None:
+        self._same = same
+        self._rank: dict[Point, int] = {}
+        self._cells: dict[tuple[int, int], list[Point]] = {}
+        first = set(ends)
+        rest = set(inner) - first
+        points = [*first, *rest]
+        near = self._maybe_near(points)
+        self._leader = dict(zip(points, points, strict=True))
+        if not near:
+            return
+        for p in (*sorted(first & near), *sorted(rest & near)):
+            self._add(p)
+
+    def _maybe_near(self, points: Sequence[Point]) -> set[Point]:
+        """Return the points that may lie within the tolerance of another, and some more.
+
+        Compared by their distance along a line at an angle that is rare in drawings.
+        """
+        reach = 1.01 * math.hypot(1, ASLANT) * self._same
+        near: set[Point] = set()
+        along = [p[0] + ASLANT * p[1] for p in points]
+        # Mostly there is none.
+        if all(u - t >= reach for t, u in pairwise(sorted(along))):
+            return near
+        for a, b in pairwise(sorted(zip(along, points, strict=True))):
+            if b[0] - a[0] < reach:
+                near.add(a[1])
+                near.add(b[1])
+        return near
+
+    def snapped(self, p: Point) -> Point:
+        """Return the representative of a pooled point."""
+        leader = self._leader[p]
+        while leader != p:
+            p, leader = leader, self._leader[leader]
+        return leader
+
+    def _add(self, p: Point) -> None:
+        self._rank[p] = len(self._rank)
+        self._leader[p] = p
+        width, margin = CELLS * self._same, 1.01 / CELLS
+        u, v = p[0] / width, p[1] / width
+        for column in range(math.floor(u - margin), math.floor(u + margin) + 1):
+            for row in range(math.floor(v - margin), math.floor(v + margin) + 1):
+                for q in self._cells.get((column, row), ()):
+                    if math.dist(p, q) < self._same:
+                        self._unite(self.snapped(p), self.snapped(q))
+        self._cells.setdefault((math.floor(u), math.floor(v)), []).append(p)
+
+    def _unite(self, p: Point, q: Point) -> None:
+        first, second = (p, q) if self._rank[p] <= self._rank[q] else (q, p)
+        self._leader[second] = first
+
+
+# Overlays: edges cut where they meet, and those that coincide made one piece.
+
+
+_Entry = tuple[float, int, Edge, int]
+"""Offset of an edge's middle from its chord, the edge's number, the edge, its turns."""
+DIGIT = 16
+"""Bits of one owner's digit in a whole number that holds the winding numbers of several owners."""
+ROUNDS = 4
+"""Most times that edges are cut again."""
+
+
+class Piece(NamedTuple):
+    """An edge that meets others at its ends only, with the winding number of its left minus that of
+    its right. ``by_owner`` separates the digits of several owners.
+    """
+
+    edge: Edge
+    turns: int
+
+
+class Overlay(NamedTuple):
+    """Pieces, and True if some were bent: these may cross where none was cut."""
+
+    pieces: list[Piece]
+    bent: bool
+
+
+def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Overlay:
+    """Return the edges of all owners, each place once, cut where they meet.
+
+    An edge that was bent to meet another is cut again, because it may now meet a third.
+    """
+    entries = [(edge, 1 << DIGIT * i) for i, edges in enumerate(owners) for edge in edges]
+    return overlay(entries, tolerance)
+
+
+def overlay(
+    entries: Sequence[tuple[Edge, int]],
+    tolerance: float = EPSILON,
+    chain: Sequence[int] | None = None,
+) -> Overlay:
+    """Return edges that each count so many turns, each place once, cut where they meet.
+
+    ``chain`` numbers the closed chain of each edge that stays clear of itself; it is negative for
+    other edges.
+    """
+    bent = True
+    for _ in range(ROUNDS):
+        split, bent = split_edges([edge for edge, _ in entries], tolerance, chain)
+        chain = None
+        entries = [
+            (part, entry[1]) for parts, entry in zip(split, entries, strict=True) for part in parts
+        ]
+        if not bent:
+            break
+    return Overlay(_merged(entries, tolerance), bent)
+
+
+def by_owner(turns: int, owners: int) -> list[int]:
+    """Return the winding number of each owner's edges from their combined number."""
+    half = 1 << DIGIT - 1
+    raised = turns + sum(half << DIGIT * i for i in range(owners))
+    return [(raised >> DIGIT * i) % (2 * half) - half for i in range(owners)]
+
+
+class Split(NamedTuple):
+    """The parts of each edge, and True if one was bent to meet another."""
+
+    parts: list[list[Edge]]
+    bent: bool
+
+
+def split_edges(
+    edges: Sequence[Edge], tolerance: float = EPSILON, chain: Sequence[int] | None = None
+) -> Split:
+    """Return each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
+
+    The order of the edges does not change the cuts. Meeting points of an arc are searched along its
+    circle, so an arc that was bent before is replaced by one through both ends.
+    """
+    whole, edges = edges, [from_end_to_end(edge) for edge in edges]
+    cuts: list[list[Point]] = [[] for _ in edges]
+    meeting: list[tuple[int, int]] = []
+    bounds = [edge.bounds for edge in edges]
+    # An arc may leave the box of its ends by as much as these are off its circle.
+    near = [widened(box, tolerance + BENT) for box in bounds]
+    for i, j in close_pairs(bounds, tolerance):
+        if chain is not None and chain[i] == chain[j] >= 0:
+            continue
+        if _stay_apart(edges[i], edges[j], tolerance) or _only_follows(
+            edges[i], edges[j], near[i], near[j], 2 * tolerance
+        ):
+            continue
+        points = meeting_points(edges[i], edges[j], tolerance, (near[i], near[j]))
+        if points:
+            cuts[i] += points
+            cuts[j] += points
+            meeting.append((i, j))
+    _share(edges, cuts, meeting, bounds, tolerance)
+    ends = [p for edge in edges for p in (edge.start, edge.end)]
+    pool = PointPool(ends, [p for points in cuts for p in points], 2 * tolerance)
+    stops = [_stops(edge, points, pool) for edge, points in zip(edges, cuts, strict=True)]
+    return Split(
+        [
+            [edge]
+            if len(ends_of_parts) == 2
+            and ends_of_parts[0] == edge.start
+            and ends_of_parts[1] == edge.end
+            and ends_of_parts[0] != ends_of_parts[1]
+            else [edge.part(a, b) for a, b in pairwise(ends_of_parts) if a != b]
+            for edge, ends_of_parts in zip(whole, stops, strict=True)
+        ],
+        any(
+            abs(edge.to_left(p)) > BENT
+            for edge, ends_of_parts in zip(edges, stops, strict=True)
+            if len(ends_of_parts) > 2
+            or ends_of_parts[0] != edge.start
+            or ends_of_parts[-1] != edge.end
+            for p in ends_of_parts
+        ),
+    )
+
+
+def _stay_apart(a: Edge, b: Edge, tolerance: float) -> bool:
+    """Return True if two arcs lie on circles that come nowhere near each other."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)):
+        return False
+    gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
+    # Their ends may be as much as BENT off their circles.
+    return max(gap - r - s, abs(r - s) - gap) > tolerance + 2 * BENT
+
+
+def _only_follows(a: Edge, b: Edge, near_a: Bounds, near_b: Bounds, same: float) -> bool:
+    """Return True if one edge starts where the other ends and they are near each other only there.
+
+    Then neither is cut by the other.
+    """
+    if a.end == b.start:
+        x, y = a.end
+    elif a.start == b.end:
+        x, y = a.start
+    else:
+        return False
+    left_a, low, right, high = near_a
+    left_b, low_b, right_b, high_b = near_b
+    aside = max(min(right, right_b) - x, x - max(left_a, left_b))
+    above = max(min(high, high_b) - y, y - max(low, low_b))
+    return aside * aside + above * above < same * same
+
+
+def _share(
+    edges: Sequence[Edge],
+    cuts: Sequence[list[Point]],
+    meeting: Sequence[tuple[int, int]],
+    bounds: Sequence[Bounds],
+    tolerance: float,
+) -> None:
+    """Add the cuts of each edge to the edges that run along it, until none is new."""
+    partners: dict[int, list[int]] = defaultdict(list)
+    for i, j in meeting:
+        partners[i].append(j)
+        partners[j].append(i)
+    new = {i: points for i, points in enumerate(cuts) if points}
+    while new:
+        shared: dict[int, list[Point]] = defaultdict(list)
+        for i, points in new.items():
+            for j in partners[i]:
+                low_x, low_y, high_x, high_y = widened(bounds[j], tolerance)
+                for p in points:
+                    if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
+                        continue
+                    if p not in cuts[j] and distance_to(edges[j], p) < tolerance:
+                        cuts[j].append(p)
+                        shared[j].append(p)
+        new = shared
+
+
+def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
+    """Return the points where the parts of an edge start and end, in its direction."""
+    start, end = pool.snapped(edge.start), pool.snapped(edge.end)
+    if not points:
+        return [start, end]
+    inner = dict.fromkeys(map(pool.snapped, points))
+    inner.pop(start, None)
+    inner.pop(end, None)
+    if not inner:
+        return [start, end]
+    along = {stop: edge.parameter(stop) for stop in inner}
+    within = [stop for stop, t in along.items() if 0 < t < 1]
+    return [start, *sorted(within, key=along.__getitem__), end]
+
+
+def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
+    """Cut edges, those that coincide as one; none where both sides have one winding number."""
+    between: dict[tuple[Point, Point], list[tuple[int, Edge, int]]] = defaultdict(list)
+    for number, entry in enumerate(edges):
+        edge, turns = entry
+        a, b = edge.start, edge.end
+        between[(a, b) if a < b else (b, a)].append((number, edge, turns))
+    pieces: list[Piece] = []
+    for ends, parallel in between.items():
+        if len(parallel) == 1:
+            _, edge, turns = parallel[0]
+            pieces.append(Piece(edge, turns))
+        else:
+            a, b = ends
+            entries = [
+                (_offset(edge, a, b), number, edge, turns if edge.start == a else -turns)
+                for number, edge, turns in parallel
+            ]
+            pieces += _united(entries, 4 * tolerance)
+    return pieces
+
+
+def _offset(edge: Edge, a: Point, b: Point) -> float:
+    """Return the distance of an edge's middle to the left of the chord from ``a`` to ``b``, mm."""
+    if not isinstance(edge, Arc):
+        return 0.0
+    x, y = edge.at(0.5)
+    dx, dy = (b[0] - a[0], b[1] - a[1])
+    return (dx * (y - a[1]) - dy * (x - a[0])) / math.hypot(dx, dy)
+
+
+def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
+    """One piece for each group of edges with common ends whose middles are near each other."""
+    entries.sort()
+    start = 0
+    for stop in range(1, len(entries) + 1):
+        if stop < len(entries) and entries[stop][0] - entries[stop - 1][0] < same:
+            continue
+        group, start = entries[start:stop], stop
+        turns = sum(turns for *_, turns in group)
+        if turns:
+            edge = min(group, key=_plainest)[2]
+            yield Piece(edge, turns if edge.start < edge.end else -turns)
+
+
+def _plainest(entry: _Entry) -> tuple[float, Point, int]:
+    """Lines first, then arcs by radius: the same choice in any order, and along a whole circle.
+
+    Of edges that are equal but for their direction, the first.
+    """
+    _, number, edge, _ = entry
+    if isinstance(edge, Arc):
+        return edge.radius, edge.centre, number
+    return 0.0, (0.0, 0.0), number
+
+
+# Winding numbers of closed chains laid over each other.
+#
+# The winding number beside one piece of each connected group is computed and then carried round
+# common points, from face to face: wherever two ways lead to a face they must agree, so the result
+# is consistent or an error.
+
+
+NEAR = 0.05
 """Radians: edges that leave a point at less than this angle are compared farther on."""
 
 
-@final
 class _Leaving:
-    """A piece as it leaves a point: its direction there, its chord, how it bends, where it ends."""
+    """A piece as it leaves a point: its direction there, its chord, its bend, its end."""
 
     __slots__ = ("bend", "chord", "edge", "end", "half", "heading")
 
     def __init__(self, half: int, edge: Edge, heading: float, chord: float, bend: float) -> None:
-        self.half: Final[int] = half
-        self.edge: Final[Edge] = edge
-        self.heading: Final[float] = heading
-        self.chord: Final[float] = chord
-        self.bend: Final[float] = bend
-        self.end: Final[Point] = edge.start if half & 1 else edge.end
+        self.half = half
+        self.edge = edge
+        self.heading = heading
+        self.chord = chord
+        self.bend = bend
+        self.end = edge.start if half & 1 else edge.end
 
     def to_left(self, p: Point) -> float:
-        """How far ``p`` lies to the left of the line or circle the piece is a part of."""
-        left = self.edge.to_left(p)
-        return -left if self.half & 1 else left
+        """Return the distance of ``p`` to the left of the piece's line or circle, mm."""
+        distance = self.edge.to_left(p)
+        return -distance if self.half & 1 else distance
 
     def towards(self, reach: float) -> float:
-        """Angle from the point to where the piece is ``reach`` away."""
+        """Return the angle from the point to where the piece is ``reach`` away."""
         return self.heading + math.asin(max(-1.0, min(1.0, self.bend * reach / 2)))
 
 
@@ -80,8 +405,8 @@ class Arrangement:
             rings[p].append(half)
         self._by_place: EdgeIndex | None = None
         self.tangled: set[Point] = set()
-        """Where pieces leave in nearly one direction, so that rounding could order them wrongly;
-        every point, where pieces were bent and may cross between their ends.
+        """Points where pieces leave in nearly one direction, so that rounding could order them
+        wrongly; every point, where pieces were bent and may cross between their ends.
         """
         # Two follow each other either way.
         self.rings = {
@@ -91,7 +416,7 @@ class Arrangement:
         if overlay.bent:
             self.tangled.update(self.rings)
         self.left = self._wound()
-        """How often the chains wind round what is to the left of each half."""
+        """Winding number of the chains to the left of each half."""
         if self.tangled:
             self._verify()
 
@@ -100,27 +425,27 @@ class Arrangement:
         return -turns if half & 1 else turns
 
     def _in_order(self, halves: Sequence[int]) -> list[int]:
-        """Halves that leave one point, counter-clockwise; the widest gap comes last."""
-        found = sorted(
+        """Return the halves that leave one point, counter-clockwise; the widest gap comes last."""
+        leaving = sorted(
             (_leaving(half, self._drawn[half >> 1]) for half in halves),
-            key=lambda leaving: leaving.heading,
+            key=lambda piece: piece.heading,
         )
-        count = len(found)
-        gaps = [found[i].heading - found[i - 1].heading for i in range(count)]
+        count = len(leaving)
+        gaps = [leaving[i].heading - leaving[i - 1].heading for i in range(count)]
         gaps[0] += math.tau
         first = max(range(count), key=gaps.__getitem__)
-        found = [*found[first:], *found[:first]]
+        leaving = [*leaving[first:], *leaving[:first]]
         gaps = [*gaps[first:], *gaps[:first]]
         ring: list[int] = []
         start = 0
         for stop in range(1, count + 1):
             if stop == count or gaps[stop] > NEAR:
-                bundle = found[start:stop]
+                bundle = leaving[start:stop]
                 if len(bundle) > 1:
                     bundle.sort(key=cmp_to_key(_by_side))
                     if count > 2:
                         self.tangled.add(self.origin[halves[0]])
-                ring += [leaving.half for leaving in bundle]
+                ring += [piece.half for piece in bundle]
                 start = stop
         return ring
 
@@ -130,47 +455,47 @@ class Arrangement:
             self._by_place = EdgeIndex(self._drawn)
         return self._by_place
 
-    def _around(self, p: Point, left: Sequence[int | None]) -> int:
-        """How often the pieces that are told in ``left`` wind round a point."""
+    def _around(self, p: Point, winding: Sequence[int | None]) -> int:
+        """Return the winding number round a point of the pieces with a number in ``winding``."""
         x, y = p
         return sum(
             self.pieces[number].turns * turns_round(self._drawn[number], p)
             for number in self._index.numbers((x, y, self._index.right, y))
-            if left[2 * number] is not None
+            if winding[2 * number] is not None
         )
 
     def _wound(self) -> list[int]:
-        left: list[int | None] = [None] * len(self.origin)
-        edges = [edge.bounds[0] for edge in self._drawn]
-        told = False
-        for number in sorted(range(len(edges)), key=edges.__getitem__):
-            if left[2 * number] is not None:
+        winding: list[int | None] = [None] * len(self.origin)
+        low_x = [edge.bounds[0] for edge in self._drawn]
+        has_group = False
+        for number in sorted(range(len(low_x)), key=low_x.__getitem__):
+            if winding[2 * number] is not None:
                 continue
             # Nothing of this group lies farther left, and no other group that is still to come
             # reaches round it.
-            half, p = self._leftmost(number, edges[number])
-            self._carry(half, self._around(p, left) if told else 0, left)
-            told = True
-        return [turns for turns in left if turns is not None]
+            half, p = self._leftmost(number, low_x[number])
+            self._carry(half, self._around(p, winding) if has_group else 0, winding)
+            has_group = True
+        return [turns for turns in winding if turns is not None]
 
     def _verify(self) -> None:
-        """Asks beside one piece of every part that hangs together by points that leave no doubt.
+        """Check the winding number beside one piece of each part that clear points connect.
 
-        Raises InconsistentError where what was carried there is not what winds round that place.
+        Raises InconsistentError where it differs from the number that was carried there.
         """
-        seen: set[int] = set()
+        visited: set[int] = set()
         for first in range(len(self.pieces)):
-            if first in seen:
+            if first in visited:
                 continue
             part, waiting = [first], [first]
-            seen.add(first)
+            visited.add(first)
             while waiting:
                 number = waiting.pop()
                 for p in self.origin[2 * number : 2 * number + 2]:
                     if p in self.tangled:
                         continue
-                    more = {half >> 1 for half in self.rings[p]} - seen
-                    seen |= more
+                    more = {half >> 1 for half in self.rings[p]} - visited
+                    visited |= more
                     part += more
                     waiting += more
             half = 2 * max(part, key=lambda number: self._drawn[number].length)
@@ -179,9 +504,7 @@ class Arrangement:
                 raise InconsistentError(self._drawn[half >> 1].at(0.5))
 
     def _beside(self, half: int) -> Point | None:
-        """A point to the left of a half, nearer to it than to any other; None if there is hardly
-        room.
-        """
+        """A point to the left of a half, nearer to it than to any other; None without room."""
         edge = self._drawn[half >> 1]
         x, y = edge.at(0.5)
         room = reach = edge.length / 16
@@ -194,10 +517,10 @@ class Arrangement:
         return x + nx * room / 2, y + ny * room / 2
 
     def _leftmost(self, number: int, x: float) -> tuple[int, Point]:
-        """A half with the plane outside its group on its left, and its leftmost point."""
+        """Return a half with the plane outside its group on its left, and its leftmost point."""
         edge = self._drawn[number]
         p = min(edge.start, edge.end)
-        # Where an arc bulges by a rounding only, what it meets at its end may lie farther left.
+        # Where an arc bulges by a rounding only, a piece at its end may lie farther left.
         if isinstance(edge, Arc) and x < p[0] - 2 * EPSILON:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
         # All leave to the right of it, so the last of those that leave upwards most.
@@ -206,9 +529,9 @@ class Arrangement:
         upward = max(leaving.heading for leaving in ring) - NEAR
         return [leaving.half for leaving in ring if leaving.heading > upward][-1], p
 
-    def _carry(self, half: int, turns: int, left: list[int | None]) -> None:
-        """Tells all of a group how often the chains wind, from what is left of one half."""
-        left[half] = turns
+    def _carry(self, half: int, turns: int, winding: list[int | None]) -> None:
+        """Set the winding numbers of all of a group from the number to the left of one half."""
+        winding[half] = turns
         waiting = [half]
         done: set[Point] = set()
         while waiting:
@@ -219,40 +542,32 @@ class Arrangement:
             done.add(here)
             ring = self.rings[here]
             place = ring.index(half)
-            at = left[half]
+            at = winding[half]
             assert at is not None
-            for other in (*ring[place + 1 :], *ring[: place + 1]):
-                back = other ^ 1
-                if left[back] is None:
-                    left[back] = at
+            for leaving in (*ring[place + 1 :], *ring[: place + 1]):
+                back = leaving ^ 1
+                if winding[back] is None:
+                    winding[back] = at
                     waiting.append(back)
-                elif left[back] != at:
+                elif winding[back] != at:
                     raise InconsistentError(here)
-                at += self.turns(other)
-                if left[other] is None:
-                    left[other] = at
-                elif left[other] != at:
+                at += self.turns(leaving)
+                if winding[leaving] is None:
+                    winding[leaving] = at
+                elif winding[leaving] != at:
                     raise InconsistentError(here)
 
-    def borders(self, above: int) -> list[int]:
-        """The halves on whose left alone the chains wind more than ``above`` times."""
+    def edging(self, inside: Container[int]) -> list[int]:
+        """Return the halves with a winding number of ``inside`` on their left alone."""
+        winding = self.left
         return [
             half
-            for half, turns in enumerate(self.left)
-            if turns > above >= turns - self.turns(half)
-        ]
-
-    def edging(self, wanted: Container[int]) -> list[int]:
-        """The halves round whose left the chains wind as wanted, and round whose right not so."""
-        left = self.left
-        return [
-            half
-            for half, turns in enumerate(left)
-            if turns in wanted and left[half ^ 1] not in wanted
+            for half, turns in enumerate(winding)
+            if turns in inside and winding[half ^ 1] not in inside
         ]
 
     def loops(self, halves: Sequence[int]) -> Iterator[list[Edge]]:
-        """Closed loops through all of the borders; those that touch at a point stay apart."""
+        """Yield closed loops through all of the halves; those that touch at a point stay apart."""
         free = dict.fromkeys(halves)
         for first in halves:
             if first not in free:
@@ -280,23 +595,23 @@ class Arrangement:
     def _leftmost_turn(self, half: int, free: dict[int, None]) -> int:
         ring = self.rings[self.origin[half ^ 1]]
         place = ring.index(half ^ 1)
-        for other in (*reversed(ring[:place]), *reversed(ring[place + 1 :])):
-            if other in free:
-                return other
+        for leaving in (*reversed(ring[:place]), *reversed(ring[place + 1 :])):
+            if leaving in free:
+                return leaving
         raise InconsistentError(self.origin[half ^ 1])
 
 
 def _by_side(a: _Leaving, b: _Leaving) -> int:
-    """Negative where ``b`` runs to the left of ``a``.
+    """Compare by side: negative where ``b`` runs to the left of ``a``.
 
     Where the shorter ends it is clear of the other, or it would have been cut there. Where both
-    end in one point they are compared half way: there neither what they part by at the start nor
-    what they are apart by at the end has the other sign but by rounding.
+    end in one point they are compared half way: the difference at the start and the distance at the
+    end have the other sign only by rounding.
     """
-    short, other = (a, b) if a.chord <= b.chord else (b, a)
-    left = other.to_left(short.end)
-    if short.end != other.end and abs(left) > EPSILON / 2:
-        return 1 if (left > 0) == (short is a) else -1
+    short, long = (a, b) if a.chord <= b.chord else (b, a)
+    offset = long.to_left(short.end)
+    if short.end != long.end and abs(offset) > EPSILON / 2:
+        return 1 if (offset > 0) == (short is a) else -1
     reach = short.chord / 2
     apart = math.remainder(a.towards(reach) - b.towards(reach), math.tau)
     return (apart > 0) - (apart < 0)

@@ -1,203 +1,105 @@
-"""Boolean operations on regions of lines and arcs, exact but for points that are made one (SAME).
+"""Boolean operations on contours of lines and arcs, exact but for points within SAME made one.
 
-Contours that meet are laid over each other; a piece stays if what is asked for lies on one side of
-it only; the pieces that stay are chained into contours. Those that meet no other stay or fall whole
-(``apart.py``). Nothing is flattened on the way.
+Contours that meet are laid over each other; a piece stays if the result lies on one side of it
+only; the pieces that stay are chained into contours. Contours that meet no other stay or fall
+whole. Nothing is flattened on the way.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from operator import lt
 from typing import TypeVar
 
-from sbafab.geometry.apart import (
-    ChainGroup,
-    ClosedChain,
-    Wound,
-    chains_of,
-    grouped,
-    settled,
-    turned_round,
+from sbafab.errors import GeometryError, InconsistentError
+from sbafab.geometry.arrangement import Arrangement, overlaid, overlay
+from sbafab.geometry.cache import stored
+from sbafab.geometry.contour import LEAST_AREA, Contour, in_reading_order, tidy
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    from_end_to_end,
+    meeting_points,
 )
-from sbafab.geometry.arrangement import Arrangement
-from sbafab.geometry.edges import EPSILON, Edge, Point
-from sbafab.geometry.inconsistent import GeometryError, InconsistentError
-from sbafab.geometry.nanometres import in_reading_order
-from sbafab.geometry.pieces import DIGIT, by_owner, overlaid, overlay
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import MOST, remembered
-from sbafab.geometry.tidy import tidy
+from sbafab.geometry.nearby import close_pairs, widened
 
-Found = TypeVar("Found")
-WantedTurns = Callable[[int], bool]
-"""Whether a place belongs to a region, from how often chains wind round it."""
+Result = TypeVar("Result")
+Membership = Callable[[int], bool]
+"""True if a place belongs to a region, from the winding number of the chains there."""
+CountedContour = tuple[Contour, int]
+"""A contour, and how many times it counts."""
 
-WAYS = (1, 4, 16, 64)
-"""With how many EPSILON edges are cut where they meet, tried in turn; by the last, points within a
-quarter of a micrometre are one.
+TOLERANCES = (1, 4, 16, 64)
+"""Multiples of EPSILON with which edges are cut where they meet, tried in turn; with the last,
+points within a quarter of a micrometre are one.
 """
 
 
-def union(regions: Iterable[Region]) -> Region:
-    solid = [region for region in regions if not region.is_empty]
-    if len(solid) < 2:
-        return solid[0] if solid else Region()
-    return _union(*solid)
-
-
-@remembered
-def _union(*regions: Region) -> Region:
-    return enclosed([contour for region in regions for contour in region.contours])
-
-
-def intersection(a: Region, b: Region) -> Region:
-    if a.is_empty or b.is_empty:
-        return Region()
-    return _intersection(a, b)
-
-
-@remembered
-def _intersection(a: Region, b: Region) -> Region:
-    return enclosed([*a.contours, *b.contours], 1)
-
-
-def difference(a: Region, b: Region) -> Region:
-    if a.is_empty or b.is_empty:
-        return a
-    return _difference(a, b)
-
-
-@remembered
-def _difference(a: Region, b: Region) -> Region:
-    own, other = ((contour, 1) for contour in a.contours), ((c, -1) for c in b.contours)
-    (found,) = _enclosed([*own, *other], [_more_than(0)])
-    return found
-
-
-def divided(region: Region, by: Region) -> tuple[Region, Region]:
-    """What of a region lies outside another, and what inside: ``region - by`` and ``region & by``.
-
-    Both come of one arrangement.
-    """
-    if region.is_empty or by.is_empty:
-        return region, Region()
-    return _divided(region, by)
-
-
-@remembered
-def _divided(region: Region, by: Region) -> tuple[Region, Region]:
-    own, other = ((c, 1) for c in region.contours), ((c, 1 << DIGIT) for c in by.contours)
-    outside, inside = _enclosed([*own, *other], [_is_outside, _is_inside])
-    return outside, inside
-
-
-@lru_cache(maxsize=MOST)
-def _is_outside(turns: int) -> bool:
-    """Whether the first of two regions is there alone."""
-    own, other = by_owner(turns, 2)
-    return own > 0 >= other
-
-
-@lru_cache(maxsize=MOST)
-def _is_inside(turns: int) -> bool:
-    """Whether both of two regions are there."""
-    own, other = by_owner(turns, 2)
-    return own > 0 and other > 0
-
-
-def _more_than(turns: int) -> WantedTurns:
-    """Wanted is what chains wind round more often than so."""
+def more_than(turns: int) -> Membership:
+    """Membership of places that chains wind round more than so many times."""
     return partial(lt, turns)
 
 
-def wound(edges: Sequence[Edge], above: int) -> Region:
-    """The points that closed chains of edges wind round more than ``above`` times.
+def combined(
+    contours: Iterable[CountedContour], memberships: Sequence[Membership]
+) -> list[tuple[Contour, ...]]:
+    """Return the contours of a region for each membership, in reading order.
 
-    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    Raises GeometryError where no tolerance gives one answer.
     """
-    return arranged([edges], partial(_wound, above))
-
-
-def _wound(above: int, found: Arrangement) -> Region:
-    return _region(_loops(found, _more_than(above)))
-
-
-def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
-    """The same for contours, each a closed chain by itself."""
-    (found,) = _enclosed([(contour, 1) for contour in contours], [_more_than(above)])
-    return found
-
-
-def _enclosed(chains: Iterable[Wound], wanted: Sequence[WantedTurns]) -> list[Region]:
-    """The regions of the places that are wanted, from how often chains wind round them."""
-    found: list[list[Contour]] = [[] for _ in wanted]
-    for group in grouped(chains_of(chains)):
+    results: list[list[Contour]] = [[] for _ in memberships]
+    for group in grouped(chains_of(contours)):
         if group.is_alone:
-            own = [_whole(group.chains[0], group.outside, is_in) for is_in in wanted]
+            parts = [_whole(group.chains[0], group.outside, is_in) for is_in in memberships]
         else:
-            own = _cut(group, wanted)
-        for contours, more in zip(found, own, strict=True):
-            contours.extend(more)
-    return [Region(in_reading_order(contours)) for contours in found]
+            parts = _in_some_way(partial(_cut, group, memberships))
+        for result, part in zip(results, parts, strict=True):
+            result.extend(part)
+    return [in_reading_order(result) for result in results]
 
 
-def _whole(chain: ClosedChain, outside: int, wanted: WantedTurns) -> list[Contour]:
+def _whole(chain: ClosedChain, outside: int, is_in: Membership) -> list[Contour]:
     """A chain that nothing meets, with the material on its left; nothing if it bounds none."""
     contour = chain.contour
     inside = outside + (-chain.turns if contour.is_hole else chain.turns)
-    if wanted(inside) == wanted(outside):
+    if is_in(inside) == is_in(outside):
         return []
-    return [contour if wanted(outside) == contour.is_hole else turned_round(contour)]
+    return [contour if is_in(outside) == contour.is_hole else turned_round(contour)]
 
 
-def _cut(group: ChainGroup, wanted: Sequence[WantedTurns]) -> list[list[Contour]]:
-    """The contours of each region, where chains meet each other."""
-    return _in_some_way(partial(_cut_with, group, wanted))
-
-
-def _cut_with(
-    group: ChainGroup, wanted: Sequence[WantedTurns], tolerance: float
+def _cut(
+    group: ChainGroup, memberships: Sequence[Membership], tolerance: float
 ) -> list[list[Contour]]:
-    found = Arrangement(overlay(group.edges, tolerance, group.clear))
-    return [_contours(_loops(found, is_in, group.outside)) for is_in in wanted]
+    """The contours of each region, where chains meet each other."""
+    arrangement = Arrangement(overlay(group.edges, tolerance, group.clear))
+    return [bounding(arrangement, is_in, group.outside) for is_in in memberships]
 
 
-def _loops(found: Arrangement, wanted: WantedTurns, outside: int = 0) -> Iterable[Sequence[Edge]]:
-    """Loops round what is wanted, where other chains wind so often round all of it."""
-    return found.loops(
-        found.edging({turns for turns in set(found.left) if wanted(turns + outside)})
-    )
+def bounding(arrangement: Arrangement, is_in: Membership, outside: int = 0) -> list[Contour]:
+    """Contours round the faces of a membership, all of which lie inside ``outside`` more turns."""
+    turns = {turns for turns in set(arrangement.left) if is_in(turns + outside)}
+    loops = map(tidy, arrangement.loops(arrangement.edging(turns)))
+    return [settled(contour) for contour in loops if contour is not None]
 
 
-def _contours(loops: Iterable[Sequence[Edge]]) -> list[Contour]:
-    return [settled(contour) for contour in map(tidy, loops) if contour is not None]
+def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Result]) -> Result:
+    """Return ``read`` of the closed chains of edges of all owners, laid over each other.
 
-
-def _region(loops: Iterable[Sequence[Edge]]) -> Region:
-    """The region inside closed chains that meet nowhere."""
-    return Region(in_reading_order(_contours(loops)))
-
-
-def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found]) -> Found:
-    """What is read from the closed chains of edges of all owners, laid over each other.
-
-    Raises GeometryError where no way to cut the edges where they meet gives one answer.
+    Raises GeometryError where no tolerance gives one answer.
     """
-    return _in_some_way(partial(_arranged_with, owners, read))
+    return _in_some_way(lambda tolerance: read(Arrangement(overlaid(owners, tolerance))))
 
 
-def _arranged_with(
-    owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Found], tolerance: float
-) -> Found:
-    return read(Arrangement(overlaid(owners, tolerance)))
-
-
-def _in_some_way(read: Callable[[float], Found]) -> Found:
-    """What is read where edges are cut with a tolerance, the finest that gives one answer."""
+def _in_some_way(read: Callable[[float], Result]) -> Result:
+    """Return ``read`` of the finest tolerance for cutting edges that gives one answer."""
     place: Point | None = None
-    for coarser in WAYS:
+    for coarser in TOLERANCES:
         try:
             return read(coarser * EPSILON)
         except InconsistentError as fault:
@@ -207,3 +109,269 @@ def _in_some_way(read: Callable[[float], Found]) -> Found:
         f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
         "there by 0.001 mm"
     )
+
+
+# Groups of closed chains that meet, and their nesting.
+#
+# Bores, lumens and outlines one inside the other make most of a laminate. Chains that stay clear
+# of all others are not cut and need no arrangement: the winding number of the others round one of
+# their points gives those on both sides.
+
+
+FAR = 1e-3
+"""mm: chains that stay so far from each other are not cut, at any tolerance."""
+
+
+class ClosedChain:
+    """A closed chain, and how many times it and its twins count together.
+
+    ``drawn`` is the first of them; ``contour`` is its tidy form if it is ``alone``, which means
+    that it stays clear of itself.
+    """
+
+    __slots__ = ("alone", "circle", "contour", "drawn", "start", "turns")
+
+    def __init__(self, contour: Contour, turns: int) -> None:
+        whole = alone(contour)
+        self.alone = whole is not None
+        self.drawn = contour
+        self.contour = whole or contour
+        self.circle = whole.circle if whole is not None else None
+        self.turns = turns
+        self.start: Point = self.contour.edges[0].start
+
+    def turns_round(self, chain: ClosedChain) -> int:
+        """Winding number of the contour round another chain that it stays clear of."""
+        if self.circle is None:
+            return self.contour.winding(chain.start)
+        (centre, radius) = self.circle
+        if math.dist(centre, chain.start) > radius:
+            return 0
+        return -1 if self.contour.is_hole else 1
+
+
+def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
+    """Chains in the order of their first, those that run along the same edges as one.
+
+    Chains that cancel out are left out.
+    """
+    chains: list[ClosedChain] = []
+    circles: dict[tuple[Point, float], ClosedChain] = {}
+    by_edge: dict[Edge, list[ClosedChain]] = {}
+    for contour, turns in contours:
+        chain = ClosedChain(contour, turns)
+        if chain.circle is not None:
+            twin = circles.setdefault(chain.circle, chain)
+            if twin is not chain:
+                same_way = twin.contour.is_hole == chain.contour.is_hole
+                twin.turns += turns if same_way else -turns
+                continue
+        elif chain.alone:
+            edges = chain.contour.edges
+            candidates = by_edge.setdefault(edges[0], [])
+            equal = next((first for first in candidates if first.contour.edges == edges), None)
+            if equal is not None:
+                equal.turns += turns
+                continue
+            candidates.append(chain)
+        chains.append(chain)
+    return [chain for chain in chains if chain.turns]
+
+
+class ChainGroup:
+    """Chains that meet, or one that stays clear of all others.
+
+    The chains of all other groups wind round it ``outside`` times.
+    """
+
+    __slots__ = ("chains", "outside")
+
+    def __init__(self, chains: list[ClosedChain], outside: int) -> None:
+        self.chains = chains
+        self.outside = outside
+
+    @property
+    def is_alone(self) -> bool:
+        """True if it is one chain that meets nothing."""
+        return len(self.chains) == 1 and self.chains[0].alone
+
+    @property
+    def edges(self) -> list[tuple[Edge, int]]:
+        """The edges of all its chains, and how many times each counts."""
+        return [(edge, chain.turns) for chain in self.chains for edge in chain.drawn.edges]
+
+    @property
+    def clear(self) -> list[int]:
+        """For each edge a number of its chain; -1 where that may meet itself."""
+        return [
+            number if chain.alone else -1
+            for number, chain in enumerate(self.chains)
+            for _ in chain.drawn.edges
+        ]
+
+
+def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:
+    """Chains by groups that stay clear of each other."""
+    count = len(chains)
+    home = list(range(count))
+    windings: list[dict[int, int]] = [{} for _ in range(count)]
+    """For each chain, the winding numbers of others round it."""
+    boxes = [chain.contour.bounds for chain in chains]
+    for j in range(count):
+        low_x, low_y, high_x, high_y = widened(boxes[j], FAR)
+        for i in range(j):
+            a, b = boxes[i], boxes[j]
+            if a[0] > high_x or a[2] < low_x or a[1] > high_y or a[3] < low_y:
+                continue
+            if _meet(chains[i], chains[j]):
+                first, second = sorted((_home(home, i), _home(home, j)))
+                home[second] = first
+            elif a[0] <= b[0] and a[1] <= b[1] and a[2] >= b[2] and a[3] >= b[3]:
+                windings[j][i] = chains[i].turns_round(chains[j])
+            else:
+                windings[i][j] = chains[j].turns_round(chains[i])
+    members: dict[int, list[int]] = {}
+    for i in range(count):
+        members.setdefault(_home(home, i), []).append(i)
+    groups: list[ChainGroup] = []
+    for leader, numbers in members.items():
+        outside = {
+            sum(
+                chains[i].turns * turns
+                for i, turns in windings[number].items()
+                if _home(home, i) != leader
+            )
+            for number in numbers
+        }
+        if len(outside) > 1:
+            # A chain that meets none of them winds round some of a group only.
+            return [ChainGroup(list(chains), 0)]
+        groups.append(ChainGroup([chains[number] for number in numbers], outside.pop()))
+    return groups
+
+
+def _home(home: list[int], number: int) -> int:
+    while home[number] != number:
+        number = home[number]
+    return number
+
+
+def _meet(a: ClosedChain, b: ClosedChain) -> bool:
+    """Return True if two chains may come within FAR of each other."""
+    if a.circle is not None and b.circle is not None:
+        (p, r), (q, s) = a.circle, b.circle
+        gap = math.dist(p, q)
+        return not max(gap - r - s, abs(r - s) - gap) > FAR
+    edges, boxes = b.contour.edges, b.contour.boxes
+    low_x, low_y, high_x, high_y = widened(b.contour.bounds, FAR)
+    for edge, box in zip(a.contour.edges, a.contour.boxes, strict=True):
+        if box[0] > high_x or box[2] < low_x or box[1] > high_y or box[3] < low_y:
+            continue
+        if not _clear_of_all(edge, box, edges, boxes):
+            return True
+    return False
+
+
+def _clear_of_all(
+    edge: Edge, box: Bounds, obstacles: tuple[Edge, ...], boxes: tuple[Bounds, ...]
+) -> bool:
+    """Return True if an edge surely stays farther than FAR from all obstacles."""
+    low_x, low_y, high_x, high_y = widened(box, FAR)
+    for obstacle, b in zip(obstacles, boxes, strict=True):
+        meets = b[0] <= high_x and b[2] >= low_x and b[1] <= high_y and b[3] >= low_y
+        if meets and not _clear(edge, obstacle):
+            return False
+    return True
+
+
+def _clear(a: Edge, b: Edge) -> bool:
+    """Return True if two edges surely stay farther than FAR from each other."""
+    if isinstance(a, Arc):
+        if isinstance(b, Arc):
+            gap = math.dist(a.centre, b.centre)
+            r, s = a.radius, b.radius
+            if max(gap - r - s, abs(r - s) - gap) > FAR:
+                return True
+        elif _clear_of_circle(b, a):
+            return True
+    elif isinstance(b, Arc) and _clear_of_circle(a, b):
+        return True
+    return not meeting_points(a, b, FAR)
+
+
+def _clear_of_circle(line: Line, arc: Arc) -> bool:
+    """Return True if a line keeps clear of an arc's whole circle, outside or inside."""
+    if abs(line.to_left(arc.centre)) > arc.radius + FAR:
+        return True
+    return line.farthest_from(arc.centre) < arc.radius - FAR
+
+
+def alone(contour: Contour) -> Contour | None:
+    """The tidy form of a contour that stays clear of itself; None where it may meet itself."""
+    values = contour.__dict__
+    if "alone" not in values:
+        form = tidy(contour.edges) if _keeps_clear(contour) else None
+        # No contour is stored within itself, or it would outlive its last use.
+        values["alone"] = form is not None and (form.edges == contour.edges or form)
+        if form is not None:
+            form.__dict__["alone"] = True
+    whole: Contour | bool = values["alone"]
+    if isinstance(whole, bool):
+        return contour if whole else None
+    return whole
+
+
+def settled(contour: Contour) -> Contour:
+    """Mark a contour as staying clear of itself: it has been cut where it met edges."""
+    contour.__dict__["alone"] = True
+    return contour
+
+
+def meets_itself(contour: Contour) -> Contour:
+    """Mark a contour that comes near itself, so that ``alone`` need not look."""
+    contour.__dict__["alone"] = False
+    return contour
+
+
+def turned_round(contour: Contour) -> Contour:
+    """The tidy form of a contour that is alone, with the material on its other side."""
+    return stored(contour, "turned_round", _turned)
+
+
+def _turned(contour: Contour) -> Contour:
+    turned = contour.reversed()
+    whole = turned if contour.circle is not None else tidy(turned.edges)
+    assert whole is not None
+    return settled(whole)
+
+
+def _keeps_clear(contour: Contour) -> bool:
+    """Return True if only edges that follow each other come within FAR of each other."""
+    edges, count = contour.edges, len(contour.edges)
+    least = max(LEAST_AREA, FAR * contour.length)
+    if abs(contour.area) < least or any(from_end_to_end(edge) is not edge for edge in edges):
+        return False
+    if contour.circle is not None:
+        _, radius = contour.circle
+        whole = abs(abs(contour.area) - math.pi * radius * radius) < FAR * radius
+        same = {(e.centre, e.radius) for e in edges if isinstance(e, Arc)}
+        return whole and len(same) == 1 and radius > FAR
+    for i, j in close_pairs(contour.boxes, FAR):
+        a, b = (edges[i], edges[j]) if i < j else (edges[j], edges[i])
+        apart = abs(i - j)
+        if 1 < apart < count - 1:
+            if not _clear(a, b):
+                return False
+            continue
+        shared = {a.start, a.end} & {b.start, b.end}
+        if min(math.dist(a.start, a.end), math.dist(b.start, b.end)) < 4 * FAR:
+            return False
+        if not set(meeting_points(a, b)) <= shared:
+            return False
+    return True
+
+
+# Contours as booleans hand them out: edges of one support joined, dust left out.
+
+
+# Coordinates in whole nanometres: shapes that differ by a hair come in one order.

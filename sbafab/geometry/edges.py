@@ -1,4 +1,4 @@
-"""Edges of a planar profile: straight lines and circular arcs, exact.
+"""Edges of a planar profile: exact lines and circular arcs, their runs and meeting points.
 
 Lengths are millimetres, angles radians. Every arc spans at most half a turn, so its bulge
 (tan of a quarter of its sweep, the DXF convention) is at most one in size.
@@ -7,25 +7,26 @@ Lengths are millimetres, angles radians. Every arc spans at most half a turn, so
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Final, final
+from typing import Final
 
 Point = tuple[float, float]
 Bounds = tuple[float, float, float, float]
 
-EPSILON: Final = 2e-6
+EPSILON = 2e-6
 """mm: a point nearer to an edge than this, 2 nm, lies on it."""
-SAME: Final = 2 * EPSILON
+SAME = 2 * EPSILON
 """mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
 by such steps. Far below the 1 um that the cut files promise.
 """
 
-BENT: Final = EPSILON / 4
-"""mm: an edge whose points were moved off its line or circle by more may run where none was looked
-for. Two edges bent by less still are within EPSILON of each other where they meet.
+BENT = EPSILON / 4
+"""mm: an edge whose points were moved off its line or circle by more may cross others where no
+crossing was searched. Two edges bent by less are within EPSILON of each other where they meet.
 """
-UNKNOWN: Final = 1e9
-"""Radians: an angle that has not been worked out."""
+UNKNOWN = 1e9
+"""Radians: an angle that is not computed yet."""
 
 
 def unit(degrees: float) -> Point:
@@ -39,15 +40,14 @@ def _along(p: Point, origin: Point, unit: Point) -> float:
     return (p[0] - origin[0]) * unit[0] + (p[1] - origin[1]) * unit[1]
 
 
-@final
 class Line:
     """A straight edge from ``start`` to ``end``."""
 
     __slots__ = ("_length", "end", "start")
 
     def __init__(self, start: Point, end: Point) -> None:
-        self.start: Final[Point] = start
-        self.end: Final[Point] = end
+        self.start: Final = start
+        self.end: Final = end
         self._length = 0.0
 
     def __eq__(self, other: object) -> bool:
@@ -116,11 +116,11 @@ class Line:
         return max(math.dist(p, self.start), math.dist(p, self.end))
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
-        """How far the edge reaches from ``origin`` along a unit direction."""
+        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
         return max(_along(self.start, origin, unit), _along(self.end, origin, unit))
 
     def to_left(self, p: Point) -> float:
-        """How far ``p`` lies to the left of the infinite line."""
+        """Return the distance of ``p`` to the left of the infinite line, mm."""
         x, y = self.start
         ux, uy = self.direction(self.start)
         return ux * (p[1] - y) - uy * (p[0] - x)
@@ -138,21 +138,20 @@ class Line:
         return Line((x0 + nx, y0 + ny), (x1 + nx, y1 + ny))
 
 
-@final
 class Arc:
     """A circular edge round ``centre``, counter-clockwise if ``ccw``; at most half a turn.
 
-    Rules ask for its sweep and bounds again and again: they are worked out once.
+    Its sweep and bounds are computed once.
     """
 
     __slots__ = ("_bounds", "_start_angle", "_sweep", "ccw", "centre", "end", "radius", "start")
 
     def __init__(self, start: Point, end: Point, centre: Point, radius: float, ccw: bool) -> None:
-        self.start: Final[Point] = start
-        self.end: Final[Point] = end
-        self.centre: Final[Point] = centre
-        self.radius: Final[float] = radius
-        self.ccw: Final[bool] = ccw
+        self.start: Final = start
+        self.end: Final = end
+        self.centre: Final = centre
+        self.radius: Final = radius
+        self.ccw: Final = ccw
         self._start_angle = UNKNOWN
         self._sweep = UNKNOWN
         self._bounds: Bounds | None = None
@@ -181,7 +180,7 @@ class Arc:
 
     @property
     def ends_lie_on_circle(self) -> bool:
-        """Whether both ends lie on the circle, to within BENT."""
+        """True if both ends lie on the circle, to within BENT."""
         first = math.dist(self.start, self.centre) - self.radius
         last = math.dist(self.end, self.centre) - self.radius
         return -BENT < first < BENT and -BENT < last < BENT
@@ -229,10 +228,10 @@ class Arc:
 
     @property
     def bounds(self) -> Bounds:
-        found = self._bounds
-        if found is None:
-            found = self._bounds = self._box()
-        return found
+        bounds = self._bounds
+        if bounds is None:
+            bounds = self._bounds = self._box()
+        return bounds
 
     def _box(self) -> Bounds:
         cx, cy = self.centre
@@ -240,14 +239,14 @@ class Arc:
         first, last = (self.start, self.end) if self.ccw else (self.end, self.start)
         x0, y0 = first
         x1, y1 = last
-        left, right = (x0, x1) if x0 < x1 else (x1, x0)
-        low, high = (y0, y1) if y0 < y1 else (y1, y0)
+        low_x, high_x = (x0, x1) if x0 < x1 else (x1, x0)
+        low_y, high_y = (y0, y1) if y0 < y1 else (y1, y0)
         # The ends may lie off the circle by a rounding: they are within the box, too.
         return (
-            cx - r if y0 >= cy >= y1 and cx - r < left else left,
-            cy - r if x0 <= cx <= x1 and cy - r < low else low,
-            cx + r if y0 <= cy <= y1 and cx + r > right else right,
-            cy + r if x0 >= cx >= x1 and cy + r > high else high,
+            cx - r if y0 >= cy >= y1 and cx - r < low_x else low_x,
+            cy - r if x0 <= cx <= x1 and cy - r < low_y else low_y,
+            cx + r if y0 <= cy <= y1 and cx + r > high_x else high_x,
+            cy + r if x0 >= cx >= x1 and cy + r > high_y else high_y,
         )
 
     def reversed(self) -> Arc:
@@ -303,7 +302,7 @@ class Arc:
         return max(math.dist(p, self.start), math.dist(p, self.end))
 
     def farthest_along(self, origin: Point, unit: Point) -> float:
-        """How far the edge reaches from ``origin`` along a unit direction."""
+        """Return the farthest reach of the edge from ``origin`` along a unit direction, mm."""
         cx, cy = self.centre
         r = self.radius
         top = (cx + unit[0] * r, cy + unit[1] * r)
@@ -311,7 +310,7 @@ class Arc:
         return _along(top, origin, unit) if 0.0 <= self.parameter(top) <= 1.0 else ends
 
     def to_left(self, p: Point) -> float:
-        """How far ``p`` lies to the left of the whole circle."""
+        """Return the distance of ``p`` to the left of the whole circle, mm."""
         inside = self.radius - math.dist(p, self.centre)
         return inside if self.ccw else -inside
 
@@ -361,7 +360,7 @@ def quarter_arcs(
 
 
 def from_end_to_end(edge: Edge) -> Edge:
-    """The edge; where an end was taken off an arc's circle by more than BENT, the arc of its sweep
+    """The edge; for an arc with an end off its circle by more than BENT, the arc of its sweep
     through both ends.
     """
     if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
@@ -388,7 +387,7 @@ def distance_to(edge: Edge, p: Point) -> float:
 
 
 def turns_round(edge: Edge, p: Point) -> int:
-    """What an edge adds to the times its contour runs counter-clockwise round ``p``."""
+    """Return the share of an edge in its contour's winding number round ``p``."""
     px, py = p
     x0, y0 = edge.start
     x1, y1 = edge.end
@@ -405,9 +404,215 @@ def turns_round(edge: Edge, p: Point) -> int:
         beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
         if beside and (px - cx) * (px - cx) + (py - cy) * (py - cy) < edge.radius * edge.radius:
             # A point exactly on the chord belongs to the side the count above gave it.
-            left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
-            if edge.ccw and not left:
+            is_left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
+            if edge.ccw and not is_left:
                 turns += 1
-            elif not edge.ccw and left:
+            elif not edge.ccw and is_left:
                 turns -= 1
     return turns
+
+
+def box_round(boxes: Sequence[Bounds]) -> Bounds:
+    """Return the box that holds all boxes; of none, one that holds nothing."""
+    low_x = low_y = math.inf
+    high_x = high_y = -math.inf
+    for box in boxes:
+        low_x = min(low_x, box[0])
+        low_y = min(low_y, box[1])
+        high_x = max(high_x, box[2])
+        high_y = max(high_y, box[3])
+    return low_x, low_y, high_x, high_y
+
+
+# Runs: edges of a closed chain gathered by the line or circle that they lie on.
+
+
+_Run = tuple[Edge, ...]
+DRIFT = 4 * EPSILON
+"""mm by which edges on one line or circle may leave it together."""
+
+
+def runs(edges: _Run) -> Iterator[_Run]:
+    """The edges gathered by the line or circle they lie on, from the first corner on."""
+    breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
+    if not breaks:
+        yield from _parted(edges)
+        return
+    for first, last in zip(breaks, [*breaks[1:], breaks[0]], strict=True):
+        yield from _parted(edges[first:last] if first < last else edges[first:] + edges[:last])
+
+
+def same_support(a: Edge, b: Edge) -> bool:
+    """True if two edges lie on one circle, or are lines of one direction, and turn the same way."""
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        return (
+            a.ccw == b.ccw
+            and abs(a.radius - b.radius) < EPSILON
+            and math.dist(a.centre, b.centre) < EPSILON
+        )
+    if isinstance(a, Line) and isinstance(b, Line):
+        ux, uy = a.direction(a.start)
+        vx, vy = b.direction(b.start)
+        return ux * vx + uy * vy > 0 and abs(ux * vy - uy * vx) * (a.length + b.length) < EPSILON
+    return False
+
+
+def _parted(run: _Run) -> Iterator[_Run]:
+    """Yield the run in parts that each follow one line or circle.
+
+    Each two neighbours may look straight and the edges yet turn a corner together.
+    """
+    if len(run) < 3:
+        yield run
+        return
+    head, end = run[0], run[-1].end
+    if isinstance(head, Arc):
+        offs = [_off_circle(edge, head) for edge in run]
+        place = next((i for i, off in enumerate(offs) if off > DRIFT), 0)
+    else:
+        # Of a closed run, what lies farthest from where it starts.
+        chord = Line(head.start, end)
+        offs = [
+            math.dist(edge.start, end) if head.start == end else abs(chord.to_left(edge.start))
+            for edge in run
+        ]
+        farthest = max(range(len(run)), key=offs.__getitem__)
+        place = farthest if offs[farthest] > DRIFT else 0
+    if not place:
+        yield run
+        return
+    yield from _parted(run[:place])
+    yield from _parted(run[place:])
+
+
+def _off_circle(edge: Edge, head: Arc) -> float:
+    """Return the difference of an arc's circle from another arc's, mm."""
+    if not isinstance(edge, Arc):
+        return math.inf
+    return max(abs(edge.radius - head.radius), math.dist(edge.centre, head.centre))
+
+
+# Meeting points of two edges: crossings, touches, and the ends of a shared stretch.
+
+
+EVERYWHERE: Bounds = (-math.inf, -math.inf, math.inf, math.inf)
+
+
+def meeting_points(
+    a: Edge,
+    b: Edge,
+    tolerance: float = EPSILON,
+    boxes: tuple[Bounds, Bounds] = (EVERYWHERE, EVERYWHERE),
+) -> list[Point]:
+    """Return the points that lie on both edges, to within the tolerance.
+
+    Edges that run along each other give the ends of the shared stretch. ``boxes`` hold all points
+    within the tolerance of each edge, if computed already; no point outside them is returned.
+    """
+    near_a, near_b = boxes
+    low_x, low_y = max(near_a[0], near_b[0]), max(near_a[1], near_b[1])
+    high_x, high_y = min(near_a[2], near_b[2]), min(near_a[3], near_b[3])
+    a0, a1, b0, b1 = a.start, a.end, b.start, b.end
+    points: list[Point] = []
+    if a0 in (b0, b1) or (
+        low_x <= a0[0] <= high_x and low_y <= a0[1] <= high_y and distance_to(b, a0) < tolerance
+    ):
+        points.append(a0)
+    if a1 in (b0, b1) or (
+        low_x <= a1[0] <= high_x and low_y <= a1[1] <= high_y and distance_to(b, a1) < tolerance
+    ):
+        points.append(a1)
+    for p in (b0, b1):
+        within = low_x <= p[0] <= high_x and low_y <= p[1] <= high_y
+        if within and p not in (a0, a1) and distance_to(a, p) < tolerance:
+            points.append(p)
+    if points and _holds(points[0], 2 * tolerance, low_x, low_y, high_x, high_y):
+        return points
+    for p in _support_crossings(a, b, tolerance):
+        if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
+            continue
+        # A known end wins over a computed point: at a touch the computed one is less exact.
+        if any(math.dist(p, q) <= 2 * tolerance for q in points):
+            continue
+        if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
+            points.append(p)
+    return points
+
+
+def _holds(
+    p: Point, reach: float, low_x: float, low_y: float, high_x: float, high_y: float
+) -> bool:
+    """Return True if a whole box lies within ``reach`` of a point."""
+    return math.hypot(max(high_x - p[0], p[0] - low_x), max(high_y - p[1], p[1] - low_y)) <= reach
+
+
+def _support_crossings(a: Edge, b: Edge, tolerance: float) -> list[Point]:
+    if isinstance(a, Line):
+        if isinstance(b, Line):
+            return _line_line(a, b)
+        return line_circle(a.start, a.direction(a.start), b.centre, b.radius, tolerance)
+    if isinstance(b, Line):
+        return line_circle(b.start, b.direction(b.start), a.centre, a.radius, tolerance)
+    return _circle_circle(a, b, tolerance)
+
+
+def _line_line(a: Line, b: Line) -> list[Point]:
+    ax, ay = a.start
+    bx, by = b.start
+    ux, uy = a.direction(a.start)
+    vx, vy = b.direction(b.start)
+    cross = ux * vy - uy * vx
+    if abs(cross) < 1e-12:
+        return []
+    t = ((bx - ax) * vy - (by - ay) * vx) / cross
+    return [(ax + t * ux, ay + t * uy)]
+
+
+def line_circle(
+    origin: Point, unit: Point, centre: Point, radius: float, tolerance: float = EPSILON
+) -> list[Point]:
+    """The crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
+    ox, oy = origin
+    ux, uy = unit
+    cx, cy = centre
+    along = (cx - ox) * ux + (cy - oy) * uy
+    across = (cx - ox) * uy - (cy - oy) * ux
+    foot = (ox + along * ux, oy + along * uy)
+    room = radius - abs(across)
+    if room < -tolerance:
+        return []
+    half = math.sqrt(max(0.0, room * (radius + abs(across))))
+    if half < tolerance:
+        return [foot]
+    points = [
+        (foot[0] - half * ux, foot[1] - half * uy),
+        (foot[0] + half * ux, foot[1] + half * uy),
+    ]
+    return [foot, *points] if room < tolerance else points
+
+
+def _circle_circle(a: Arc, b: Arc, tolerance: float) -> list[Point]:
+    ax, ay = a.centre
+    bx, by = b.centre
+    gap = math.hypot(bx - ax, by - ay)
+    if gap < 1e-12:
+        return []
+    outside = a.radius + b.radius - gap
+    inside = gap - abs(a.radius - b.radius)
+    if outside < -tolerance or inside < -tolerance:
+        return []
+    ux, uy = (bx - ax) / gap, (by - ay) / gap
+    along = (gap * gap + (a.radius - b.radius) * (a.radius + b.radius)) / (2 * gap)
+    # The product form keeps its digits where the circles all but touch (Heron).
+    rest = outside * inside * (gap + a.radius + b.radius) * (gap + abs(a.radius - b.radius))
+    half = math.sqrt(max(0.0, rest)) / (2 * gap)
+    if outside < tolerance or inside < tolerance:
+        side = 1.0 if along > 0 else -1.0
+        touch = (ax + side * a.radius * ux, ay + side * a.radius * uy)
+        if half < tolerance:
+            return [touch]
+    foot = (ax + along * ux, ay + along * uy)
+    return [
+        (foot[0] - half * uy, foot[1] + half * ux),
+        (foot[0] + half * uy, foot[1] - half * ux),
+    ]

@@ -1,34 +1,70 @@
-"""All narrow places of a region, in arrays: every sample against every edge at once."""
+"""Facing places: all segments hardly wider than the narrowest that stand square on edges."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from sbafab.geometry.edge_table import boxes_round, columns_of, crossings, dot, touching_in_parts
-from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered_together
-from sbafab.geometry.samples import sampled
-from sbafab.geometry.side_table import SideTable
-from sbafab.geometry.width import (
-    ASIDE,
-    TOUCH,
-    Gathered,
-    Width,
-    boundary_of,
-    least_of,
-    search,
+from sbafab.geometry.cache import cached_batch
+from sbafab.geometry.edge_table import (
+    SideTable,
+    boxes_round,
+    columns_of,
+    crossings,
+    dot,
+    touching_in_parts,
 )
+from sbafab.geometry.edges import Arc, Edge, Point
+from sbafab.geometry.on_demand import np
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import ASIDE, TOUCH, Gathered, Width, boundary_of, least_of, search
 
 if TYPE_CHECKING:
-    from sbafab.geometry.arrays import Bools, Floats, Indices
+    from sbafab.geometry.edge_table import Bools, Floats, Indices
 
-NEAR: Final = 10 * TOUCH
-"""mm from its ends within which what meets a segment does not cross it."""
+STEP = math.radians(15)
+"""Widest step of samples along an arc: 7.5 degrees aside, a shift counts 0.99 of its length."""
+
+
+def sampled(edges: Sequence[Edge], room: float = 0.0) -> tuple[list[Point], list[int]]:
+    """Return samples of all edges, one edge after the other, and the count of each.
+
+    On a line both ends and the middle, on an arc at least one every 15 degrees; the outermost lie
+    ``room`` mm within the ends.
+    """
+    points: list[Point] = []
+    counts: list[int] = []
+    for edge in edges:
+        count = 2
+        if isinstance(edge, Arc):
+            count = max(2, math.ceil(abs(edge.sweep) / STEP))
+        share = room / edge.length if room > 0 else 0.0
+        shares = [min(1 - share, max(share, i / count)) for i in range(count + 1)]
+        points += _places_along(edge, shares)
+        counts.append(count + 1)
+    return points, counts
+
+
+def _places_along(edge: Edge, shares: list[float]) -> list[Point]:
+    """Return the points at these shares of an edge's length; its exact ends at 0 and 1."""
+    if not isinstance(edge, Arc):
+        return [edge.start if t == 0 else edge.end if t == 1 else edge.at(t) for t in shares]
+    first, sweep = edge.start_angle, edge.sweep
+    x, y = edge.centre
+    r = edge.radius
+    angles = [first + t * sweep for t in shares]
+    points = [(x + r * math.cos(a), y + r * math.sin(a)) for a in angles]
+    if shares[0] == 0:
+        points[0] = edge.start
+    if shares[-1] == 1:
+        points[-1] = edge.end
+    return points
+
+
+NEAR = 10 * TOUCH
+"""mm from the ends of a segment within which an edge does not cross it."""
 
 
 class FacingPlaces(NamedTuple):
@@ -39,66 +75,56 @@ class FacingPlaces(NamedTuple):
     value: Floats
 
     def at(self, some: Bools) -> FacingPlaces:
-        """Some of them."""
+        """Return the places of a mask."""
         return FacingPlaces(self.start[:, some], self.end[:, some], self.value[some])
 
 
-NOWHERE = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
+FacingQuery = tuple[Region, float, float, Width | None]
+"""Region, slack (mm), sharp angle (degrees), and least width if measured already."""
 
 
-FacingAsked = tuple[Region, float, float, Width | None]
-"""What is asked of a region: the slack (mm), what is sharp (degrees), the least width if known."""
+@cached_batch
+def facing_places_of(queries: Sequence[FacingQuery]) -> Sequence[FacingPlaces]:
+    """Return the facing places of several regions, each once.
 
-
-def facing_places(
-    region: Region, slack: float, sharp: float = 90.0, least: Width | None = None
-) -> FacingPlaces:
-    """Facing places that are at most ``slack`` mm wider than the narrowest, each once.
-
-    Besides the places where edges are square on each other they hold samples along edges that run
-    nearly alongside: where a layer turns, those may become the narrowest. ``least`` is the least
-    width, where it is known.
+    They are at most ``slack`` mm wider than the narrowest. Besides the places where edges are
+    square on each other these are samples along edges that run nearly alongside: where a layer
+    turns, those may become the narrowest.
     """
-    (found,) = facing_places_of([(region, slack, sharp, least)])
-    return found
-
-
-@remembered_together
-def facing_places_of(asked: Sequence[FacingAsked]) -> Sequence[FacingPlaces]:
-    """The same of several regions."""
-    found = [NOWHERE] * len(asked)
+    nowhere = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
+    results = [nowhere] * len(queries)
     searched: dict[int, Gathered] = {}
-    for number, (region, slack, sharp, known) in enumerate(asked):
+    for number, (region, slack, sharp, least_width) in enumerate(queries):
         boundary = boundary_of(region, sharp)
-        least = known or least_of(boundary, math.inf)
+        least = least_width or least_of(boundary, math.inf)
         if least is None:
             continue
         if least.value == 0.0:
             place = np.array([least.start]).T, np.array([least.end]).T
-            found[number] = FacingPlaces(*place, np.zeros(1))
+            results[number] = FacingPlaces(*place, np.zeros(1))
             continue
         searched[number] = Gathered(boundary, least.value + slack)
         search(searched[number])
     if searched:
         for number, places in zip(searched, _together(list(searched.values())), strict=True):
-            found[number] = places
-    return found
+            results[number] = places
+    return results
 
 
 def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
-    """What was gathered of each boundary, and samples of its sides, without what is crossed."""
-    boundaries = [one.boundary for one in searched]
-    parts = [len(one.sides) for one in boundaries]
-    sides = SideTable([side for one in boundaries for side in one.sides], parts)
+    """Return the gathered segments and samples of sides of each boundary that no edge crosses."""
+    boundaries = [gathered.boundary for gathered in searched]
+    parts = [len(gathered.sides) for gathered in boundaries]
+    sides = SideTable([side for gathered in boundaries for side in gathered.sides], parts)
     of_side = np.arange(len(parts)).repeat(parts)
-    within = np.array([one.value for one in searched])
-    offered = columns_of([(*p, *q) for one in searched for p, q in one.offered], 4)
+    within = np.array([gathered.value for gathered in searched])
+    offered = columns_of([(*p, *q) for gathered in searched for p, q in gathered.offered], 4)
     p, q, side = _from_samples(sides, within[of_side])
-    counts = [len(one.offered) for one in searched]
+    counts = [len(gathered.offered) for gathered in searched]
     home = np.concatenate([np.arange(len(parts)).repeat(counts), of_side.take(side)])
     p, q = np.concatenate([offered[:2], p], axis=1), np.concatenate([offered[2:], q], axis=1)
     first = _first_of_each(p, q, home)
-    # Of each boundary by itself, in the order in which they were found.
+    # Boundary by boundary, in the order of the search.
     first = first.take(home.take(first).argsort(kind="stable"))
     p, q, home = p.take(first, axis=1), q.take(first, axis=1), home.take(first)
     clear = _clear(p, q, home, sides, searched)
@@ -109,9 +135,9 @@ def _together(searched: Sequence[Gathered]) -> list[FacingPlaces]:
 
 
 def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Indices]:
-    """Samples of each side and the feet of their normals on the sides they face, and the side.
+    """Samples of sides, the feet of their normals on facing sides, and the numbers of the sides.
 
-    ``within`` is how far off these may be, mm, for each side.
+    ``within`` is the greatest distance of a foot for each side, mm.
     """
     a, b = sides.pairs(ASIDE, within)
     points, numbers = sampled(sides.edges)
@@ -119,24 +145,26 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     owner = np.arange(len(counts)).repeat(counts)
     normals = sides.table.at(owner).normal(samples)
     # Each pair has a row a sample of its first side.
-    own = counts.take(a)
+    rows_of_pair = counts.take(a)
     starts = (counts.cumsum() - counts).take(a)
-    row = np.arange(own.sum()) + (starts - own.cumsum() + own).repeat(own)
+    row = np.arange(rows_of_pair.sum()) + (starts - rows_of_pair.cumsum() + rows_of_pair).repeat(
+        rows_of_pair
+    )
     p, n = samples.take(row, axis=1), normals.take(row, axis=1)
-    feet, inward, there = _feet(p, sides, b.repeat(own))
-    side = a.repeat(own)
+    feet, inward, there = _feet(p, sides, b.repeat(rows_of_pair))
+    side = a.repeat(rows_of_pair)
     # Rows of samples, a column a foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
     faces = (dot(off, n) > TOUCH) & (dot(off, inward) < -TOUCH)
-    kept = there & square & faces & (_length(off) <= within.take(side)[:, None])
-    place, _ = kept.nonzero()
-    return p[:, :, 0].take(place, axis=1), feet[:, kept], side.take(place)
+    valid = there & square & faces & (_length(off) <= within.take(side)[:, None])
+    place, _ = valid.nonzero()
+    return p[:, :, 0].take(place, axis=1), feet[:, valid], side.take(place)
 
 
 def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
-    """Points of sides where their normal passes through points, up to two each; and the normals."""
+    """The points of sides where their normals pass through points, up to two each; the normals."""
     edges = sides.table.at(numbers)
     chord, off = edges.end - edges.start, p - edges.start
     square = dot(chord, chord)
@@ -169,11 +197,11 @@ def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats
 
 
 def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
-    """Which segments of each home are the first with their ends, in either order, to 10 nm."""
+    """The numbers of the first segment with given ends, in either order, to 10 nm, by home."""
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
     ends = np.concatenate([np.where(turned, ends[[2, 3, 0, 1]], ends), home[None]])
-    # A stable order, so that the first of those that are alike comes first.
+    # A stable order, so that the first of equal segments comes first.
     order = np.lexsort(ends)
     ends = ends.take(order, axis=1)
     is_new = np.ones(len(order), dtype=bool)
@@ -184,7 +212,7 @@ def _first_of_each(p: Floats, q: Floats, home: Indices) -> Indices:
 def _clear(
     p: Floats, q: Floats, home: Indices, sides: SideTable, searched: Sequence[Gathered]
 ) -> Bools:
-    """Which segments no edge crosses; those that an edge may cross are looked at one by one."""
+    """Return True for segments that no edge crosses; doubtful ones are tested one by one."""
     counts = np.bincount(home, minlength=len(searched)).tolist()
     boxes = boxes_round(p, q, NEAR)
     segment, number = touching_in_parts(boxes, counts, sides.table.box, sides.parts)
@@ -206,12 +234,12 @@ def _clear(
         doubtful |= (aside < NEAR) & (ahead > NEAR / 2) & (ahead < length - NEAR / 2)
     clear = np.ones(p.shape[1], dtype=bool)
     # Not np.unique, which loads masked arrays.
-    for asked in sorted(set(segment[doubtful].tolist())):
-        (px, py), (qx, qy) = p[:, asked].tolist(), q[:, asked].tolist()
-        clear[asked] = searched[home[asked]].is_clear((px, py), (qx, qy))
+    for place in sorted(set(segment[doubtful].tolist())):
+        (px, py), (qx, qy) = p[:, place].tolist(), q[:, place].tolist()
+        clear[place] = searched[home[place]].is_clear((px, py), (qx, qy))
     return clear
 
 
 def _length(vector: Floats) -> Floats:
-    found: Floats = np.sqrt(dot(vector, vector))
-    return found
+    length: Floats = np.sqrt(dot(vector, vector))
+    return length

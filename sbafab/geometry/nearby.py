@@ -1,17 +1,18 @@
-"""Finding the edges near a place without looking at all of them."""
+"""Search for near edges and boxes without comparing all of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
+from typing import NamedTuple
 
-from sbafab.geometry.edges import EPSILON, Bounds, Edge, Point, distance_to
+from sbafab.geometry.edges import EPSILON, Bounds, Edge, Line, Point, distance_to, left_normal
 
 MANY_BOXES = 500
-"""From which on comparing all at once is worth fetching numpy."""
+"""Number from which comparing boxes in arrays outweighs loading NumPy."""
 FEW_BOXES = 100
-"""Up to which a sweep needs no bands."""
+"""Number up to which a sweep needs no bands."""
 AT_ONCE = 1_000_000
 """Pairs that are compared at once, which bounds the memory."""
 
@@ -22,15 +23,16 @@ def widened(box: Bounds, margin: float) -> Bounds:
 
 
 def boxes_meet(a: Bounds, b: Bounds) -> bool:
-    """Whether two boxes have more in common than an edge."""
+    """Return True if two boxes overlap by more than an edge."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterable[tuple[int, int]]:
-    """Numbers of the boxes that come within ``reach`` of each other, by a sweep along x.
+    """Return the numbers of boxes that come within ``reach`` of each other, by a sweep along x.
 
     The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
-    and the pairs alone. Of many boxes, all are compared at once with those that they meet along x.
+    and the pairs alone. For few boxes it needs no bands; many are compared in arrays. The order of
+    the pairs is the same in each case.
     """
     if len(boxes) >= MANY_BOXES:
         return _close_among_many(boxes, reach)
@@ -40,19 +42,18 @@ def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterable[tuple[int, in
 
 
 def _close_in_bands(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
-    """The same pairs in the same order."""
     order = sorted(range(len(boxes)), key=lambda i: boxes[i][0])
     height = reach + sum([box[3] - box[1] for box in boxes]) / max(1, len(boxes)) or 1.0
     active: dict[int, list[tuple[int, int, int]]] = {}
     for rank, i in enumerate(order):
-        left, low, _, high = boxes[i]
+        low_x, low, _, high = boxes[i]
         first, last = math.floor((low - reach) / height), math.floor((high + reach) / height)
-        found = []
+        pairs = []
         for band in range(first, last + 1):
             filed = active.get(band)
             if not filed:
                 continue
-            filed = active[band] = [it for it in filed if boxes[it[1]][2] >= left - reach]
+            filed = active[band] = [it for it in filed if boxes[it[1]][2] >= low_x - reach]
             for before, j, bottom in filed:
                 # Two boxes may share several bands; they meet in the lowest of them.
                 if (
@@ -60,8 +61,8 @@ def _close_in_bands(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int
                     and boxes[j][1] <= high + reach
                     and boxes[j][3] >= low - reach
                 ):
-                    found.append((before, j))
-        for _, j in sorted(found):
+                    pairs.append((before, j))
+        for _, j in sorted(pairs):
             yield j, i
         bottom, top = math.floor(low / height), math.floor(high / height)
         for band in range(bottom, top + 1):
@@ -69,58 +70,57 @@ def _close_in_bands(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int
 
 
 def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, int]]:
-    """The same pairs in the same order."""
-    found: list[tuple[int, int]] = []
+    pairs: list[tuple[int, int]] = []
     active: list[tuple[float, float, float, int]] = []
     lefts = [box[0] for box in boxes]
     for i in sorted(range(len(boxes)), key=lefts.__getitem__):
-        left, low, right, high = boxes[i]
-        first, bottom, top = left - reach, low - reach, high + reach
-        active = [one for one in active if one[0] >= first]
+        low_x, low, high_x, high = boxes[i]
+        first, bottom, top = low_x - reach, low - reach, high + reach
+        active = [entry for entry in active if entry[0] >= first]
         for _, other_low, other_high, j in active:
             if other_low <= top and other_high >= bottom:
-                found.append((j, i))
-        active.append((right, low, high, i))
-    return found
+                pairs.append((j, i))
+        active.append((high_x, low, high, i))
+    return pairs
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
-    """The same pairs in the same order."""
+    # Only large designs need it: reading a drawing must not load NumPy.
     import numpy as np
 
     sides = np.array(boxes)
     order = np.argsort(sides[:, 0], kind="stable")
-    left, low, right, high = sides[order].T
+    low_x, low, high_x, high = sides[order].T
     # Ranks: each box may meet those after it as far as they start before it ends.
-    last = np.searchsorted(left - reach, right, side="right")
+    last = np.searchsorted(low_x - reach, high_x, side="right")
     counts = np.maximum(last - np.arange(1, len(order) + 1), 0)
     until = np.cumsum(counts)
-    found = []
+    pairs = []
     first = 0
     while first < len(order):
         done = until[first - 1] if first else 0
         after = max(first + 1, int(np.searchsorted(until, done + AT_ONCE, side="right")))
-        own = counts[first:after]
-        before = np.repeat(np.arange(first, after), own)
-        ahead = np.arange(len(before)) - np.repeat(np.cumsum(own) - own, own)
+        repeats = counts[first:after]
+        before = np.repeat(np.arange(first, after), repeats)
+        ahead = np.arange(len(before)) - np.repeat(np.cumsum(repeats) - repeats, repeats)
         behind = before + 1 + ahead
         meets = (low[before] <= high[behind] + reach) & (high[before] >= low[behind] - reach)
-        found.append(np.array([behind[meets], before[meets]]))
+        pairs.append(np.array([behind[meets], before[meets]]))
         first = after
-    behind, before = np.concatenate(found, axis=1)
+    behind, before = np.concatenate(pairs, axis=1)
     turn = np.lexsort((before, behind))
     yield from zip(order[before[turn]].tolist(), order[behind[turn]].tolist(), strict=True)
 
 
 FEW_EDGES = 64
-"""Up to which all boxes are looked at, which costs less than filing them."""
+"""Number up to which comparing all boxes costs less than filing them."""
 
 
 class EdgeIndex:
     """Edges filed by the cells of a square grid that their bounding boxes touch."""
 
     def __init__(self, edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> None:
-        """``boxes``: the bounds of the edges, where they are known."""
+        """``boxes``: the bounds of the edges, if computed already."""
         self.edges = edges
         self._boxes = boxes if boxes is not None else [edge.bounds for edge in edges]
         boxes = self._boxes or [(0.0, 0.0, 0.0, 0.0)]
@@ -174,39 +174,39 @@ class EdgeIndex:
         )
 
     def touching(self, box: Bounds) -> Iterator[Edge]:
-        """Edges whose bounding boxes meet a box."""
+        """Yield edges whose bounding boxes meet a box."""
         return (self.edges[number] for number in self.numbers(box))
 
     def numbers(self, box: Bounds) -> list[int]:
-        """The same, by their place among the edges that were filed."""
-        found = self.among(box, self.about(box))
-        return found if len(self._boxes) > FEW_EDGES else self.in_order(box, found)
+        """Return the numbers of edges whose bounding boxes meet a box."""
+        numbers = self.among(box, self.about(box))
+        return numbers if len(self._boxes) > FEW_EDGES else self.in_order(box, numbers)
 
     def among(self, box: Bounds, numbers: Iterable[int]) -> list[int]:
-        """Of these edges those whose bounding boxes meet a box."""
-        left, bottom, right, top = box
+        """Return those of these edges whose bounding boxes meet a box."""
+        low_x, low_y, high_x, high_y = box
         boxes = self._boxes
         return [
             number
             for number in numbers
-            if (own := boxes[number])[0] <= right
-            and own[2] >= left
-            and own[1] <= top
-            and own[3] >= bottom
+            if (bounds := boxes[number])[0] <= high_x
+            and bounds[2] >= low_x
+            and bounds[1] <= high_y
+            and bounds[3] >= low_y
         ]
 
-    def in_order(self, box: Bounds, found: list[int]) -> list[int]:
-        """Edges that meet a box, in rising order, sorted by the first cell that they share."""
-        if len(found) > 1:
+    def in_order(self, box: Bounds, numbers: list[int]) -> list[int]:
+        """Sort edges that meet a box, in rising order, by the first cell they share with it."""
+        if len(numbers) > 1:
             x, y = self._low
             cell = self.cell
             first = self._cells
             x0, y0 = math.floor((box[0] - x) / cell), math.floor((box[1] - y) / cell)
-            found.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
-        return found
+            numbers.sort(key=lambda n: (max(x0, first[n][0]), max(y0, first[n][1])))
+        return numbers
 
     def about(self, box: Bounds, after: int = -1) -> Iterable[int]:
-        """The edges in the cells that a box touches, cell by cell, each once; all of a few.
+        """Return the edges in the cells that a box touches, cell by cell, each once; all of a few.
 
         Those up to the number ``after`` may be left out.
         """
@@ -228,14 +228,14 @@ class EdgeIndex:
         return self._high[0]
 
     def all_within(self, box: Bounds) -> bool:
-        """Whether no edge reaches out of the box."""
+        """Return True if no edge reaches out of the box."""
         low_x, low_y = self._low
         high_x, high_y = self._high
         return box[0] <= low_x and box[1] <= low_y and box[2] >= high_x and box[3] >= high_y
 
     def distance(self, p: Point) -> float:
         """Least distance from ``p`` to any edge."""
-        # Many a point that is asked for lies on an edge.
+        # Many points lie on an edge.
         margin = EPSILON
         while True:
             box = widened((*p, *p), margin)
@@ -243,3 +243,74 @@ class EdgeIndex:
             if least <= margin or self.all_within(box):
                 return least
             margin = max(2 * margin, self.cell)
+
+
+ALONGSIDE = 1e-3
+"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
+
+
+BESIDE = 1e-5
+"""Rounding: mm by which an edge may miss another's normals."""
+
+
+class Foot(NamedTuple):
+    """A point of an edge, and the unit normal into the material there."""
+
+    point: Point
+    normal: Point
+
+
+class BoundarySide:
+    """An edge of a boundary with values that the search uses repeatedly.
+
+    ``half`` is the distance of its ends from its middle, ``lean`` the sine of its half turn.
+    """
+
+    __slots__ = ("box", "edge", "half", "half_turn", "lean", "middle", "normal")
+
+    def __init__(
+        self, edge: Edge, box: Bounds, middle: Point, half_turn: float, half: float
+    ) -> None:
+        self.edge = edge
+        self.box = box
+        self.middle = middle
+        self.normal = left_normal(edge, middle)
+        self.half_turn = half_turn
+        self.half = half
+        self.lean = math.sin(min(half_turn, math.pi / 2))
+
+    def may_hold_feet(self, side: BoundarySide, within: float) -> bool:
+        """Return True if a normal of this edge may meet ``side`` no farther off than ``within``."""
+        x, y = self.middle
+        nx, ny = self.normal
+        aside = abs((side.middle[0] - x) * ny - (side.middle[1] - y) * nx)
+        return aside <= self.half + side.half + within * self.lean + BESIDE
+
+    def feet(self, p: Point) -> list[Foot]:
+        """Return the points of the edge where its normal passes through ``p``."""
+        edge = self.edge
+        if isinstance(edge, Line):
+            x0, y0 = edge.start
+            x1, y1 = edge.end
+            dx, dy = x1 - x0, y1 - y0
+            square = dx * dx + dy * dy
+            t = ((p[0] - x0) * dx + (p[1] - y0) * dy) / square
+            if not -1e-9 <= t <= 1 + 1e-9:
+                return []
+            length = math.sqrt(square)
+            return [Foot((x0 + t * dx, y0 + t * dy), (-dy / length, dx / length))]
+        cx, cy = edge.centre
+        r = edge.radius
+        ux, uy = p[0] - cx, p[1] - cy
+        distance = math.hypot(ux, uy)
+        if distance < 1e-12:
+            return [Foot(self.middle, left_normal(edge, self.middle))]
+        inward = -1.0 if edge.ccw else 1.0
+        mx, my = self.middle[0] - cx, self.middle[1] - cy
+        least = r * (math.cos(self.half_turn) - 1e-9)
+        feet = []
+        for sign in (1.0, -1.0):
+            vx, vy = sign * ux / distance, sign * uy / distance
+            if vx * mx + vy * my >= least:
+                feet.append(Foot((cx + r * vx, cy + r * vy), (inward * vx, inward * vy)))
+        return feet

@@ -1,17 +1,31 @@
-"""Growing and shrinking regions by a distance, arcs staying arcs."""
+"""Offsets of regions that keep arcs as arcs: growing and shrinking, and the path of a beam."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal, NamedTuple
 
-from sbafab.geometry.apart import FAR, alone, meets_itself
-from sbafab.geometry.boolean import enclosed
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, left_turn
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import remembered
-from sbafab.geometry.shapes import circle
+from sbafab.errors import GeometryError
+from sbafab.geometry.arcs import biarc, ellipse
+from sbafab.geometry.boolean import FAR, alone, meets_itself
+from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import Contour, circle
+from sbafab.geometry.edges import (
+    EPSILON,
+    Arc,
+    Edge,
+    Line,
+    Point,
+    distance_to,
+    edge_from_bulge,
+    left_turn,
+    meeting_points,
+)
+from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
+from sbafab.geometry.region import Region, enclosed, wound
 
 CUSP = 3.0
 """Radians: a path that turns by more is taken to turn back on itself."""
@@ -26,14 +40,14 @@ def grow(region: Region, distance: float) -> Region:
     return _grown(region, distance)
 
 
-@remembered
+@cached
 def _grown(region: Region, distance: float) -> Region:
     chains = [_chain(contour, distance) for contour in region.contours]
     return enclosed([chain for chain in chains if chain.edges])
 
 
 def shrink(region: Region, distance: float) -> Region:
-    """The points at least ``distance`` inside the region."""
+    """Return the points at least ``distance`` inside the region."""
     if distance < 0:
         return grow(region, -distance)
     if distance < EPSILON or region.is_empty:
@@ -41,21 +55,21 @@ def shrink(region: Region, distance: float) -> Region:
     return _shrunk(region, distance)
 
 
-@remembered
+@cached
 def _shrunk(region: Region, distance: float) -> Region:
-    # What is outside grows: the chains wind round it 0 times, or more; round what is left, -1.
+    # The outside grows: its winding number is 0 or more, that of the remaining material -1.
     outside = [contour.reversed() for contour in region.contours]
     chains = [_chain(contour, distance) for contour in outside]
     return enclosed([chain.reversed() for chain in chains if chain.edges])
 
 
 def fillet(region: Region, radius: float) -> Region:
-    """The region with every concave corner rounded to ``radius``, gaps narrower filled."""
+    """Return the region with concave corners rounded to ``radius`` and narrower gaps filled."""
     return shrink(grow(region, radius), radius)
 
 
 def _chain(contour: Contour, distance: float) -> Contour:
-    """A closed chain that winds round what the contour does, and the bands beside its edges."""
+    """A closed chain that winds round the contour's inside and the bands beside its edges."""
     if contour.circle is not None and alone(contour):
         centre, radius = contour.circle
         radius += -distance if contour.is_hole else distance
@@ -69,7 +83,7 @@ def _chain(contour: Contour, distance: float) -> Contour:
 
 
 def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
-    """The edges, those that follow each other but for a rounding by way of one point."""
+    """Yield the edges with ends that differ by a rounding made one point."""
     starts = [edge.start for edge in edges]
     for i, start in enumerate(starts):
         end = edges[i - 1].end
@@ -81,7 +95,7 @@ def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
 
 
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
-    """The edges of such a chain.
+    """Yield the edges of such a chain.
 
     The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
     round one by one, by way of the corner, or straight on where both cover the difference.
@@ -108,7 +122,7 @@ def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
 
 
 def _both_cover(before: Edge, after: Edge, distance: float) -> bool:
-    """Whether the bands of two lines both hold the triangle of a corner and the ends beside it."""
+    """True if the bands of two lines both hold the triangle of a corner and the ends beside it."""
     if not (isinstance(before, Line) and isinstance(after, Line)):
         return False
     turn = left_turn(before, after)
@@ -143,3 +157,436 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
     points = [(x + nx * distance, y + ny * distance) for nx, ny in stops]
     for start, end in pairwise(points):
         yield Arc(start, end, (x, y), distance, True)
+
+
+# Tracks of a beam's middle in closed form, their crossings, and arcs along them.
+
+
+TOLERANCE = 0.0001
+"""Farthest an arc of the path may lie from the exact curve, in mm."""
+STEP, CORNER_STEP = math.radians(15), math.radians(30)
+"""Most that one arc turns along a curve, and round a corner."""
+LEAST_ARCS = 3
+"""Fewest arcs of a curve: four points identify its circle when the kerf is undone."""
+SHORT = 1e-3
+SHARES = tuple(0.75**k for k in range(16, 0, -1))
+"""Shares of two tracks from whose ends a crossing is searched."""
+
+
+def rim(a: float, b: float, angle: float) -> Point:
+    """The point of a beam's rim (half widths ``a`` and ``b``) with this angle of its normal."""
+    x, y = math.cos(angle), math.sin(angle)
+    size = math.hypot(a * x, b * y)
+    return a * a * x / size, b * b * y / size
+
+
+class Track(NamedTuple):
+    """The source of a piece of path: an arc of ``turn`` times ``radius`` (0: a corner), or a line.
+
+    The parameter is the angle of the outward normal; along a line, the length.
+    """
+
+    beam: tuple[float, float]
+    centre: Point
+    radius: float
+    turn: int
+    line: Line | None = None
+
+    def at(self, t: float) -> Point:
+        if self.line is not None:
+            ux, uy = self.line.direction(self.line.start)
+            (x, y), (ex, ey) = self.line.start, rim(*self.beam, math.atan2(-ux, uy))
+            return x + ex + t * ux, y + ey + t * uy
+        (cx, cy), (ex, ey) = self.centre, rim(*self.beam, t)
+        r = self.turn * self.radius
+        return cx + r * math.cos(t) + ex, cy + r * math.sin(t) + ey
+
+    def bend(self, t: float) -> float:
+        """Radius of curvature of source and rim, positive to the left of the normal's turn."""
+        a, b = self.beam
+        rim_bend = (a * b) ** 2 / math.hypot(a * math.cos(t), b * math.sin(t)) ** 3
+        return self.turn * self.radius + rim_bend
+
+    def rate(self, t: float) -> Point:
+        if self.line is not None:
+            return self.line.direction(self.line.start)
+        bend = self.bend(t)
+        return -bend * math.sin(t), bend * math.cos(t)
+
+    def runs_on(self, t: float) -> bool:
+        """True if the beam moves forward; in a hollow narrower than its rim it moves back."""
+        return self.turn >= 0 or self.bend(t) < 0
+
+
+def crossing(
+    arriving: tuple[Track, float, float], leaving: tuple[Track, float, float]
+) -> tuple[float, float]:
+    """Return the parameters at which a track that ends meets one that starts.
+
+    Searched from there, and where the beam moves back there, from farther away.
+    """
+    (before, far, end), (after, start, on) = arriving, leaving
+    if before.runs_on(end) and after.runs_on(start):
+        if math.dist(before.at(end), after.at(start)) < 2 * EPSILON:
+            return end, start
+        return _met(before, end, after, start) or (end, start)
+    back, ahead = far - end, on - start
+    for share in SHARES:
+        reach = share * max(abs(back), abs(ahead))
+        met = _met(
+            before,
+            end + math.copysign(min(reach, abs(back)), back),
+            after,
+            start + math.copysign(min(reach, abs(ahead)), ahead),
+        )
+        if met and (met[0] - end) * back >= 0 and (met[1] - start) * ahead >= 0:
+            return met
+    return end, start
+
+
+def _met(before: Track, s: float, after: Track, t: float) -> tuple[float, float] | None:
+    """The parameters at which two forward tracks cross, by Newton's method from near ones."""
+    first = s, t
+    for _ in range(8):
+        (x, y), (u, v) = before.at(s), after.at(t)
+        if max(abs(s - first[0]), abs(t - first[1])) > 0.5:
+            return None
+        if math.hypot(u - x, v - y) < 1e-10:
+            return (s, t) if before.runs_on(s) and after.runs_on(t) else None
+        (px, py), (qx, qy) = before.rate(s), after.rate(t)
+        det = px * qy - py * qx
+        if abs(det) < 1e-3 * math.hypot(px, py) * math.hypot(qx, qy):
+            return None
+        s += ((u - x) * qy - (v - y) * qx) / det
+        t += ((u - x) * py - (v - y) * px) / det
+    return None
+
+
+def arcs_along(track: Track, t0: float, t1: float) -> list[Edge]:
+    """Return arcs through points of the track, as many as keep within the tolerance."""
+    step, tolerance = (STEP, TOLERANCE) if track.radius else (CORNER_STEP, TOLERANCE / 10)
+    count = max(1, math.ceil(abs(t1 - t0) / step - 1e-9))
+    if track.radius * abs(t1 - t0) > SHORT:
+        count = max(LEAST_ARCS, count)
+    return through(track.at, t0, t1, count, tolerance)
+
+
+def through(
+    curve: Callable[[float], Point], t0: float, t1: float, count: int, tolerance: float
+) -> list[Edge]:
+    """Arcs through ``count`` + 1 points of the curve, or through twice as many, and so on."""
+    while True:
+        stops = [t0 + (t1 - t0) * k / count for k in range(count + 1)]
+        points = [curve(t) for t in stops]
+        if math.dist(points[0], points[-1]) < EPSILON:
+            points[-1] = points[0]
+            if count == 1:
+                return []
+        edges = [
+            _through(p, curve((s + t) / 2), q)
+            for (s, t), (p, q) in zip(pairwise(stops), pairwise(points), strict=True)
+        ]
+        off = max(
+            distance_to(edge, curve(s + (t - s) * share))
+            for edge, (s, t) in zip(edges, pairwise(stops), strict=True)
+            for share in (0.2, 0.8)
+        )
+        if off <= tolerance or count > 1000:
+            return [edge for edge in edges if math.dist(edge.start, edge.end) > EPSILON]
+        count *= 2
+
+
+def _through(start: Point, middle: Point, end: Point) -> Edge:
+    """Return the arc from start to end through a point half way."""
+    (ax, ay), (bx, by) = (
+        (middle[0] - start[0], middle[1] - start[1]),
+        (end[0] - middle[0], end[1] - middle[1]),
+    )
+    half = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    if abs(half) * math.dist(start, end) < EPSILON / 10:
+        return Line(start, end)
+    return edge_from_bulge(start, end, math.tan(half / 2))
+
+
+# The path of a beam of some width: regions grown by half of it, contour by contour.
+#
+# A beam that is as wide along x as along y grows a region by a disc, and arcs stay arcs. One that
+# is not grows it by an ellipse: straight edges stay straight, and every other piece of the path,
+# known in closed form, is drawn through its points by arcs.
+
+
+Kerf = float | tuple[float, float]
+"""Full width of the cut, mm: the same everywhere, or measured along x and along y."""
+Fate = Literal["vanishes", "splits in parts", "runs into another"]
+
+FINE = 0.00005
+"""Farthest a stretched arc may lie off, mm; its error shifts the ends of the path's pieces."""
+SHORTEST = 4 * EPSILON
+"""An arc shorter than this is stretched as a line."""
+STRETCHED_STEP, MOST_PIECES = math.radians(30), 1000
+"""Most that two arcs turn along a stretched curve, and more of them than any curve takes."""
+SMOOTH = 1e-3
+"""Radians: a curve that turns more at once crosses itself there, or another."""
+PROJECTIONS, BEND = 3, 0.01
+"""Steps to the point of a track nearest to another; its radius (mm) where its way counts as much.
+"""
+
+
+class Lost(NamedTuple):
+    """A contour that the path does not follow exactly once, and the reason."""
+
+    contour: Contour
+    fate: Fate
+
+
+@dataclass(frozen=True)
+class BeamPath:
+    """The path, and the first contour of the region that has no single path of its own."""
+
+    region: Region
+    lost: Lost | None
+
+
+def widths(kerf: Kerf) -> tuple[float, float]:
+    """Full width along x and along y."""
+    return kerf if isinstance(kerf, tuple) else (kerf, kerf)
+
+
+def beam_path(region: Region, kerf: Kerf) -> BeamPath:
+    """The path of the beam's middle that leaves ``region``; both widths 0, or neither.
+
+    Raises GeometryError where the offset cannot be worked out.
+    """
+    a, b = (width / 2 for width in widths(kerf))
+    if a == b:
+        path = grow(region, a)
+        return BeamPath(path, _lost(region.contours, region.contours, path, a))
+    reach = max(a, b)
+    sx, sy = reach / a, reach / b
+    # Stretched so that the beam is round, in arcs a twentieth of a micrometre off the ellipses.
+    rounds = [[_stretched(edge, sx, sy) for edge in c.edges] for c in region.contours]
+    wide = Region(tuple(Contour(tuple(e for part in c for e in part)) for c in rounds))
+    grown = grow(wide, reach)
+    lost = _lost(region.contours, wide.contours, grown, reach)
+    sources = _Sources(
+        EdgeIndex(wide.edges),
+        [
+            _Source(edge, part is parts[0], part is parts[-1])
+            for contour, pieces in zip(region.contours, rounds, strict=True)
+            for edge, parts in zip(contour.edges, pieces, strict=True)
+            for part in parts
+        ],
+        (a, b),
+        reach,
+    )
+    contours = []
+    for contour in grown.contours:
+        tracks = [_track(edge, sources) for edge in contour.edges]
+        contours.append(_untangled(_drawn(contour.edges, tracks, (sx, sy))))
+    return BeamPath(Region(tuple(contours)), lost)
+
+
+class _Source(NamedTuple):
+    """The true edge of a piece of the stretched region, and whether the piece starts or ends it."""
+
+    edge: Edge
+    is_first: bool
+    is_last: bool
+
+
+class _Sources(NamedTuple):
+    """The stretched region's edges by place, and the source of each."""
+
+    near: EdgeIndex
+    of: Sequence[_Source]
+    beam: tuple[float, float]
+    reach: float
+
+
+def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
+    """Return edges within FINE of the stretched edge, without kinks, which would count as corners.
+
+    The ends are exactly those of the edge; an edge too short to turn is a line.
+    """
+    start, end = ((p[0] * sx, p[1] * sy) for p in (edge.start, edge.end))
+    if isinstance(edge, Line) or math.dist(start, end) < SHORTEST:
+        return [Line(start, end)]
+    (cx, cy), r, first, sweep = edge.centre, edge.radius, edge.start_angle, edge.sweep
+    curve = ellipse((cx * sx, cy * sy), (r * sx, 0.0), (0.0, r * sy))
+    count = math.ceil(abs(sweep) / STRETCHED_STEP)
+    while count < MOST_PIECES:
+        angles = [first + sweep * k / count for k in range(count + 1)]
+        points = [start, *(curve(t)[0] for t in angles[1:-1]), end]
+        ways = [_unit(curve(t)[1], sweep) for t in angles]
+        pieces = [
+            biarc(p, u, q, v, 0.0)
+            for (p, q), (u, v) in zip(pairwise(points), pairwise(ways), strict=True)
+        ]
+        # A biarc lies farthest from its curve at a sixth of its way and at five sixths.
+        if all(
+            pair and distance_to(pair[half], curve(s + (t - s) * share)[0]) < FINE
+            for pair, (s, t) in zip(pieces, pairwise(angles), strict=True)
+            for half, share in ((0, 1 / 6), (1, 5 / 6))
+        ):
+            return [piece for pair in pieces for piece in pair]
+        count *= 2
+    x, y = edge.start
+    raise GeometryError(f"the arc at x {x:.6f}, y {y:.6f} cannot be stretched to the kerf")
+
+
+def _unit(way: Point, sign: float) -> Point:
+    size = math.copysign(math.hypot(*way), sign)
+    return way[0] / size, way[1] / size
+
+
+def _nearest(near: EdgeIndex, p: Point, reach: float) -> int:
+    """Return the number of the edge nearest to a point ``reach`` away from them."""
+    numbers = list(near.numbers(widened((*p, *p), 1.01 * reach))) or range(len(near.edges))
+    return min(numbers, key=lambda n: (round(distance_to(near.edges[n], p), 9), n))
+
+
+def _lost(
+    originals: Sequence[Contour], stretched: Sequence[Contour], grown: Region, reach: float
+) -> Lost | None:
+    near = EdgeIndex([edge for contour in stretched for edge in contour.edges])
+    owners = [n for n, contour in enumerate(stretched) for _ in contour.edges]
+    followed = [
+        {owners[_nearest(near, edge.at(0.5), reach)] for edge in contour.edges}
+        for contour in grown.contours
+    ]
+    for number, contour in enumerate(originals):
+        paths = [sources for sources in followed if number in sources]
+        if not paths:
+            return Lost(contour, "vanishes")
+        if len(paths) > 1:
+            return Lost(contour, "splits in parts")
+        if len(paths[0]) > 1:
+            return Lost(contour, "runs into another")
+    return None
+
+
+def _track(edge: Edge, sources: _Sources) -> Track:
+    """Return the track of a piece of the stretched path, in true measure."""
+    near, reach = sources.near, sources.reach
+    if isinstance(edge, Arc) and edge.ccw and abs(edge.radius - reach) < EPSILON:
+        for number in near.numbers(widened((*edge.centre, *edge.centre), 2 * EPSILON)):
+            piece, (source, is_first, is_last) = near.edges[number], sources.of[number]
+            if is_first and math.dist(piece.start, edge.centre) < 2 * EPSILON:
+                return Track(sources.beam, source.start, 0.0, 1)
+            if is_last and math.dist(piece.end, edge.centre) < 2 * EPSILON:
+                return Track(sources.beam, source.end, 0.0, 1)
+    source = sources.of[_nearest(near, edge.at(0.5), reach)].edge
+    if isinstance(source, Line):
+        return Track(sources.beam, source.start, 0.0, 0, source)
+    return Track(sources.beam, source.centre, source.radius, 1 if source.ccw else -1)
+
+
+def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, float]) -> Contour:
+    """Return a contour of the path from its stretched image and the tracks of its edges."""
+    count = len(edges)
+    starts = [
+        i
+        for i in range(count)
+        if tracks[i] != tracks[i - 1] or abs(left_turn(edges[i - 1], edges[i])) > SMOOTH
+    ]
+    if not starts:
+        track = tracks[0]
+        start = _parameter(track, edges[0], edges[0].start, scale)
+        return Contour(tuple(arcs_along(track, start, start + track.turn * math.tau)))
+    spans: list[tuple[Track, float, float]] = []
+    for i, after in zip(starts, [*starts[1:], starts[0] + count], strict=True):
+        stretch = [edges[k % count] for k in range(i, max(after, i + 1))]
+        t0 = _parameter(tracks[i], stretch[0], stretch[0].start, scale)
+        stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, stretch, scale))
+        # Where the beam moves back from end to end, the pieces beside cross each other.
+        spans += [
+            (tracks[i], s, t)
+            for s, t in pairwise(stops)
+            if any(tracks[i].runs_on(s + share * (t - s)) for share in (0.0, 0.5, 1.0))
+        ]
+    return Contour(tuple(_joined(spans)))
+
+
+def _untangled(contour: Contour) -> Contour:
+    """The contour without loops of less than a micrometre, where tracks cross once too often."""
+    edges, count = contour.edges, len(contour.edges)
+    if not any(
+        (i - j) % count not in (1, count - 1) and meeting_points(edges[i], edges[j])
+        for i, j in close_pairs(contour.boxes, EPSILON)
+    ):
+        return contour
+    whole = wound((contour.reversed() if contour.is_hole else contour).edges, 0).contours
+    # A larger loop is no rounding: it stays, and is found when the file is read.
+    if len(whole) != 1 or abs(whole[0].area - abs(contour.area)) > EPSILON * contour.length:
+        return contour
+    return whole[0].reversed() if contour.is_hole else whole[0]
+
+
+def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:
+    """Both ends, and between them where the beam's flat side moves back and crosses itself."""
+    flat = 0.0 if track.beam[1] > track.beam[0] else math.pi / 2
+    low, high = sorted((t0, t1))
+    sides = [
+        flat + math.pi * k
+        for k in range(math.ceil((low - flat) / math.pi), math.floor((high - flat) / math.pi) + 1)
+    ]
+    back = [t for t in sides if low < t < high and not track.runs_on(t)]
+    return [t0, *sorted(back, reverse=t1 < t0), t1]
+
+
+def _parameter(track: Track, edge: Edge, p: Point, scale: tuple[float, float]) -> float:
+    sx, sy = scale
+    if track.line is not None:
+        (x0, y0), (ux, uy) = track.at(0.0), track.line.direction(track.line.start)
+        return (p[0] / sx - x0) * ux + (p[1] / sy - y0) * uy
+    ux, uy = edge.direction(p)
+    t = math.atan2(-ux * sy, uy * sx)
+    for _ in range(PROJECTIONS):
+        # The way tells the parameter, and the place more precisely where the track bends little.
+        (x, y), (rx, ry) = track.at(t), track.rate(t)
+        t += ((p[0] / sx - x) * rx + (p[1] / sy - y) * ry) / (rx * rx + ry * ry + BEND**2)
+    return t
+
+
+def _last(track: Track, t0: float, edges: Sequence[Edge], scale: tuple[float, float]) -> float:
+    """The parameter at the end of a track's edges, on from ``t0`` the way the track turns."""
+    t1 = _parameter(track, edges[-1], edges[-1].end, scale)
+    if track.line is not None:
+        return t1
+    # No edge turns by more than a half: their turns tell how often the normal has come round.
+    turn = sum(
+        math.remainder(
+            _parameter(track, e, e.end, scale) - _parameter(track, e, e.start, scale), math.tau
+        )
+        for e in edges
+    )
+    t1 += math.tau * round((t0 + turn - t1) / math.tau)
+    return t1 if (t1 - t0) * track.turn > 0 else t0
+
+
+def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
+    """Yield edges along the tracks, which end where they cross the next."""
+    starts, ends = [t0 for _, t0, _ in spans], [t1 for _, _, t1 in spans]
+    for i, span in enumerate(spans):
+        ends[i - 1], starts[i] = crossing(spans[i - 1], span)
+    visible = [
+        i
+        for i, (track, _, _) in enumerate(spans)
+        if math.dist(track.at(starts[i]), track.at(ends[i])) > EPSILON
+    ]
+    for i, following in zip(visible, [*visible[1:], *visible[:1]], strict=True):
+        track = spans[i][0]
+        start, end = track.at(starts[i]), spans[following][0].at(starts[following])
+        miss = math.dist(end, track.at(ends[i]))
+        if miss > TOLERANCE:
+            raise GeometryError(
+                f"the edges that meet at x {end[0]:.6f}, y {end[1]:.6f} miss each other by "
+                f"{miss:.6f} mm once the kerf is added; change a size there by 0.001 mm"
+            )
+        edges: list[Edge] = [Line(start, end)]
+        if track.line is None:
+            edges = arcs_along(track, starts[i], ends[i])
+        if edges:
+            edges[0] = edges[0].part(start, edges[0].end)
+            edges[-1] = edges[-1].part(edges[-1].start, end)
+            yield from edges

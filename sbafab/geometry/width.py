@@ -8,38 +8,43 @@ between corners; these are exact for lines and arcs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.geometry.boundary_side import BoundarySide, Foot
-from sbafab.geometry.corners import Corner, corners_of, pinch
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, left_normal
-from sbafab.geometry.ends import tapered_ends
-from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.kept import kept
-from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.remembered import remembered
-from sbafab.geometry.rings import across_a_ring, bound_a_ring
-from sbafab.geometry.width_bounds import may_be_narrower, widest_least
+from sbafab.geometry.cache import cached, stored
+from sbafab.geometry.contour import Contour, run_sweep
+from sbafab.geometry.edges import (
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    left_normal,
+    left_turn,
+    meeting_points,
+)
+from sbafab.geometry.nearby import ALONGSIDE, BoundarySide, EdgeIndex, Foot, widened
+from sbafab.geometry.offset import Kerf, Lost, widths
+from sbafab.geometry.region import Region
 
 if TYPE_CHECKING:
-    from sbafab.geometry.side_table import SideTable
+    from sbafab.geometry.edge_table import SideTable
 
-ALONGSIDE: Final = 1e-3
-"""Lines at a smaller angle (radians), or arcs with nearer centres (mm), run alongside."""
-SHORTER: Final = 1e-9
+SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
-ROUNDING: Final = 1e-12
-"""mm: more than what distances are rounded by."""
-TOUCH: Final = 1e-6
+ROUNDING = 1e-12
+"""mm: more than the rounding of distances."""
+TOUCH = 1e-6
 """mm within which two points are one."""
-ASIDE: Final = math.acos(0.9)
+ASIDE = math.acos(0.9)
 """Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
-SQUARE: Final = 0.05
-"""The same for edges square on each other: room for rounding, and for those alongside."""
-MANY_SIDES: Final = 100
-"""From which on looking at all pairs in arrays is worth it."""
+SQUARE = 0.05
+"""As ASIDE for edges square on each other: room for rounding, and for those alongside."""
+NOTCH = 15.0
+"""Degrees: notches sharper than this are no slots."""
+MANY_SIDES = 100
+"""Number from which comparing all pairs in arrays is faster."""
 
 
 class Width(NamedTuple):
@@ -54,9 +59,9 @@ class Width(NamedTuple):
         return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
 
 
-@remembered
+@cached
 def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
-    """The narrowest place of the material, if under ``below`` mm; None if no edge faces another.
+    """Return the narrowest place of the material below ``below`` mm; None if no edge faces another.
 
     A corner with an interior angle below ``sharp`` degrees has width 0.
     """
@@ -66,24 +71,36 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
     return least_of(boundary_of(region, sharp), below)
 
 
-@remembered
+@cached
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
-    """The narrowest slot, hole or gap between pieces, likewise."""
-    outside = [kept(one, "from_outside", Contour.reversed) for one in region.contours]
+    """Return the narrowest slot, hole or gap between pieces, likewise."""
+    outside = [stored(contour, "from_outside", Contour.reversed) for contour in region.contours]
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
+def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
+    """Return the place where a beam's path loses a contour: the slot that closes, or its middle."""
+    if lost.fate != "vanishes":
+        slot = least_gap(region, NOTCH, max(widths(kerf)))
+        if slot is not None:
+            return slot.middle
+    low_x, low_y, high_x, high_y = lost.contour.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2
+
+
 class Boundary:
-    """Contours with the material on their left, made ready for the search."""
+    """Contours with the material on their left, prepared for the search."""
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
-        self.sides = [side for one in contours for side in kept(one, "sides", _sides)]
-        self.corners = [corner for one in contours for corner in kept(one, "corners", _corners)]
+        self.sides = [side for contour in contours for side in stored(contour, "sides", _sides)]
+        self.corners = [
+            corner for contour in contours for corner in stored(contour, "corners", _corners)
+        ]
         """What corner each side starts at, if any."""
         self.ends = [
             ends
-            for one in contours
-            for ends in kept(one, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
+            for contour in contours
+            for ends in stored(contour, f"ends{sharp}", lambda c: list(tapered_ends(c, sharp)))
         ]
         self.pinch = pinch(contours, self.corners, sharp)
         self.widest_least = widest_least(contours)
@@ -97,22 +114,23 @@ class Boundary:
     @property
     def table(self) -> SideTable:
         """The sides in arrays."""
-        from sbafab.geometry.side_table import SideTable
+        # A page without a server measures widths before it has loaded numpy.
+        from sbafab.geometry.edge_table import SideTable
 
         if self._table is None:
             self._table = SideTable(self.sides)
         return self._table
 
 
-def _made_ready(region: Region, sharp: float) -> Boundary:
+def _boundary(region: Region, sharp: float) -> Boundary:
     return Boundary(region.contours, sharp)
 
 
-boundary_of = remembered(_made_ready, most=16)
+boundary_of = cached(_boundary, most=16)
 
 
 class _Narrowest:
-    """Keeps the shortest segment offered, if below a length, that no edge crosses."""
+    """The shortest segment offered, if below a length, that no edge crosses."""
 
     def __init__(self, boundary: Boundary, below: float) -> None:
         self.boundary = boundary
@@ -121,7 +139,7 @@ class _Narrowest:
 
     @property
     def most(self) -> float:
-        """Longer ones are not kept, mm."""
+        """Length in mm from which segments are ignored."""
         return self.value - SHORTER
 
     def offer(self, p: Point, q: Point) -> None:
@@ -145,17 +163,17 @@ class _Narrowest:
         after: int = -1,
         among: Sequence[int] | None = None,
     ) -> list[tuple[int, BoundarySide]]:
-        """Numbered sides that a segment shorter than the best could join to ``a``.
+        """Return numbered sides that a segment shorter than the best could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
-        ``after`` this one. ``among``: no others come into question.
+        ``after`` this one. ``among`` limits the candidates.
         """
         nx, ny = a.normal
         turn = a.half_turn + aside
         sides, index = self.boundary.sides, self.boundary.index
         straight = -math.cos(turn)
         box = widened(a.box, self.value)
-        found = []
+        numbers = []
         for number in index.among(box, index.about(box, after) if among is None else among):
             if number <= after:
                 continue
@@ -165,8 +183,8 @@ class _Narrowest:
             if room > math.pi or nx * mx + ny * my < (
                 -math.cos(room) if side.half_turn else straight
             ):
-                found.append(number)
-        return [(number, sides[number]) for number in index.in_order(box, found)]
+                numbers.append(number)
+        return [(number, sides[number]) for number in index.in_order(box, numbers)]
 
     def corners_near(self, a: Corner, after: int) -> Iterator[Corner]:
         """Yield later corners, numbered above ``after``, that a shorter segment may reach."""
@@ -178,10 +196,10 @@ class _Narrowest:
                 yield corner
 
     def is_clear(self, p: Point, q: Point) -> bool:
-        known = self.boundary.known_clear
-        if (p, q) not in known:
-            known[p, q] = self._is_clear(p, q)
-        return known[p, q]
+        cache = self.boundary.known_clear
+        if (p, q) not in cache:
+            cache[p, q] = self._is_clear(p, q)
+        return cache[p, q]
 
     def _is_clear(self, p: Point, q: Point) -> bool:
         segment = Line(p, q)
@@ -194,7 +212,7 @@ class _Narrowest:
 
 
 class Gathered(_Narrowest):
-    """Keeps the ends of every segment offered that is short enough, whatever crosses it."""
+    """The ends of every segment offered that is short enough, crossed by edges or not."""
 
     def __init__(self, boundary: Boundary, below: float) -> None:
         super().__init__(boundary, below)
@@ -212,7 +230,7 @@ class Gathered(_Narrowest):
 def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
-    # Most edges lie far apart: those are looked at only where no near ones face.
+    # Most edges lie far apart: far pairs are searched only where no near ones face.
     reach = min(boundary.index.cell, boundary.widest_least + 2 * SHORTER)
     farthest = min(below, 2 * boundary.index.across)
     while True:
@@ -224,7 +242,7 @@ def least_of(boundary: Boundary, below: float) -> Width | None:
 
 
 def search(narrowest: _Narrowest) -> None:
-    """Offers every place where edges or corners face each other."""
+    """Offer every place where edges or corners face each other."""
     boundary = narrowest.boundary
     later: Sequence[Sequence[int] | None] = [None] * len(boundary.sides)
     if len(boundary.sides) >= MANY_SIDES:
@@ -250,7 +268,7 @@ def _corners(contour: Contour) -> list[Corner | None]:
 
 def _side(edge: Edge, box: Bounds) -> BoundarySide:
     if isinstance(edge, Arc):
-        # As ``at`` says, which would work out the sweep once more.
+        # As ``at`` computes it, without computing the sweep again.
         sweep = edge.sweep
         middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
     else:
@@ -271,12 +289,12 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
             (cx, cy) = a.edge.centre
             for foot in b.feet(a.edge.centre):
                 (nx, ny) = foot.normal
-                for other in a.feet((cx + nx, cy + ny)):
-                    narrowest.offer_facing(foot, other)
+                for opposite in a.feet((cx + nx, cy + ny)):
+                    narrowest.offer_facing(foot, opposite)
         elif math.dist(origin, a.edge.centre) > 1e-9:
             for foot in a.feet(origin):
-                for other in b.feet(a.edge.centre):
-                    narrowest.offer_facing(foot, other)
+                for opposite in b.feet(a.edge.centre):
+                    narrowest.offer_facing(foot, opposite)
     elif isinstance(b.edge, Arc):
         _between_edges(b, a, narrowest)
     elif _alongside(a.edge, b.edge):
@@ -284,7 +302,7 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
 
 
 def _lie_farther(a: Edge, b: Edge, than: float) -> bool:
-    """Whether two arcs surely lie farther apart than so many mm, for their circles do."""
+    """Return True if two arcs surely lie farther apart than so many mm, as their circles do."""
     if not (isinstance(a, Arc) and isinstance(b, Arc)):
         return False
     gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
@@ -305,7 +323,7 @@ def _alongside(a: Edge, b: Edge) -> bool:
 
 
 def _may_face(a: Arc, b: Edge, within: float) -> bool:
-    """Whether two arcs of nearly one centre may face each other no farther off than ``within``.
+    """Return True if two arcs of nearly one centre may face each other within a distance.
 
     Material lies across a disc or in a ring, and nowhere between the edges of two holes.
     """
@@ -325,10 +343,10 @@ def _along_each_other(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -
         for p, q in across_a_ring(a, b):
             narrowest.offer(p, q)
         return
-    for one, other in ((a, b), (b, a)):
-        for p in (one.middle, one.edge.start, one.edge.end):
-            here = Foot(p, left_normal(one.edge, p))
-            for foot in other.feet(p):
+    for near, far in ((a, b), (b, a)):
+        for p in (near.middle, near.edge.start, near.edge.end):
+            here = Foot(p, left_normal(near.edge, p))
+            for foot in far.feet(p):
                 narrowest.offer_facing(here, foot)
 
 
@@ -343,9 +361,9 @@ def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None
                 _corner_to_edge(corner, side, foot, narrowest)
         if corner.turn < 0:
             # The edges of a corner that faces another one need not face it.
-            for other in narrowest.corners_near(corner, i):
-                if other.turn < 0:
-                    _between_corners(corner, other, narrowest)
+            for facing in narrowest.corners_near(corner, i):
+                if facing.turn < 0:
+                    _between_corners(corner, facing, narrowest)
 
 
 def _between_corners(a: Corner, b: Corner, narrowest: _Narrowest) -> None:
@@ -371,3 +389,249 @@ def _corner_to_edge(corner: Corner, side: BoundarySide, foot: Foot, narrowest: _
 
 def _dot(a: Point, b: Point) -> float:
     return a[0] * b[0] + a[1] * b[1]
+
+
+# Corners of contours.
+
+
+class Corner:
+    """A vertex with the directions of travel into and out of it; ``turn`` > 0 is convex.
+
+    ``normal`` is the unit vector halfway between the normals of the two edges.
+    """
+
+    __slots__ = ("arriving", "box", "half_turn", "leaving", "normal", "point", "turn")
+
+    def __init__(self, point: Point, arriving: Point, leaving: Point, turn: float) -> None:
+        self.point = point
+        self.arriving = arriving
+        self.leaving = leaving
+        self.turn = turn
+        self.half_turn = abs(turn) / 2
+        self.box = (point[0], point[1], point[0], point[1])
+        ux, uy = arriving
+        half = turn / 2
+        c, s = math.cos(half), math.sin(half)
+        self.normal = (-ux * s - uy * c, ux * c - uy * s)
+
+    def squarely(self, d: Point) -> bool:
+        """True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
+        room = 1e-9 * math.hypot(*d)
+        return _dot(d, self.arriving) >= -room and _dot(d, self.leaving) <= room
+
+    def normals(self) -> tuple[Point, Point]:
+        return _turned_left(self.arriving), _turned_left(self.leaving)
+
+
+def corners_of(contour: Contour) -> Iterator[Corner | None]:
+    """Yield the corner that each edge starts at; None where the path is smooth."""
+    edges = contour.edges
+    for before, after in zip((edges[-1], *edges), edges, strict=False):
+        u, v = before.direction(after.start), after.direction(after.start)
+        turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
+        if abs(turn) > math.pi - SMOOTH:
+            # At a cusp the side of the material follows from the curvatures alone.
+            turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
+        yield Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
+
+
+def pinch(
+    contours: Iterable[Contour], corners: Iterable[Corner | None], sharp: float
+) -> Point | None:
+    """Return a corner sharper than allowed, or a point where the boundary meets itself, if any."""
+    for corner in corners:
+        if corner is not None and math.degrees(math.pi - corner.turn) < sharp - ROUNDED:
+            return corner.point
+    starts: set[Point] = set()
+    for contour in contours:
+        for edge in contour.edges:
+            if edge.start in starts:
+                return edge.start
+            starts.add(edge.start)
+    return None
+
+
+def _curvature(edge: Edge) -> float:
+    if isinstance(edge, Line):
+        return 0.0
+    return (1.0 if edge.ccw else -1.0) / edge.radius
+
+
+def _turned_left(u: Point) -> Point:
+    return -u[1], u[0]
+
+
+# Ends of tapered arms: nothing stands square on both sides there, yet they are narrow.
+#
+# An end lies between two flanks that come together towards it: a rounded corner, or an edge between
+# two bends, each a corner or its fillet. It is as wide as its flanks are apart where they stop.
+
+
+SMOOTH = 1e-4
+"""Corners that turn by less, in radians, are none."""
+TAPER = 30.0
+"""Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
+LEAST_TURN = math.pi - math.radians(TAPER + 1)
+ROUNDED = 0.1
+"""Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
+
+
+class _Run:
+    """Consecutive edges on one line or circle, and their turn (radians, left positive)."""
+
+    __slots__ = ("first", "last", "radius", "sweep")
+
+    def __init__(self, first: Edge, last: Edge, sweep: float) -> None:
+        self.first = first
+        self.last = last
+        self.sweep = sweep
+        self.radius = first.radius if isinstance(first, Arc) else math.inf
+
+    def corner(self, after: _Run) -> float:
+        """Return the turn of the path from this run to the next."""
+        return left_turn(self.last, after.first)
+
+    def is_fillet(self, bottom: _Run) -> bool:
+        """Return True if it rounds a corner of the run beside it, which turns less tightly."""
+        return self.sweep > 0 and (bottom.sweep <= 0 or self.radius < bottom.radius)
+
+
+def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]]:
+    """Yield the ends of the flanks of every tapered end in a contour with the arm on its left.
+
+    A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
+    """
+    runs = [_Run(edges[0], edges[-1], run_sweep(edges)) for edges in contour.runs]
+    corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
+    # No end where the path can not turn far enough from the run before to the one after.
+    most = [abs(run.sweep) + abs(corner) for run, corner in zip(runs, corners, strict=True)]
+    ahead = [*range(1, len(runs)), 0]
+    for i, run in enumerate(runs):
+        turns = most[i - 1] + most[i] + most[ahead[i]] + abs(corners[ahead[ahead[i]]])
+        if turns < LEAST_TURN:
+            continue
+        before, after = runs[i - 1], runs[(i + 1) % len(runs)]
+        into, out = corners[i], corners[(i + 1) % len(runs)]
+        # A round end that turns further is wider than between its flanks.
+        if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
+            yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp - ROUNDED))
+        start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
+        stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
+        if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
+            yield from _between_flanks(runs, corners, start, stop, TAPER)
+
+
+def _between_flanks(
+    runs: Sequence[_Run], corners: Sequence[float], start: int, stop: int, taper: float
+) -> Iterator[tuple[Point, Point]]:
+    """Yield the ends of the path along runs ``start`` to ``stop``, if it turns back between flanks.
+
+    ``corners``: the turn into each run.
+    """
+    if stop - start + 3 > len(runs):
+        return
+    count = len(runs)
+    turn: float = sum([runs[i % count].sweep for i in range(start, stop + 1)])
+    turn += sum([corners[i % count] for i in range(start, stop + 2)])
+    if abs(turn - math.pi) < math.radians(taper):
+        yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end
+
+
+# Concentric arcs with material between them, where no search is needed.
+
+
+WIDE = 1e-5
+"""mm: in narrower rings rounding may decide which edges face each other."""
+
+
+def bound_a_ring(a: Edge, b: Edge) -> bool:
+    """True if two edges are concentric arcs with a ring between, the outer counter-clockwise."""
+    if not (isinstance(a, Arc) and isinstance(b, Arc)) or a.ccw == b.ccw or a.centre != b.centre:
+        return False
+    return (a.radius - b.radius if a.ccw else b.radius - a.radius) > WIDE
+
+
+def across_a_ring(a: BoundarySide, b: BoundarySide) -> list[tuple[Point, Point]]:
+    """Return segments across a ring from the middle and ends of each of its two arcs."""
+    segments: list[tuple[Point, Point]] = []
+    for near, far in ((a, b), (b, a)):
+        arc = far.edge
+        assert isinstance(arc, Arc)
+        cx, cy = arc.centre
+        r = arc.radius
+        mx, my = far.middle[0] - cx, far.middle[1] - cy
+        least = r * (math.cos(far.half_turn) - 1e-9)
+        for p in (near.middle, near.edge.start, near.edge.end):
+            ux, uy = p[0] - cx, p[1] - cy
+            distance = math.hypot(ux, uy)
+            vx, vy = ux / distance, uy / distance
+            if vx * mx + vy * my >= least:
+                segments.append((p, (cx + r * vx, cy + r * vy)))
+    return segments
+
+
+# Bounds of widths before a search, from circles and the boxes of contours, which have the material
+# on their left.
+
+
+MANY_CIRCLES = 24
+"""Number from which comparing all pairs costs more than it saves."""
+
+
+def widest_least(contours: Sequence[Contour]) -> float:
+    """Return an upper bound of the least width, mm, from gaps between circles and across them.
+
+    Infinite if there are no circles.
+    """
+    circles = [(*p.circle, p.is_hole) for p in contours if p.circle is not None]
+    least = min((2 * radius for _, radius, is_hole in circles if not is_hole), default=math.inf)
+    if len(circles) > MANY_CIRCLES:
+        return least
+    for (p, r, p_is_hole), (q, s, q_is_hole) in combinations(circles, 2):
+        gap = math.dist(p, q)
+        if p_is_hole and q_is_hole:
+            width = gap - r - s
+        elif p_is_hole != q_is_hole:
+            width = (s - r if p_is_hole else r - s) - gap
+        else:
+            continue
+        if 0 < width < least:
+            least = width
+    return least
+
+
+def may_be_narrower(contours: Sequence[Contour], than: float) -> Sequence[Contour]:
+    """Return the contours without circles that are as wide, and stay as far from all others.
+
+    No width below ``than`` mm begins, ends or is crossed there.
+    """
+    if math.isinf(than):
+        return contours
+    return [
+        contour
+        for contour in contours
+        if contour.circle is None
+        or (not contour.is_hole and 2 * contour.circle[1] < than)
+        or _has_near(contour, contours, than)
+    ]
+
+
+def _has_near(contour: Contour, contours: Sequence[Contour], reach: float) -> bool:
+    """Return True if another contour may come within ``reach`` of this circle."""
+    assert contour.circle is not None
+    centre, r = contour.circle
+    low_x, low_y, high_x, high_y = widened(contour.bounds, reach)
+    for neighbour in contours:
+        if neighbour is contour:
+            continue
+        if neighbour.circle is not None:
+            there, s = neighbour.circle
+            gap = math.dist(centre, there)
+            if max(gap - r - s, abs(r - s) - gap) < reach:
+                return True
+        elif any(
+            box[0] <= high_x and box[2] >= low_x and box[1] <= high_y and box[3] >= low_y
+            for box in neighbour.boxes
+        ):
+            return True
+    return False

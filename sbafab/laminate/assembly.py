@@ -1,7 +1,7 @@
-"""How a laminate is put together: which stacks are laid on each other in which step, on which pins.
+"""Assembly steps: the stacks laid on each other in each closing of the press, and its pins.
 
-The paper's four steps (Sec. 2), less those that have nothing to press. Ears register layers in the
-full bonds too: there a flash bond on the pins comes first, and the full bond after it without them.
+The paper's four steps (Sec. 2) without those that have nothing to press. Ears register layers in
+the full bonds too: a flash bond on the pins comes first, and the full bond after it without them.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from sbafab.geometry.cache import stored
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 
 BondState = Literal["flash", "full"]
@@ -41,7 +42,7 @@ class AssemblyStep:
 
 
 def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
-    """The steps of a laminate, bottom balloon first.
+    """Return the steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
@@ -49,23 +50,18 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In registered
     sheets the pins, which stand in the frame, are in every time.
     """
-    # Kept with the laminate: pins, rules, schedule and every page ask for its steps.
-    kept = laminate.__dict__
-    if "_steps" not in kept:
-        kept["_steps"] = _steps(laminate)
-    steps: tuple[AssemblyStep, ...] = kept["_steps"]
-    return steps
+    return stored(laminate, "_steps", _steps)
 
 
 def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     plans = [plan for plan in _plans(laminate) if plan.adds]
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
-        plans = [one for plan in plans for one in _tacked(plan)]
+        plans = [step for plan in plans for step in _tacked(plan)]
     return tuple(_step(number, plan, laminate) for number, plan in enumerate(plans, 1))
 
 
 class _Plan(NamedTuple):
-    """A step before it has its number and pins."""
+    """A step without its number and pins."""
 
     name: StepName
     bond: BondState
@@ -133,23 +129,23 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
 
 
 def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:
-    """Return True where a hand places a layer, or an earlier stack, that no pin of the step holds.
+    """Return True if a layer, or an earlier stack, is placed by hand, without a pin that holds it.
 
     One whole stack that is laid down again is aligned with nothing.
     """
     pins = set(step.pins)
     for stack in step.stacks if step.adds else ():
-        held = [
+        is_pinned = [
             not pins.isdisjoint(laminate.pins_holding(layer))
             for layer in distinct_layers(laminate, stack)
         ]
-        if not (any(held) if set(stack).isdisjoint(step.adds) else all(held)):
+        if not (any(is_pinned) if set(stack).isdisjoint(step.adds) else all(is_pinned)):
             return True
     return False
 
 
 def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
-    """By layer index: the pins that hold the layer in the step that adds it.
+    """Return, by layer index, the pins that hold the layer in the step that adds it.
 
     A hole that fits a pin does not hold a layer where the pin is out.
     """
@@ -164,7 +160,7 @@ def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
 
 
 def stack_count(laminate: Laminate, layers: Sequence[int]) -> int:
-    """How many stacks the layers make beside each other: as few as any layer has pieces."""
+    """Return the number of stacks beside each other: the least number of pieces of any layer."""
     return min(len(layer.profile.pieces) for layer in distinct_layers(laminate, layers))
 
 

@@ -1,4 +1,4 @@
-"""The base plate's holes: their fit with dowel pins, and how true a machine places them.
+"""The base plate's holes: their fit with dowel pins, and the machines' position errors.
 
 Deviations are those of ISO 286-2 in mm (the standard was not opened; two suppliers' tables agree on
 m6, and H7 is grade IT7 above the nominal size).
@@ -16,14 +16,14 @@ M6 = ((3.0, 0.002, 0.008), (6.0, 0.004, 0.012), (10.0, 0.006, 0.015), (18.0, 0.0
 H7 = ((3.0, 0.010), (6.0, 0.012), (10.0, 0.015), (18.0, 0.018))
 """Upper deviation of a hole reamed H7, up to each diameter; the lower one is 0."""
 LAPPED_PLAY = 0.002
-"""mm that a pin has at most in a hole that is lapped to it: ours, what a hand no longer feels."""
+"""Greatest play in mm of a pin in a hole lapped to it: our estimate, hardly felt by hand."""
 
 
-class Making(NamedTuple):
-    """How a machine makes the plate's holes.
+class HoleProcess(NamedTuple):
+    """A machine's way of making the plate's holes.
 
-    ``position`` is the most by which a hole lies off its place, mm, in any direction; ``is_lapped``
-    tells holes that are lapped each to its own pin from holes reamed H7.
+    ``position`` is the greatest distance of a hole from its place, mm, in any direction;
+    ``is_lapped``: each hole is lapped to its own pin, else reamed H7.
     """
 
     words: str
@@ -31,10 +31,10 @@ class Making(NamedTuple):
     is_lapped: bool
 
 
-MAKINGS: Mapping[PlateMachine, Making] = {
-    "jig-borer": Making("a jig borer", 0.003, True),
-    "cnc-mill": Making("a CNC mill", 0.025, False),
-    "drill-press": Making("a drill press, marked out by hand", 0.2, False),
+HOLE_PROCESSES: Mapping[PlateMachine, HoleProcess] = {
+    "jig-borer": HoleProcess("a jig borer", 0.003, True),
+    "cnc-mill": HoleProcess("a CNC mill", 0.025, False),
+    "drill-press": HoleProcess("a drill press, marked out by hand", 0.2, False),
 }
 """Positions: a jig borer 0.003 and a hole marked out by hand 0.2 (a maker's guide to drilled and
 reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 in, what two shops
@@ -53,23 +53,23 @@ def hole_deviation(diameter: float) -> float:
 
 def most_play(diameter: float, machine: PlateMachine) -> float:
     """Return the most by which a plate's hole is wider than its pin, mm in diameter."""
-    if MAKINGS[machine].is_lapped:
+    if HOLE_PROCESSES[machine].is_lapped:
         return LAPPED_PLAY
     return round(hole_deviation(diameter) - pin_deviations(diameter)[0], 6)
 
 
 def pin_error(diameter: float, machine: PlateMachine) -> float:
-    """Return the most by which a pin stands off its place, mm: the hole's place and half its play.
+    """Return the greatest position error of a pin, mm: that of its hole and half the play.
 
     A jig borer's 0.003 + 0.002 / 2 is the 0.004 that the paper gives for its dowel pins (Sec. 2).
     """
-    return round(MAKINGS[machine].position + most_play(diameter, machine) / 2, 6)
+    return round(HOLE_PROCESSES[machine].position + most_play(diameter, machine) / 2, 6)
 
 
 def lone_pin_error(diameter: float, machine: PlateMachine) -> float:
-    """Return the same of a plate's only pin, mm: wherever it stands, all layers hang on it alike.
+    """Return the greatest position error of a plate's only pin, mm, which moves all layers alike.
 
-    What is left is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 once more.
+    It is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 once more.
     """
     reamed = round((hole_deviation(diameter) - pin_deviations(diameter)[0]) / 2, 6)
     return min(pin_error(diameter, machine), reamed)

@@ -1,19 +1,19 @@
-"""The films a laminate is made of."""
+"""Films: their properties, order in lists, and colours in pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
 
 Material = str
-"""What files, sheets and lists call a film: "TPE", "PTFE", or a further one's name in capitals."""
+"""Name of a film in files, sheets and lists: "TPE", "PTFE", or another in capitals."""
 FilmKind = Literal["structural", "mask"]
 """A structural film bonds where it touches another; nothing bonds to a mask."""
 FIRST: tuple[Material, ...] = ("TPE", "PTFE")
-"""The films that every design knows; lists begin with them."""
+"""The films of every design; lists begin with them."""
 PTFE_WARNING = (
     "Extract the fumes: hot PTFE gives off toxic COF2 and HF. Cut it with a laser only on a "
     "machine whose owner permits PTFE, or use a drag knife."
@@ -25,19 +25,18 @@ PAPER_TPE = (10.0, 0.2)
 PAPER_PRODUCT, PAPER_THICKNESS = "Stretchlon 200", 0.038
 """The film that the paper bonded, and its thickness in mm (Sec. 2)."""
 GAUGE = 0.1
-"""Share by which a film's thickness may differ from the one named: what films are sold to, ours."""
+"""Tolerance of a film's thickness, as a share: our estimate of what is sold."""
 
 
 @dataclass(frozen=True)
 class Film:
     """A film as it comes off the roll.
 
-    ``thickness`` mm, ``density`` kg/m3 (None where it is not known). ``softens_above`` is the
-    temperature in C at which the film bonds: the melting point of a TPE, None where it is not known
-    or where it ``stays_solid`` in the press and bonds to what melts on it. ``limit`` is the one in
-    C that it must not exceed. ``shade`` counts the films of a kind, for colours; ``warning`` is
-    what its cut files say; ``elastic`` are Young's modulus in MPa and Poisson's ratio, None where
-    one of them is not known.
+    ``thickness`` mm, ``density`` kg/m3 (None if unknown). ``softens_above`` is the temperature in C
+    at which the film bonds: the melting point of a TPE, None if unknown or if it ``stays_solid`` in
+    the press and bonds to a film that melts on it. ``limit`` is the highest temperature allowed, C.
+    ``shade`` counts the films of a kind, for colours; ``warning`` is written into its cut files;
+    ``elastic`` are Young's modulus in MPa and Poisson's ratio, None if one of them is unknown.
     """
 
     material: Material
@@ -63,25 +62,25 @@ class Film:
         return film_name(self.product, self.thickness)
 
     def is_a(self, product: str, thickness: float) -> bool:
-        """Return True for this product of this thickness in mm, as far as films keep theirs."""
+        """Return True for this product of this thickness in mm, within the films' tolerance."""
         return self.product == product and abs(self.thickness - thickness) <= GAUGE * thickness
 
     @property
     def is_the_papers(self) -> bool:
-        """True for the film whose actuators the paper measured, as thick and as stiff."""
+        """True for the film of the actuators that the paper measured, as thick and as stiff."""
         return self.is_a(PAPER_PRODUCT, PAPER_THICKNESS) and self.elastic == PAPER_TPE
 
     @property
     def is_mask(self) -> bool:
-        """Whether nothing bonds to it."""
+        """True if nothing bonds to it."""
         return self.kind == "mask"
 
 
-def density_of(film: Film, what: str = "the mass") -> float:
-    """Return a film's density in kg/m3, which ``what`` needs. Raises DesignError if not known."""
+def density_of(film: Film, purpose: str = "the mass") -> float:
+    """A film's density in kg/m3. Raises DesignError, which names the purpose, if it is unknown."""
     if film.density is None:
         raise DesignError(
-            f"{what} needs the density of {film.material}, {film.product}; add "
+            f"{purpose} needs the density of {film.material}, {film.product}; add "
             f"{film.table}.density, in kg/m3"
         )
     return film.density
@@ -92,15 +91,13 @@ def film_name(product: str, thickness: float) -> str:
     return f"{product}, {thickness:g} mm"
 
 
-def unstated(films: Iterable[Film], stated: Iterable[tuple[str, float]]) -> list[Film]:
-    """Return the structural films, each once, that are none of the ``stated``: products and
-    thicknesses (mm) that a number was stated for.
-    """
-    known = tuple(stated)
+def unstated(films: Iterable[Film], products: Iterable[tuple[str, float]]) -> list[Film]:
+    """The structural films, each once, that are none of the products of given thickness (mm)."""
+    pairs = tuple(products)
     return [
         film
         for film in dict.fromkeys(films)
-        if not film.is_mask and not any(film.is_a(*one) for one in known)
+        if not film.is_mask and not any(film.is_a(*pair) for pair in pairs)
     ]
 
 
@@ -108,3 +105,34 @@ def in_order(materials: Iterable[Material]) -> list[Material]:
     """Every material once: TPE, PTFE, then the others by name."""
     rank = {material: place for place, material in enumerate(FIRST)}
     return sorted(set(materials), key=lambda name: (rank.get(name, len(FIRST)), name))
+
+
+# Colours of films, the same in every picture and on every page.
+
+
+class Ink(NamedTuple):
+    """Fill and line colour of a film."""
+
+    fill: str
+    line: str
+
+
+# Blue against orange: distinct in every common colour blindness, and in grey by lightness.
+# Further films have other hues; masks stay light, and pictures hatch them.
+STRUCTURAL = (
+    Ink("#a9cfea", "#0b4f86"),
+    Ink("#8fd0b5", "#0b6b4b"),
+    Ink("#c9b8e6", "#54308f"),
+    Ink("#b9c2cc", "#3c4650"),
+)
+MASKS = (
+    Ink("#fbe3bd", "#b35a00"),
+    Ink("#f8cfd4", "#a3213a"),
+    Ink("#ecebae", "#6f6a00"),
+)
+
+
+def ink(film: Film) -> Ink:
+    """The colours of a film; the fifth of a kind begins again with the first one's."""
+    inks = MASKS if film.is_mask else STRUCTURAL
+    return inks[film.shade % len(inks)]

@@ -7,22 +7,107 @@ the origin lies on the actuator's axis, z points up from the press plate.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, get_args
 
+from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.once import once
-from sbafab.geometry.region import Region
-from sbafab.laminate.films import Film, in_order
-from sbafab.laminate.interfaces import Interface, InterfaceKind, interface_regions
-from sbafab.laminate.panel import SheetPanel
+from sbafab.geometry.region import Region, coord, divided, path_data, union
+from sbafab.laminate.films import Film, density_of, in_order, ink
+from sbafab.markup import escape
+from sbafab.notebook import table_html
+
+# Registered sheets: whole films on corner pins that hold several copies until a second cut.
+#
+# Of every layer the first cut leaves one sheet. Films hold their parts by bridges, mask sheets
+# hold theirs by the transfer film they lie on. All stacked and pressed, the second cut takes a
+# slot out of every bridge and so frees the actuators. Lengths mm, in the frame of the first copy.
+
+
+@dataclass(frozen=True)
+class SheetPanel:
+    """The registered sheets of a laminate, pressed together as a batch.
+
+    ``places`` are the axes of the copies, the first at the origin; ``sheets`` each layer after the
+    first cut, bottom to top and seen from above; ``second`` all slots of the second cut; ``window``
+    the room that every film sheet leaves round one copy; ``batches`` the number of such panels that
+    make all copies.
+    """
+
+    outline: Region
+    places: tuple[Point, ...]
+    sheets: tuple[Region, ...]
+    second: Region
+    fiducials: tuple[Point, ...]
+    fiducial_diameter: float
+    window: Region
+    batches: int
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and length of a sheet."""
+        low_x, low_y, high_x, high_y = self.outline.bounds
+        return high_x - low_x, high_y - low_y
+
+    def holds(self, p: Point, place: Point) -> bool:
+        """Return True if a point of a sheet lies in the window of the copy at ``place``."""
+        return self.window.contains((p[0] - place[0], p[1] - place[1]))
+
+
+@dataclass(frozen=True)
+class Freed:
+    """A sheet after the second cut: ``parts`` of each copy in its own frame, frame and crumbs.
+
+    A part that is not cut free is part of the ``frame``, and missing.
+    """
+
+    frame: Region
+    parts: tuple[Region, ...]
+    crumbs: tuple[Region, ...] = field(default=())
+
+
+def freed(panel: SheetPanel, layer: Layer) -> Freed:
+    """Return the pieces into which the sheet of a layer falls.
+
+    Mask sheets fall apart in the first cut; the second cut takes nothing of a mask's parts.
+    """
+    cut = Region() if layer.is_mask else panel.second
+    return _freed(panel.sheets[layer.index - 1], cut, panel)
+
+
+@lru_cache(maxsize=64)
+def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
+    places = panel.places
+    pieces = (sheet - cut).pieces if not cut.is_empty else sheet.pieces
+    if not pieces:
+        return Freed(Region(), tuple(Region() for _ in places))
+    frame = max(pieces, key=lambda piece: Region(piece.outers).area)
+    pieces_of_copies: list[list[Region]] = [[] for _ in places]
+    crumbs = []
+    for piece in pieces:
+        if piece is frame:
+            continue
+        p = piece.outers[0].edges[0].at(0.5)
+        home = next((i for i, place in enumerate(places) if panel.holds(p, place)), None)
+        if home is None:
+            crumbs.append(piece)
+        else:
+            x, y = places[home]
+            pieces_of_copies[home].append(piece.moved(-x, -y))
+    parts = tuple(
+        Region(tuple(c for piece in copy for c in piece.contours)) for copy in pieces_of_copies
+    )
+    return Freed(frame, parts, tuple(crumbs))
+
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
 LOOSE = 0.2
-"""mm by which a hole may miss its pin in place or diameter and still be the pin's."""
+"""Tolerance in mm of place and diameter within which a hole belongs to a pin."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,7 +116,7 @@ class Layer:
 
     ``index`` counts from 1 at the bottom; ``balloon`` likewise (None for a sheet and its mask);
     ``z`` is the height of the layer's lower face with every film at its nominal thickness.
-    ``pieces`` is how many separate parts the role asks for. ``pattern`` names the shape: equal
+    ``pieces`` is the number of separate parts of its role. ``pattern`` names the shape: equal
     profiles of one material share it.
     """
 
@@ -54,12 +139,10 @@ class Layer:
 
     @property
     def is_mask(self) -> bool:
-        """Whether nothing bonds to it."""
+        """True if nothing bonds to it."""
         return self.film.is_mask
 
     def _repr_html_(self) -> str:
-        from sbafab.laminate.picture import layer_html
-
         return layer_html(self)
 
 
@@ -89,7 +172,7 @@ class Chamber:
 
 @dataclass(frozen=True)
 class Inlet:
-    """Where the tube of a chamber goes in: the strip's mouth at the tab's end.
+    """The mouth of a chamber's inlet strip at the tab's end, where its tube goes in.
 
     ``mouth`` is the middle of the tab's end, ``direction`` the unit vector outward, ``length``
     the straight run of the strip inward from the mouth, ``width`` the strip's, ``tube_diameter``
@@ -125,13 +208,13 @@ class Pin:
 
 @dataclass(frozen=True, repr=False)
 class Laminate:
-    """A stack of layers, bottom to top, with what the layers alone do not tell.
+    """A stack of layers, bottom to top, with its chambers, inlets and pins.
 
-    ``outline`` is that of the films of all balloons laid over each other, without inlet tabs and
-    ears; empty where only the layers are known. ``pins_in_full_bonds``: whether the pins of ears
-    stay in while TPE melts. ``panel``: the registered sheets that it is made in, if it is.
-    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if it is; ``lumen``
-    that of the channel through all layers, mm.
+    ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty where
+    only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
+    ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
+    the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
+    layers, mm.
     """
 
     name: str
@@ -153,11 +236,11 @@ class Laminate:
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
 
-    @once
+    @cached_attribute
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
-        known: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
-        found: list[Interface] = []
+        regions: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
+        interfaces: list[Interface] = []
         below: Layer | None = None
         masks: list[Layer] = []
         for layer in self.layers:
@@ -166,15 +249,17 @@ class Laminate:
                 continue
             if below is not None:
                 key = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
-                if key not in known:
-                    known[key] = interface_regions(
+                if key not in regions:
+                    regions[key] = interface_regions(
                         below.profile, layer.profile, [mask.profile for mask in masks]
                     )
-                found.append(Interface.between(len(found) + 1, below, layer, masks, known[key]))
+                interfaces.append(
+                    Interface.between(len(interfaces) + 1, below, layer, masks, regions[key])
+                )
             below, masks = layer, []
-        return tuple(found)
+        return tuple(interfaces)
 
-    @once
+    @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:
         """The layers that bond: all of structural films, TPE or further ones."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
@@ -184,7 +269,7 @@ class Laminate:
         """The materials of the films that bond, in words."""
         return ", ".join(in_order(layer.film.material for layer in self.tpe_layers))
 
-    @once
+    @cached_attribute
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
         """The layers of every distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
@@ -198,7 +283,7 @@ class Laminate:
         top = self.layers[-1]
         return top.z + top.film.thickness
 
-    @once
+    @cached_attribute
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y of all layers, mm."""
         boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
@@ -214,7 +299,7 @@ class Laminate:
         return self.layers[index - 1]
 
     def first_cut(self, layer: Layer) -> Region:
-        """What the cut file of a layer cuts: its profile, or its registered sheet.
+        """Return the region in a layer's cut file: its profile, or its registered sheet.
 
         A mask sheet is laid face down, so it is cut turned over.
         """
@@ -242,20 +327,199 @@ class Laminate:
         )
 
     def _repr_html_(self) -> str:
-        from sbafab.laminate.picture import laminate_html
-
         return laminate_html(self)
 
 
-__all__ = [
-    "Bore",
-    "Chamber",
-    "Inlet",
-    "Interface",
-    "InterfaceKind",
-    "Laminate",
-    "Layer",
-    "ROLES",
-    "Pin",
-    "Role",
-]
+# Interfaces between consecutive TPE layers: bonded and open areas.
+
+
+InterfaceKind = Literal["chamber", "separator", "bond"]
+"""``bond`` is an interface without a mask: the films bond all over."""
+
+
+@dataclass(frozen=True)
+class Interface:
+    """Two TPE layers, below and above, and the masks between them.
+
+    contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
+    ``balloon`` is the balloon a chamber interface lies in, or the one below a separator.
+    """
+
+    index: int
+    kind: InterfaceKind
+    below: Layer
+    above: Layer
+    masks: tuple[Layer, ...]
+    mask: Region
+    contact: Region
+    bond: Region
+    unbonded: Region
+
+    @staticmethod
+    def between(
+        index: int,
+        below: Layer,
+        above: Layer,
+        masks: Sequence[Layer],
+        regions: tuple[Region, Region, Region, Region],
+    ) -> Interface:
+        kind: InterfaceKind = "bond"
+        if masks:
+            kind = "chamber" if masks[0].role == "chamber-mask" else "separator"
+        return Interface(index, kind, below, above, tuple(masks), *regions)
+
+    @property
+    def gap(self) -> float:
+        """Height in mm between the two layers: the thickness of the masks."""
+        return sum(mask.film.thickness for mask in self.masks)
+
+    @property
+    def z(self) -> float:
+        """Height of the gap's lower face."""
+        return self.below.z + self.below.film.thickness
+
+    @property
+    def layer_indices(self) -> tuple[int, ...]:
+        return (self.below.index, *(mask.index for mask in self.masks), self.above.index)
+
+    @cached_attribute
+    def pattern(self) -> tuple[str, ...]:
+        """Equal for interfaces made of equal profiles."""
+        return (
+            self.below.pattern,
+            *(mask.pattern for mask in self.masks),
+            self.above.pattern,
+        )
+
+
+def interface_regions(
+    below: Region, above: Region, masks: Sequence[Region]
+) -> tuple[Region, Region, Region, Region]:
+    """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
+    mask = union(masks)
+    _, contact = (None, below) if below.contours == above.contours else divided(below, above)
+    return mask, contact, *divided(contact, mask)
+
+
+# Diameters and mass.
+
+
+def outline_diameter(laminate: Laminate) -> float:
+    """Return the diameter of the circle round the axis that holds all films without tabs and ears.
+
+    The paper's 3-DoF actuator fits 15 (Sec. 2). Measured on each film's part within the laminate's
+    outline.
+    """
+    films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
+    return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
+
+
+def overall_diameter(laminate: Laminate) -> float:
+    """Diameter of the circle round the axis that holds every layer, with tabs, tails and ears."""
+    return _round_axis(layers[0].profile for layers in laminate.patterns.values())
+
+
+def beyond_the_outline(laminate: Laminate) -> str:
+    """The parts outside the outline, which make the overall diameter larger: "3 inlet tabs"."""
+    count = len(laminate.inlets)
+    tabs = f"{count} inlet tab{'s' if count > 1 else ''}"
+    return f"{tabs} and the ears" if laminate.registration == "ears" else tabs
+
+
+def film_mass(laminate: Laminate) -> float:
+    """Mass in g of all films, tabs and ears included; without tubing, glue and fluid.
+
+    Raises DesignError where the density of a film is not known.
+    """
+    return sum(
+        layer.profile.area * layer.film.thickness * density_of(layer.film) * 1e-6
+        for layer in laminate.layers
+    )
+
+
+def _round_axis(regions: Iterable[Region]) -> float:
+    return 2 * max(
+        (edge.farthest_from((0.0, 0.0)) for region in regions for edge in region.edges), default=0.0
+    )
+
+
+# Plan views of layers and laminates for notebooks.
+
+
+SHOWN_MM = 80.0
+BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+
+
+def laminate_html(laminate: Laminate) -> str:
+    """Return the laminate in plan, with a legend, a scale and its layers in order."""
+    rows = [
+        (f"{layers[0].pattern}", layers[0].film.material, layers[0].role, _numbers(layers))
+        for layers in laminate.patterns.values()
+    ]
+    table = table_html(("pattern", "film", "role", "layers, bottom to top"), rows)
+    return laminate_svg(laminate) + _legend(laminate.bounds, laminate.layers) + table
+
+
+def layer_html(layer: Layer) -> str:
+    """Return the layer in plan, with a legend and a scale."""
+    return layer_svg(layer) + _legend(layer.profile.bounds, (layer,))
+
+
+def _numbers(layers: Sequence[Layer]) -> str:
+    """Layer indices, many of them as first, second ... last."""
+    indices = [str(layer.index) for layer in layers]
+    return ", ".join(indices if len(indices) < 6 else [*indices[:2], "...", indices[-1]])
+
+
+def _legend(bounds: Bounds, layers: Iterable[Layer]) -> str:
+    """A scale bar in HTML, and a swatch for each film."""
+    low_x, low_y, high_x, high_y = bounds
+    longer = 1.06 * max(high_x - low_x, high_y - low_y)
+    bar = max((step for step in BARS if step < longer / 3), default=BARS[0])
+    films = dict.fromkeys(layer.film for layer in layers)
+    swatches = "".join(
+        f'<span style="background:{ink(film).fill};border:1px solid '
+        f'{ink(film).line}">&emsp;</span> {film.material}, {escape(film.product)}, '
+        f"{coord(film.thickness)} mm &ensp; "
+        for film in films
+    )
+    width = coord(bar * SHOWN_MM / longer)
+    return (
+        f'<div><span style="display:inline-block;width:{width}mm;border-top:2px solid">'
+        f"{bar:g} mm</span> &ensp; {swatches}</div>"
+    )
+
+
+def layer_svg(layer: Layer) -> str:
+    """The layer's exact profile in plan, enlarged to fit a notebook cell."""
+    title = f"{layer.name} ({layer.pattern})"
+    return _document(title, layer.profile.bounds, [_profile(layer, 1.0)])
+
+
+def laminate_svg(laminate: Laminate) -> str:
+    """Every distinct profile in plan, bottom to top, see-through."""
+    title = f"{laminate.name}: {len(laminate.layers)} layers, {coord(laminate.thickness)} mm"
+    shapes = [_profile(layers[0], 0.45) for layers in laminate.patterns.values()]
+    return _document(title, laminate.bounds, shapes)
+
+
+def _profile(layer: Layer, opacity: float) -> str:
+    colours = ink(layer.film)
+    return (
+        f'<path d="{path_data(layer.profile)}" fill="{colours.fill}" stroke="{colours.line}" '
+        f'fill-opacity="{coord(opacity)}"/>'
+    )
+
+
+def _document(title: str, bounds: Bounds, shapes: list[str]) -> str:
+    low_x, low_y, high_x, high_y = bounds
+    margin = 0.03 * max(high_x - low_x, high_y - low_y)
+    width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
+    scale = SHOWN_MM / max(width, height)
+    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{coord(width * scale)}mm" '
+        f'height="{coord(height * scale)}mm" viewBox="{box}"><title>{escape(title)}</title>'
+        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.3 / scale)}">'
+        f"{''.join(shapes)}</g></svg>"
+    )

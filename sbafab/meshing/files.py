@@ -1,31 +1,21 @@
-"""The mesh folder: every file written, each surface verified first."""
+"""Write the flat solid and the cavities, each surface verified first."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.cavity import cavity
-from sbafab.meshing.prisms import SAGITTA, sealed
-from sbafab.meshing.solid import solid
+from sbafab.meshing.formats.stl import write_stl
+from sbafab.meshing.formats.table import MESH_FORMATS
+from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import tube_wrap, wrapped
-from sbafab.meshing.write_3mf import write_3mf
-from sbafab.meshing.write_glb import write_glb
-from sbafab.meshing.write_stl import write_stl
 
 MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
-Writer = Callable[[Surface, Path], None]
-
-SOLID_WRITERS: dict[str, Writer] = {
-    "stl": write_stl,
-    "3mf": write_3mf,
-    "glb": write_glb,
-}
+Writer = Callable[[Surface, Path, str], None]
 
 
 @dataclass(frozen=True)
@@ -55,15 +45,15 @@ def write_meshes(
 
     A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
     ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
-    ``progress`` is told how many of how many files are done. Raises OutputError if a surface is
-    open or its volume is not the sum of area x thickness.
+    ``progress`` is called with the numbers of files done and of all files. Raises OutputError if a
+    surface is open or its volume is not the sum of area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
-    total = len(SOLID_WRITERS) + len(laminate.chambers)
-    total *= 1 if laminate.tube is None else 2
+    shapes = 1 if laminate.tube is None else 2
+    total = shapes * (sum(bool(row.solid) for row in MESH_FORMATS) + len(laminate.chambers))
     written: list[MeshFile] = []
     for mesh, surface, write in _meshes(laminate, sagitta):
-        write(surface, folder / mesh.file)
+        write(surface, folder / mesh.file, laminate.bonded_materials)
         written.append(mesh)
         if progress is not None:
             progress(len(written), total)
@@ -72,21 +62,15 @@ def write_meshes(
 
 def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surface, Writer]]:
     wrap = tube_wrap(laminate)
-    surface = solid(laminate, sagitta)
-    around = None
+    shapes = {"": solid(laminate, sagitta)}
     if wrap is not None:
         around = wrapped(solid(laminate, sagitta, wrap.cuts), wrap)
-        sealed("the solid round its tube", around)
-    films = laminate.bonded_materials
-    named: dict[str, Writer] = {
-        "3mf": partial(write_3mf, material=films),
-        "glb": partial(write_glb, material=films),
-    }
-    told = _described("", "solid", None, surface)
-    for suffix, write in {**SOLID_WRITERS, **named}.items():
-        yield replace(told, file=f"mesh/solid.{suffix}"), surface, write
-        if around is not None:
-            yield _described(f"mesh/solid_wrapped.{suffix}", "solid", None, around), around, write
+        shapes["_wrapped"] = sealed("the solid round its tube", around)
+    for row in MESH_FORMATS:
+        if row.solid is not None:
+            for suffix, surface in shapes.items():
+                file = f"mesh/solid{suffix}.{row.ending}"
+                yield _described(file, "solid", None, surface), surface, row.solid
     for chamber in laminate.chambers:
         file = f"mesh/cavity_{chamber.name}.stl"
         surface = cavity(laminate, chamber, sagitta)

@@ -1,12 +1,270 @@
-"""The flat solid: TPE films and the bonds that join them."""
+"""Partition of the plane by the edges of regions, prisms over it, and the flat solid and cavities.
+
+Every edge of every region is an edge of the partition, so surfaces put together from its cells
+meet edge to edge.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.prisms import SAGITTA, Slab, closed_surface
-from sbafab.meshing.surface import Surface
+from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour, facets
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region, rectangle
+from sbafab.laminate.laminate import Chamber, Interface, Laminate
+from sbafab.meshing.surface import Surface, open_edges
+
+if TYPE_CHECKING:
+    import numpy as np
+    import shapely
+    from numpy.typing import NDArray
+
+GRID = 1e-5
+"""Spacing in mm of the grid that vertices are rounded to; single precision tells them apart."""
+
+
+class Partition(NamedTuple):
+    """Cells of the plane between the edges of some regions.
+
+    ``points`` (n, 2) float64 in mm. ``edges`` (m, 2) int64 indices of points, each edge of each
+    cell with the cell on its left; ``cells`` (m,) the cell of an edge. ``inside`` (regions,
+    cells) bool: which cells make up a region.
+    """
+
+    points: NDArray[np.float64]
+    edges: NDArray[np.int64]
+    cells: NDArray[np.int64]
+    inside: NDArray[np.bool_]
+
+    def boundary(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Edges (k, 2) round the union of the chosen cells, the cells on their left."""
+        import numpy as np
+
+        edges = self.edges[chosen[self.cells]]
+        size = len(self.points)
+        forth = edges[:, 0] * size + edges[:, 1]
+        back = np.sort(edges[:, 1] * size + edges[:, 0])
+        # Not np.isin, which loads masked arrays.
+        place = np.searchsorted(back[:-1], forth)
+        outline: NDArray[np.int64] = edges[back[place] != forth]
+        return outline
+
+    def triangles(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
+        import numpy as np
+        from manifold3d import triangulate
+
+        loops = _loops(self.boundary(chosen))
+        if not loops:
+            return np.empty((0, 3), dtype=np.int64)
+        order = np.concatenate(loops)
+        corners = triangulate([self.points[loop] for loop in loops])
+        return order[np.asarray(corners, dtype=np.int64)]
+
+
+def partition(regions: Sequence[Region], sagitta: float) -> Partition:
+    """The cells between all edges of the regions, arcs as chords within ``sagitta`` mm."""
+    import numpy as np
+    import shapely
+
+    areas = [_polygons(region, sagitta) for region in regions]
+    lines = shapely.unary_union([shapely.boundary(area) for area in areas], grid_size=GRID)
+    cells = shapely.orient_polygons(shapely.get_parts(shapely.polygonize(shapely.get_parts(lines))))
+    within = shapely.get_coordinates(shapely.point_on_surface(cells))
+    inside = np.array([shapely.contains_xy(area, within) for area in areas])
+    rings, owner = shapely.get_rings(cells, return_index=True)
+    coordinates, ring = shapely.get_coordinates(rings, return_index=True)
+    steps = np.round(coordinates / GRID).astype(np.int64)
+    distinct, index = np.unique(steps, axis=0, return_inverse=True)
+    index = index.ravel()
+    # A ring ends where it starts; the step to the next ring is no edge.
+    joined = ring[:-1] == ring[1:]
+    edges = np.column_stack([index[:-1], index[1:]])[joined]
+    return Partition(distinct * GRID, edges, owner[ring[:-1][joined]], inside)
+
+
+def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
+    import numpy as np
+    import shapely
+
+    def ring(contour: Contour) -> shapely.LinearRing:
+        # As an array, which shapely takes without a look at every number of it.
+        return shapely.linearrings(np.array(facets(contour, sagitta)))
+
+    pieces = []
+    for piece in region.pieces:
+        (outer,) = piece.outers
+        pieces.append(shapely.polygons(ring(outer), [ring(hole) for hole in piece.holes] or None))
+    return shapely.multipolygons(pieces)
+
+
+def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Closed chains of points that the directed edges make up, none through a point twice."""
+    import numpy as np
+
+    following: defaultdict[int, list[int]] = defaultdict(list)
+    for tail, head in edges.tolist():
+        following[tail].append(head)
+    loops = []
+    for start in edges[:, 0].tolist():
+        point = start
+        path: list[int] = []
+        place: dict[int, int] = {}
+        while following[point]:
+            place[point] = len(path)
+            path.append(point)
+            point = following[point].pop()
+            if point in place:
+                loop = path[place[point] :]
+                loops.append(np.array(loop, dtype=np.int64))
+                del path[place[point] :]
+                for passed in loop:
+                    del place[passed]
+    return loops
+
+
+# Prisms over planar regions, and the closed surface of their union.
+
+
+SAGITTA = 0.0015
+"""Default height in mm of an arc over its chord: no point is farther than 1 um from the arc."""
+
+VOLUME_TOLERANCE = 0.002
+"""Largest relative difference between a surface's volume and its sum of area x thickness."""
+
+
+class Slab(NamedTuple):
+    """A region between two heights in mm."""
+
+    region: Region
+    bottom: float
+    top: float
+
+    @property
+    def volume(self) -> float:
+        """Exact volume in mm3: area x thickness."""
+        return self.region.area * (self.top - self.bottom)
+
+
+def fuse(slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()) -> Surface:
+    """The surface of the union of the slabs, built film by film from one partition of the plane.
+
+    Arcs become chords within ``sagitta`` mm of them, of equal area. No boolean of solids is
+    needed: walls stand on the outline of a level, and what differs from the level above it or
+    below it is a face. ``cuts`` (x in mm, ascending) are lines that no face runs across.
+    """
+    import numpy as np
+
+    regions = list(dict.fromkeys(slab.region for slab in slabs))
+    strips = list(_strips(regions, cuts))
+    plane = partition([*regions, *strips], sagitta)
+    heights, levels = _levels(slabs, regions, plane)
+    faces = _faces(plane, levels, plane.inside[len(regions) :])
+    count = len(plane.points)
+    used = np.zeros(count * len(heights), dtype=bool)
+    used[faces] = True
+    (corners,) = np.nonzero(used)
+    points = np.column_stack([plane.points[corners % count], heights[corners // count]])
+    return Surface(points, np.cumsum(used)[faces] - 1)
+
+
+def _strips(regions: Sequence[Region], cuts: Sequence[float]) -> Iterator[Region]:
+    """Return the strips between two cuts each, before the first and past the last of them."""
+    if not cuts:
+        return
+    boxes = [region.bounds for region in regions]
+    low = min(box[0] for box in boxes) - 1, min(box[1] for box in boxes) - 1
+    high = max(box[2] for box in boxes) + 1, max(box[3] for box in boxes) + 1
+    for start, end in pairwise([low[0], *cuts, high[0]]):
+        yield rectangle((start, low[1]), (end, high[1]))
+
+
+def closed_surface(
+    name: str, slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()
+) -> Surface:
+    """Return the verified surface of the slabs; ``name`` names it in errors.
+
+    Raises OutputError if an edge does not join two triangles, or the volume is off.
+    """
+    surface = sealed(name, fuse(slabs, sagitta, cuts))
+    expected = sum(slab.volume for slab in slabs)
+    if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
+        raise OutputError(
+            f"The mesh of {name} holds {surface.volume:.4f} mm3 where its films add up to "
+            f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
+        )
+    return surface
+
+
+def sealed(name: str, surface: Surface) -> Surface:
+    """The surface itself. Raises OutputError if an edge does not join two triangles."""
+    gaps = open_edges(surface)
+    if len(gaps):
+        x, y, z = gaps[0]
+        raise OutputError(
+            f"The mesh of {name} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
+            f"y {y:.3f}, z {z:.3f}; move profiles apart that touch in one point there."
+        )
+    return surface
+
+
+def _levels(
+    slabs: Sequence[Slab], regions: Sequence[Region], plane: Partition
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """The heights where something starts or ends, and the filled cells between each two."""
+    import numpy as np
+
+    # To 1e-9 mm, so that faces that touch lie at one number.
+    spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
+    heights = sorted({height for span in spans for height in span})
+    number = {height: index for index, height in enumerate(heights)}
+    row = {region: index for index, region in enumerate(regions)}
+    filled = np.zeros((len(heights) - 1, plane.inside.shape[1]), dtype=bool)
+    for slab, (bottom, top) in zip(slabs, spans, strict=True):
+        filled[number[bottom] : number[top]] |= plane.inside[row[slab.region]]
+    return np.array(heights), filled
+
+
+def _faces(
+    plane: Partition, levels: NDArray[np.bool_], strips: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Triangles (k, 3) of point + height x number of points, heights counted from the lowest."""
+    import numpy as np
+
+    walls: dict[bytes, NDArray[np.int64]] = {}
+    lids: dict[bytes, NDArray[np.int64]] = {}
+    count = len(plane.points)
+    empty = np.zeros((1, levels.shape[1]), dtype=bool)
+    faces = []
+    for index, (below, here) in enumerate(
+        zip(np.vstack([empty, levels]), np.vstack([levels, empty]), strict=True)
+    ):
+        for chosen, order in ((below & ~here, (0, 1, 2)), (here & ~below, (0, 2, 1))):
+            if (key := chosen.tobytes()) not in lids:
+                parts = [chosen & strip for strip in strips] if len(strips) else [chosen]
+                lids[key] = np.concatenate([plane.triangles(part) for part in parts])
+            faces.append(lids[key][:, order] + index * count)
+        if (key := here.tobytes()) not in walls:
+            walls[key] = _walls(plane.boundary(here), count)
+        faces.append(walls[key] + index * count)
+    return np.concatenate(faces)
+
+
+def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Two triangles an edge, from one height to the next."""
+    import numpy as np
+
+    tails, heads = edges.T
+    lower = np.column_stack([tails, heads, heads + count])
+    upper = np.column_stack([tails, heads + count, tails + count])
+    return np.concatenate([lower, upper])
+
+
+# The flat solid: TPE films and the bonds that join them.
 
 
 def solid_slabs(laminate: Laminate) -> list[Slab]:
@@ -30,3 +288,93 @@ def solid(laminate: Laminate, sagitta: float = SAGITTA, cuts: Sequence[float] = 
     OutputError if it does not close.
     """
     return closed_surface("the solid", solid_slabs(laminate), sagitta, cuts)
+
+
+# The cavity of a chamber: what its air fills, closed at the inlet's mouth.
+
+
+def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
+    """The chamber's pockets and its channels through walls and neck rings, bottom to top.
+
+    Raises OutputError where the chamber has no pocket, or a film between two of its pockets
+    closes a channel.
+    """
+    axes = [bore.centre for bore in laminate.bores if bore.chamber == chamber.name]
+    pockets = [
+        Slab(Region(tuple(contours)), interface.z, interface.z + interface.gap)
+        for interface in laminate.interfaces
+        if interface.kind == "chamber"
+        and (contours := list(_pocket(interface, chamber.centres, axes)))
+    ]
+    if not pockets:
+        x, y = chamber.centres[0]
+        raise OutputError(
+            f"Chamber {chamber.name} has no pocket at x {x:.3f}, y {y:.3f}; "
+            "a chamber mask must cover that place."
+        )
+    channels = _channels(laminate, chamber, axes, pockets[0].top, pockets[-1].bottom)
+    return sorted([*pockets, *channels], key=lambda slab: slab.bottom)
+
+
+def cavity(
+    laminate: Laminate,
+    chamber: Chamber,
+    sagitta: float = SAGITTA,
+    cuts: Sequence[float] = (),
+) -> Surface:
+    """The closed surface of a chamber's cavity, normals out of the air.
+
+    Its volume is that of :func:`cavity_slabs`. No face runs across the ``cuts``, x in mm. Raises
+    OutputError if it does not close.
+    """
+    return closed_surface(
+        f"the cavity of chamber {chamber.name}", cavity_slabs(laminate, chamber), sagitta, cuts
+    )
+
+
+def _pocket(
+    interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
+) -> Iterator[Contour]:
+    """The unbonded pieces round the centres, open where a channel runs through them."""
+    for piece in interface.unbonded.pieces:
+        (outer,) = piece.outers
+        if any(outer.winding(centre) != 0 for centre in centres):
+            yield outer
+            for hole in piece.holes:
+                on_axis = [axis for axis in axes if hole.winding(axis) != 0]
+                if not on_axis or interface.bond.contains(on_axis[0]):
+                    yield hole
+
+
+def _channels(
+    laminate: Laminate, chamber: Chamber, axes: Sequence[Point], low: float, high: float
+) -> Iterator[Slab]:
+    """The openings on the chamber's axes in all that is bonded between two heights in mm."""
+    films = [
+        (f"layer {layer.index}", layer.profile, layer.z, layer.z + layer.film.thickness)
+        for layer in laminate.tpe_layers
+    ]
+    bonds = [
+        (f"interface {gap.index}", gap.bond, gap.z, gap.z + gap.gap)
+        for gap in laminate.interfaces
+        if gap.kind == "separator"
+    ]
+    for place, region, bottom, top in films + bonds:
+        if not low <= (bottom + top) / 2 <= high:
+            continue
+        for x, y in axes:
+            opening = _opening(region.holes, (x, y))
+            if opening is None:
+                raise OutputError(
+                    f"The channel of chamber {chamber.name} is closed at {place}, "
+                    f"x {x:.3f}, y {y:.3f}; cut a bore there with a neck ring round it."
+                )
+            yield Slab(opening, bottom, top)
+
+
+def _opening(holes: Iterable[Contour], axis: Point) -> Region | None:
+    """Return the region that the smallest hole round the axis leaves open, or None."""
+    round_axis = [hole for hole in holes if hole.winding(axis) != 0]
+    if not round_axis:
+        return None
+    return Region((max(round_axis, key=lambda hole: hole.area).reversed(),))

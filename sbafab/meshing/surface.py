@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sbafab.errors import DesignError
-from sbafab.geometry.once import once
+from sbafab.geometry.cache import cached_attribute
 
 if TYPE_CHECKING:
     import numpy as np
@@ -28,7 +28,7 @@ class Surface:
     points: NDArray[np.float64]
     faces: NDArray[np.int64]
 
-    @once
+    @cached_attribute
     def volume(self) -> float:
         """Enclosed volume in mm3."""
         import numpy as np

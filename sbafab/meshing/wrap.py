@@ -23,7 +23,7 @@ RAMP = 1.5
 
 
 class TubeWrap(NamedTuple):
-    """How a laminate lies round its tube, whose axis is z.
+    """Placement of a laminate round its tube, whose axis is z.
 
     ``radius`` is the tube's; lengths ``neutral`` mm above it, in the middle of the sheet, stay.
     Where the sheet overlaps, it is raised by ``thickness`` at and past x = ``seam``; ``cuts`` are
@@ -60,7 +60,7 @@ class TubeWrap(NamedTuple):
     def angle(
         self, x: NDArray[np.float64], middle: float = 0.0, share: ArrayLike = 1.0
     ) -> NDArray[np.float64]:
-        """By what angle a body leans at x, seen from where it is fixed."""
+        """Angle in radians by which a body leans at x, seen from where it is fixed."""
         import numpy as np
 
         bend = np.asarray(share, dtype=float) / self.radius
@@ -68,14 +68,14 @@ class TubeWrap(NamedTuple):
         return angle
 
     def raised(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far the sheet is lifted by its own other end."""
+        """Height in mm by which the sheet is lifted by its overlapping end."""
         import numpy as np
 
         return self.thickness * np.clip((x - self.seam) / RAMP + 1, 0, 1)
 
 
 def tube_wrap(laminate: Laminate) -> TubeWrap | None:
-    """How a laminate is wrapped; None for one that is on no tube."""
+    """Return the placement of a laminate round its tube, or None for one without a tube."""
     if laminate.tube is None:
         return None
     sheet = laminate.tpe_layers[0]
@@ -99,7 +99,7 @@ def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
 
 
 def bent_point(p: Vector, radius: float) -> Vector:
-    """Where a point of the flat laminate comes to lie round a tube of this radius about z."""
+    """Return where a point of the flat laminate lies round a tube of this radius about z."""
     angle, r = p[0] / radius, radius + p[2]
     return r * math.cos(angle), r * math.sin(angle), p[1]
 
@@ -123,7 +123,7 @@ def bent(surface: Surface, radius: float, sagitta: float = SAGITTA) -> Surface:
 
 
 def cut_along(surface: Surface, x: float) -> Surface:
-    """The same surface with an edge wherever it crosses the plane of this x."""
+    """Return the surface with edges wherever it crosses the plane of this x."""
     import numpy as np
 
     offset = surface.points[:, 0] - x
@@ -136,8 +136,8 @@ def cut_along(surface: Surface, x: float) -> Surface:
     # The first corner becomes the one that is alone on its side, or the one on the plane.
     on_plane = (sides == 0).any(axis=1)
     alone = np.where(sides.sum(axis=1) > 0, -1, 1)
-    wanted = np.where(on_plane, 0, alone)
-    start = (sides == wanted[:, None]).argmax(axis=1)
+    first_side = np.where(on_plane, 0, alone)
+    start = (sides == first_side[:, None]).argmax(axis=1)
     faces = np.take_along_axis(faces, (start[:, None] + np.arange(3)) % 3, axis=1)
     points, middle = _crossings(surface.points, offset, faces, on_plane)
     a, b, c = faces.T

@@ -1,16 +1,16 @@
-"""One round balloon as an elastic membrane of revolution: inflated free, or between plates.
+"""A round balloon as an elastic membrane of revolution: inflated free, or between plates.
 
-Two equal films, bonded round the pocket and, where there are neighbours, at the neck. One film is
-computed; the other one mirrors it. A film stretches (plane stress; Saint Venant and Kirchhoff's
-law, or Hencky's) and bends. Where its hoop is compressed it wrinkles, and carries what wrinkles of
-least energy do:
+Two films, bonded round the pocket and, where there are neighbours, at the neck. Of equal films one
+is computed, and the other mirrors it; unlike ones are computed together. A film stretches (plane
+stress; Saint Venant and Kirchhoff's law, or Hencky's) and bends. Where its hoop is compressed it
+wrinkles, and the wrinkles of least energy carry
 
     N = 2 sqrt(B K)    K = T (pi / L)^2 + E t c^2      (after Cerda and Mahadevan, 2003)
 
 with the bending stiffness B, the tension T along the meridian, the length L of the compressed zone
-and the curvature c of the meridian. The rim, two films thick, ripples (``rim_ripple``). Shapes are
-those of least energy, found by Newton's method for many pressures and heights at once. Lengths mm,
-pressures kPa, volumes ul, forces mN.
+and the curvature c of the meridian. The rim, two films thick, ripples. Shapes are those of least
+energy, found by Newton's method for many pressures and heights at once. Lengths mm, pressures kPa,
+volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
-from sbafab.models import banded, rim_ripple
+from sbafab.models import least_energy
 from sbafab.models.film_elements import (
     Elements,
-    Flat,
-    air,
+    FlatFilm,
+    air_volume,
+    assembled_gradient,
+    assembled_tangent,
     bending,
     curvature,
-    gradient,
-    matrix,
     membrane,
     strain,
 )
-from sbafab.models.least_energy import Descent, NoBalance, settled
+from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,19 +44,18 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
-    from sbafab.models.rim_ripple import Ripple
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5
 NECK_ELEMENTS = 2
-CLOSE = 1e-9
-"""Force out of balance, as a share of pressure times pocket area, that is none."""
-LEAST = 0.01
-"""Pressure in kPa that balance is judged by where there is less."""
-PLATE = 20_000.0
-"""What a plate gives way by: the pressure on the film presses it in by 1 / PLATE mm."""
-ROUNDS = 3
-"""How often the wrinkles' force is taken from the tension, and the shape from that."""
+RESIDUAL = 1e-9
+"""Residual force, as a share of pressure times pocket area, that counts as equilibrium."""
+LEAST_PRESSURE = 0.01
+"""Pressure in kPa from which the tolerance of the residual is taken where there is less."""
+PLATE_STIFFNESS = 20_000.0
+"""Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
+WRINKLE_ROUNDS = 3
+"""Iterations between the wrinkles' stress, which follows the tension, and the shape."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +65,8 @@ class Balloon:
     ``neck`` is the radius bonded to the next balloon, ``bore`` that of the hole in it; both 0 for a
     lone balloon. Without ``wrinkles`` films stay as smooth as an axisymmetric mesh keeps them.
     ``inextensible`` is the limit of a film that neither bends nor carries any compression, its rim
-    included: the modulus has then to be large. ``order`` is that of the film's law (``Flat``): 2
-    for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
+    included: the modulus has then to be large. ``order`` is that of the film's law (``FlatFilm``):
+    2 for Saint Venant's and Kirchhoff's, which programs for linear films take; 0 for Hencky's.
     """
 
     pocket: float = 2.5
@@ -81,45 +80,45 @@ class Balloon:
     inextensible: bool = False
     order: int = 2
     mate: Balloon | None = None
-    """The other film, where it is unlike: of the same sizes, and without a mate."""
+    """The second film where the two differ: of the same sizes, and without a mate itself."""
 
     @cached_property
     def nodes(self) -> Array:
-        """Radii of the flat film's nodes, closer where it bends sharply: at neck and rim."""
+        """Radii of the flat film's nodes, mm, closer together at neck and rim, where it bends."""
         even = np.linspace(0, 1, FILM_ELEMENTS + 1)
         close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
         film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
-        held = np.linspace(self.bore, self.neck, NECK_ELEMENTS + 1)[:-1]
-        neck = held if self.neck else held[:0]
+        neck_nodes = np.linspace(self.bore, self.neck, NECK_ELEMENTS + 1)[:-1]
+        neck = neck_nodes if self.neck else neck_nodes[:0]
         rim = self.pocket + self.ring * np.linspace(0, 1, RIM_ELEMENTS + 1)[1:] ** 2
         return np.concatenate([neck, film, rim])
 
     @property
-    def held(self) -> int:
+    def neck_edge(self) -> int:
         """Number of the node at the neck's edge; 0, the pole, without a neck."""
         return NECK_ELEMENTS if self.neck else 0
 
     @property
     def edge(self) -> int:
         """Number of the node at the pocket's edge."""
-        return self.held + FILM_ELEMENTS
+        return self.neck_edge + FILM_ELEMENTS
 
     @cached_property
-    def film(self) -> Flat:
-        return Flat(self.nodes, self.thickness, self.modulus, self.poisson, self.order)
+    def film(self) -> FlatFilm:
+        return FlatFilm(self.nodes, self.thickness, self.modulus, self.poisson, self.order)
 
     @cached_property
-    def widths(self) -> Array:
+    def node_areas(self) -> Array:
         """Area in mm2 that belongs to each node."""
         return np.asarray(math.tau * self.nodes * np.gradient(self.nodes))
 
     @property
-    def rigid(self) -> float:
-        """Modulus times thickness, N/m: how hard the film resists being stretched."""
+    def membrane_stiffness(self) -> float:
+        """Modulus times thickness, N/m."""
         return self.modulus * self.thickness
 
     @property
-    def rigidity(self) -> float:
+    def bending_stiffness(self) -> float:
         """Bending stiffness B of one film in kPa mm3."""
         if self.inextensible:
             return 0.0
@@ -127,43 +126,43 @@ class Balloon:
 
     @cached_property
     def freedoms(self) -> NDArray[np.int_]:
-        """Numbers of the coordinates (r, z of each node in turn) that move on their own.
+        """Numbers of the coordinates (r, z of each node in turn) that are degrees of freedom.
 
         The neck stays level: its heights follow ``level``. The rim stays in the plane between the
         films, the pole on the axis.
         """
         nodes = range(len(self.nodes))
-        found = [2 * node for node in nodes if node or self.bore]
-        found += [2 * node + 1 for node in nodes[self.held : self.edge]]
-        return np.array(sorted(found))
+        numbers = [2 * node for node in nodes if node or self.bore]
+        numbers += [2 * node + 1 for node in nodes[self.neck_edge : self.edge]]
+        return np.array(sorted(numbers))
 
     @cached_property
     def free(self) -> Array:
-        """1 where a coordinate moves on its own, else 0: (coordinates, 1)."""
-        found = np.zeros((2 * len(self.nodes), 1))
-        found[self.freedoms] = 1.0
-        return found
+        """1 for each coordinate that is a degree of freedom, else 0: (coordinates, 1)."""
+        mask = np.zeros((2 * len(self.nodes), 1))
+        mask[self.freedoms] = 1.0
+        return mask
 
     @cached_property
-    def packing(self) -> banded.Packing:
-        """How a band by coordinates becomes one by freedoms."""
-        return banded.packing(self.freedoms, 2 * len(self.nodes), 6)
+    def packing(self) -> least_energy.Packing:
+        """Index map from a band of coordinates to one of degrees of freedom."""
+        return least_energy.packing(self.freedoms, 2 * len(self.nodes), 6)
 
     @property
     def level(self) -> int:
-        """Number of the height that the neck's others are equal to."""
-        return 2 * self.held + 1
+        """Number of the height that all heights of the neck are tied to."""
+        return 2 * self.neck_edge + 1
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
-        """The elements that may: of the films, not of neck and rim."""
+        """True for the elements that may wrinkle: those of the film, not of neck and rim."""
         number = np.arange(len(self.nodes) - 1)
-        free = (number >= self.held) & (number < self.edge) & self.wrinkles
+        free = (number >= self.neck_edge) & (number < self.edge) & self.wrinkles
         return free | ((number >= self.edge) & self.inextensible)
 
 
 class Shapes(NamedTuple):
-    """Balloons in balance, a row each.
+    """Balloons in equilibrium, a row each.
 
     ``pressure`` in kPa; ``height`` that the whole balloon has risen by, its stroke, in mm;
     ``volume`` of its air in ul; ``force`` on the plate at either end in mN; ``energy`` stored in
@@ -180,8 +179,8 @@ class Shapes(NamedTuple):
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, the stress that wrinkles carry, and how the
-    rim ripples.
+    """Pressure, half the height between the plates, the hoop stress that wrinkles carry (``cap``),
+    whether plates hold the necks (``tied``), and the rim's ripple.
     """
 
     pressure: Array
@@ -198,12 +197,12 @@ class BalloonLoad(NamedTuple):
 def inflate(
     balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None, tied: bool = False
 ) -> Shapes:
-    """The shapes at pressures (kPa), free or between plates at heights (mm).
+    """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm).
 
     A free balloon with a bore is pulled on by the air in it, as one in a stack is. With ``tied``
     the plates hold its necks, and pull where they stand higher than it would rise; the force is
     then below 0. Raises DesignError for pressures or heights that are not above 0 (a tied one may
-    have no pressure), or where no balance is found.
+    have no pressure), or where Newton's method finds no equilibrium.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     high = math.inf if height is None else np.asarray(height, dtype=float)
@@ -213,47 +212,53 @@ def inflate(
     elements = len(balloon.nodes) - 1
     smooth = np.where(balloon.may_wrinkle & balloon.inextensible, 0.0, math.inf)
     cap = np.broadcast_to(smooth, (len(p), elements))
-    load = BalloonLoad(p, high / 2, cap, tied, rim_ripple.smooth(balloon, len(p)))
+    load = BalloonLoad(p, high / 2, cap, tied, no_ripples(balloon, len(p)))
     if balloon.mate is not None:
-        from sbafab.models import two_films
-
-        return two_films.inflate((replace(balloon, mate=None), balloon.mate), load)
-    # Where no balance is found, elements may shrink to nothing on the way; that is said in the end.
+        return inflate_two_films((replace(balloon, mate=None), balloon.mate), load)
+    # Short of an equilibrium elements may shrink to nothing; that raises in the end.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        x = _settled(balloon, load, coordinates(*start(balloon, load)))
+        x = _equilibrium(balloon, load, coordinates(*initial_shape(balloon, load)))
         if balloon.wrinkles and not balloon.inextensible:
-            zone = compressed(balloon, *places(x))
-            for _ in range(ROUNDS):
-                (ripple,) = rippling((balloon,), (places(x),))
-                load = load._replace(cap=wrinkling(balloon, *places(x), zone), ripple=ripple)
-                x = _settled(balloon, load, x)
-    r, z = (np.ascontiguousarray(part) for part in places(x))
-    found = total(balloon, load, x)
-    held = air(balloon.film, balloon.edge, Elements.of(r, z)).energy
-    return Shapes(p, 2 * z[:, 0], 2 * held, found.force, 2 * (found.energy + p * held), r, z)
+            zone = compressed_length(balloon, *node_positions(x))
+            for _ in range(WRINKLE_ROUNDS):
+                (ripple,) = ripples_at((balloon,), (node_positions(x),))
+                load = load._replace(
+                    cap=wrinkle_stress(balloon, *node_positions(x), zone), ripple=ripple
+                )
+                x = _equilibrium(balloon, load, x)
+    r, z = (np.ascontiguousarray(part) for part in node_positions(x))
+    state = total_energy(balloon, load, x)
+    half_volume = air_volume(balloon.film, balloon.edge, Elements.of(r, z)).energy
+    return Shapes(
+        p, 2 * z[:, 0], 2 * half_volume, state.force, 2 * (state.energy + p * half_volume), r, z
+    )
 
 
-def start(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """Bulged films to begin with, as high as their pressure may lift them."""
+def initial_shape(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
+    """Return bulged films to start from, as high as their pressure may lift them: r and z."""
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
-    if balloon.rigidity > 0:
+    if balloon.bending_stiffness > 0:
         # A thick film rises as a plate that is clamped all round: by less.
-        plate = load.pressure * free**4 / ((384 if balloon.neck else 64) * balloon.rigidity)
+        plate = (
+            load.pressure * free**4 / ((384 if balloon.neck else 64) * balloon.bending_stiffness)
+        )
         rise = np.minimum(rise, plate)
     rise = np.clip(rise, 0.05 * free, 0.8 * free)
     rise = np.maximum(rise, load.half) if load.tied else rise
     shape = np.clip(1 - ((flat - balloon.neck) / free) ** 2, 0.0, 1.0)
-    shape[: balloon.held + 1] = 1.0
+    shape[: balloon.neck_edge + 1] = 1.0
     return np.tile(flat, (len(rise), 1)), np.minimum(
-        rise[:, None] * shape, load.half[:, None] + 1 / PLATE
+        rise[:, None] * shape, load.half[:, None] + 1 / PLATE_STIFFNESS
     )
 
 
-class Total(NamedTuple):
-    """Energy (rows,) of a film and plates less the work of the air, its derivatives by coordinate,
-    (coordinates, rows) and as a band (coordinates, 6, rows), without what ripples join: that is by
-    the radii of the rim's nodes (nodes, nodes, rows). And the plates' force, (rows,).
+class TotalEnergy(NamedTuple):
+    """Potential energy (rows,) of a film, its air and the plates, with its derivatives.
+
+    ``gradient`` by coordinate (coordinates, rows), the residual; ``matrix``, the tangent stiffness
+    as a band (coordinates, 6, rows), without what ripples couple: that is ``rim``, by the radii of
+    the rim's nodes (nodes, nodes, rows). ``force`` is that of the plates, (rows,).
     """
 
     energy: Array
@@ -264,137 +269,485 @@ class Total(NamedTuple):
 
 
 def coordinates(r: Array, z: Array) -> Array:
-    """Coordinates r, z of each node in turn: (coordinates, rows)."""
+    """Return the coordinates r, z of each node in turn: (coordinates, rows)."""
     return np.stack([r.T, z.T], 1).reshape(-1, len(r))
 
 
-def places(x: Array) -> tuple[Array, Array]:
-    """The radii and heights of the nodes, a row a film."""
+def node_positions(x: Array) -> tuple[Array, Array]:
+    """Return the radii and heights of the nodes, a row a film."""
     return x[0::2].T, x[1::2].T
 
 
-def total(balloon: Balloon, load: BalloonLoad, x: Array) -> Total:
-    """The energy at coordinates."""
+def total_energy(balloon: Balloon, load: BalloonLoad, x: Array) -> TotalEnergy:
+    """Return the potential energy at coordinates, with residual and tangent stiffness."""
     film, edge = balloon.film, balloon.edge
-    r, z = places(x)
-    lie = Elements.of(r, z)
+    r, z = node_positions(x)
+    elements = Elements.of(r, z)
     p = load.pressure
-    bent = bending(film, balloon.rigidity, slice(balloon.held, edge), lie)
-    stretched, filled = membrane(film, lie, load.cap), air(film, edge, lie)
-    eased = rim_ripple.eased(film, edge, load.ripple, r)
+    bend = bending(film, balloon.bending_stiffness, slice(balloon.neck_edge, edge), elements)
+    stretch, content = membrane(film, elements, load.cap), air_volume(film, edge, elements)
+    eased = ripple_energy(film, edge, load.ripple, r)
     slopes, curves = (
         [a + b - p[:, None] * c for a, b, c in zip(*parts, strict=True)]
         for parts in (
-            (bent.term.slopes, stretched.slopes, filled.slopes),
-            (bent.term.curves, stretched.curves, filled.curves),
+            (bend.term.slopes, stretch.slopes, content.slopes),
+            (bend.term.curves, stretch.curves, content.curves),
         )
     )
     number = np.arange(len(film.nodes))
-    stiff = PLATE * p[:, None] * np.where(number < edge, balloon.widths, 0.0)
+    stiff = PLATE_STIFFNESS * p[:, None] * np.where(number < edge, balloon.node_areas, 0.0)
     over = np.maximum(z - load.half[:, None], 0.0)
     touches = over > 0
     if load.tied:
-        holds = number <= balloon.held
-        stiff = np.where(holds, PLATE * np.maximum(p, 1.0)[:, None] * balloon.widths, stiff)
+        holds = number <= balloon.neck_edge
+        stiff = np.where(
+            holds, PLATE_STIFFNESS * np.maximum(p, 1.0)[:, None] * balloon.node_areas, stiff
+        )
         over = np.where(holds, z - load.half[:, None], over)
         touches |= holds
     pressed = stiff * over
-    energy = bent.term.energy + stretched.energy + eased.energy
-    energy = energy - p * filled.energy + (pressed * over).sum(-1) / 2
-    by_place, band = gradient(slopes), matrix(curves, bent.joined)
+    energy = bend.term.energy + stretch.energy + eased.energy
+    energy = energy - p * content.energy + (pressed * over).sum(-1) / 2
+    by_place, band = assembled_gradient(slopes), assembled_tangent(curves, bend.joined)
     by_place[1::2] += pressed.T
     by_place[2 * edge :: 2] += eased.slopes
     band[1::2, 0] += np.where(touches, stiff, 0.0).T
-    return Total(energy, by_place, band, eased.curves, pressed.sum(-1))
+    return TotalEnergy(energy, by_place, band, eased.curves, pressed.sum(-1))
 
 
-def levelled(balloon: Balloon, found: Total) -> Total:
-    """The same with the heights of the neck taken for one, at ``level``."""
+def neck_tied(balloon: Balloon, state: TotalEnergy) -> TotalEnergy:
+    """Tie the heights of the neck to the one at ``level``, in place, and return the energy."""
     for height in range(1, balloon.level, 2):
-        found.gradient[balloon.level] += found.gradient[height]
-        banded.join(found.matrix, height, balloon.level)
-    return found
+        state.gradient[balloon.level] += state.gradient[height]
+        least_energy.tie(state.matrix, height, balloon.level)
+    return state
 
 
-class Energies:
-    """A balloon's energies under a load, for ``least_energy``."""
+class BalloonEnergy:
+    """A balloon's energy under a load, as a ``least_energy.Potential``."""
 
     def __init__(self, balloon: Balloon, load: BalloonLoad) -> None:
         self.balloon, self.load = balloon, load
-        self.scale, self.close = sizes(balloon, load)
+        self.scale, self.close = tolerances(balloon, load)
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        found = levelled(self.balloon, total(self.balloon, self.load.rows(rows), x))
-        band = banded.packed(found.matrix, self.balloon.packing)
+        state = neck_tied(self.balloon, total_energy(self.balloon, self.load.rows(rows), x))
+        band = least_energy.packed(state.matrix, self.balloon.packing)
         # The rim's radii are the last freedoms, next to each other.
-        ends = len(found.rim)
+        ends = len(state.rim)
         for k in range(ends):
             number = np.arange(ends - k)
-            band[len(band) - ends + number, k] += found.rim[number, number + k]
-        return Descent(found.energy, found.gradient * self.balloon.free, band)
+            band[len(band) - ends + number, k] += state.rim[number, number + k]
+        return Descent(state.energy, state.gradient * self.balloon.free, band)
 
-    def ahead(self, state: Descent, damping: Array) -> Array:
+    def newton_step(self, state: Descent, damping: Array) -> Array:
         band = state.matrix.copy()
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.balloon.freedoms
-        found = np.zeros_like(state.gradient)
-        found[freedoms] = banded.solve(band, -state.gradient[freedoms])
-        found[1 : self.balloon.level : 2] = found[self.balloon.level]
-        return found
+        step = np.zeros_like(state.gradient)
+        step[freedoms] = least_energy.solve(band, -state.gradient[freedoms])
+        step[1 : self.balloon.level : 2] = step[self.balloon.level]
+        return step
 
     def change(self, x: Array, ahead: Array) -> Array:
-        return change(x, ahead)
+        return relative_change(x, ahead)
 
 
-def sizes(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
-    """An energy of the size of each balloon's, uJ, and the force in mN that counts as none."""
-    force = CLOSE * np.maximum(load.pressure, LEAST) * math.pi * balloon.pocket**2
+def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
+    """Return an energy of each balloon's size, uJ, and the residual in mN that counts as none."""
+    force = RESIDUAL * np.maximum(load.pressure, LEAST_PRESSURE) * math.pi * balloon.pocket**2
     return load.pressure * balloon.pocket**3, force
 
 
-def change(x: Array, ahead: Array) -> Array:
-    """The largest share of its length by which a step changes an element: (rows,)."""
+def relative_change(x: Array, ahead: Array) -> Array:
+    """Return the largest share of its length by which a step changes an element: (rows,)."""
     length, by = (np.hypot(np.diff(y[0::2], axis=0), np.diff(y[1::2], axis=0)) for y in (x, ahead))
     return np.asarray((by / length).max(0))
 
 
-def _settled(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
-    """The shapes of least energy downhill of these. Raises DesignError where none is found."""
+def _equilibrium(balloon: Balloon, load: BalloonLoad, x: Array) -> Array:
+    """Return the equilibrium downhill of coordinates. Raises DesignError where there is none."""
     try:
-        return settled(Energies(balloon, load), x)
-    except NoBalance:
+        return equilibrium(BalloonEnergy(balloon, load), x)
+    except NoEquilibrium:
         raise DesignError(
-            f"a balloon of radius {balloon.pocket:g} mm finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {balloon.pocket:g} mm; try another load"
         ) from None
 
 
-def compressed(balloon: Balloon, r: Array, z: Array) -> Array:
-    """Length in mm along the film, neck and rim apart, over which the smooth hoop is compressed."""
+def compressed_length(balloon: Balloon, r: Array, z: Array) -> Array:
+    """Return the length in mm along the film over which the smooth hoop is compressed."""
     strains = strain(balloon.film, r, z)
     is_film = balloon.may_wrinkle & (not balloon.inextensible)
-    pressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
+    is_compressed = (strains.hoop + balloon.poisson * strains.meridian < 0) & is_film
     shortest = balloon.film.lengths.min()
-    return np.asarray(np.maximum((pressed * balloon.film.lengths).sum(-1), shortest))
+    return np.asarray(np.maximum((is_compressed * balloon.film.lengths).sum(-1), shortest))
 
 
-def wrinkling(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
-    """The hoop stress in kPa that wrinkles over a zone carry, for each element's tension."""
+def wrinkle_stress(balloon: Balloon, r: Array, z: Array, zone: Array) -> Array:
+    """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
     film = balloon.film
-    tension = balloon.rigid * strain(film, r, z).meridian
+    tension = balloon.membrane_stiffness * strain(film, r, z).meridian
     # A wrinkle of a curved film stretches the meridian: many short ones cost least.
-    held = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
-    held = held + balloon.rigid * curvature(film, r, z) ** 2
-    force = 2 * np.sqrt(balloon.rigidity * held)
+    support = np.maximum(tension, 0.0) * (math.pi / zone[:, None]) ** 2
+    support = support + balloon.membrane_stiffness * curvature(film, r, z) ** 2
+    force = 2 * np.sqrt(balloon.bending_stiffness * support)
     carried: Array = np.full_like(force, math.inf)
     carried[:, balloon.may_wrinkle] = force[:, balloon.may_wrinkle] / balloon.thickness
     return carried
 
 
-def rippling(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
-    """How the rim ripples at the shapes of its one film, which another mirrors, or of both."""
-    strains = [strain(one.film, *shape) for one, shape in zip(films, shapes, strict=True)]
+def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) -> list[Ripple]:
+    """Return the rim's ripples at shapes of one film, which the other mirrors, or of both."""
+    strains = [strain(film.film, *shape) for film, shape in zip(films, shapes, strict=True)]
     pulls = [
-        one.rigid * found.meridian[:, one.edge - 1]
-        for one, found in zip(films, strains, strict=True)
+        film.membrane_stiffness * strains_of.meridian[:, film.edge - 1]
+        for film, strains_of in zip(films, strains, strict=True)
     ]
-    return rim_ripple.rippling(films, strains[0].hoop[:, films[0].edge :], pulls)
+    return rim_ripples(films, strains[0].hoop[:, films[0].edge :], pulls)
+
+
+# The bonded rim of a balloon, which buckles out of its plane where its hoop is compressed.
+#
+# The films, pulled tight, hold the pocket's edge; the rim tilts about it by a cos(n turn), a in
+# rad. At s from that edge a ripple takes up the hoop strain
+#
+#     a^2 rho,    rho = (n^2 s^2 / r^2 - s / r) / 4
+#
+# the first part for the waves' length, the second for the tilt, which draws the hoop inward. It
+# costs
+#
+#     a^2 K / 2,    K = pi int D ((1/r - n^2 s / r^2)^2 + 2 (1 - nu) n^2 (1/r - s/r^2)^2) r ds
+#                       + pi R sum sqrt(B T)
+#
+# the rim's bending and twisting (plate of both films, Kirchhoff), and the films' roots: a long
+# film of bending stiffness B under the tension T is turned at its end against sqrt(B T). With the
+# rim's hoop strain e the energy is a^2 K / 2 + int E (e + a^2 rho)^2 / 2, so that the amplitude of
+# least energy has a closed form, and the rest is quadratic in e. The number of waves is the
+# one of least energy. Nothing is fitted. Lengths mm, pressures kPa, energies uJ.
+
+
+WAVE_NUMBERS = np.arange(2, 201)
+"""Numbers of waves round the rim that are compared."""
+GAUSS_POINTS = 5
+"""Gauss points an element."""
+
+
+class Ripple(NamedTuple):
+    """Ripple of one film's rim, a row a balloon.
+
+    ``waves`` round the rim; ``cost`` is K / 2, infinite for a smooth rim; ``relief`` the rho of the
+    rim's elements, ``pull`` each one's volume times modulus times rho, and ``stiff`` the integral
+    of E rho^2.
+    """
+
+    waves: Array
+    cost: Array
+    relief: Array
+    pull: Array
+    stiff: Array
+
+    def rows(self, these: NDArray[np.int_]) -> Ripple:
+        return Ripple(*(part[these] for part in self))
+
+
+def no_ripples(balloon: Balloon, count: int) -> Ripple:
+    """Return the ripples of rims that stay smooth."""
+    elements = np.zeros((count, len(balloon.nodes) - 1 - balloon.edge))
+    none = np.full(count, math.inf)
+    return Ripple(np.zeros(count), none, elements, elements, np.ones(count))
+
+
+def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
+    """Return the ripples of least energy at the rim's hoop strains (rows, elements), a share for
+    each film; ``tensions`` in N/m are those of the films at the pocket's edge, one row each.
+
+    One film stands for two equal ones.
+    """
+    pair = films if len(films) == 2 else (films[0], films[0])
+    pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
+    roots = sum(
+        np.sqrt(film.bending_stiffness * np.maximum(pull, 0.0))
+        for film, pull in zip(pair, pulls, strict=True)
+    )
+    rigid = sum(film.membrane_stiffness for film in pair)
+    cost, relief, weight, stiff = _rim_modes(pair)
+    cost = cost + math.pi * pair[0].pocket * np.asarray(roots)[:, None] / 2
+    pull = rigid * weight * relief
+    drive = -(hoop @ pull.T + cost)
+    gain = np.where(drive > 0, drive**2 / stiff, 0.0)
+    best = gain.argmax(-1)
+    row = np.arange(len(hoop))
+    ripples = []
+    for film in films:
+        share = film.membrane_stiffness / rigid
+        ripples.append(
+            Ripple(
+                WAVE_NUMBERS[best].astype(float),
+                share * cost[row, best],
+                relief[best],
+                share * pull[best],
+                share * stiff[best],
+            )
+        )
+    return ripples
+
+
+def _rim_modes(pair: Sequence[Balloon]) -> tuple[Array, Array, Array, Array]:
+    """Return, by number of waves: half the cost of bending; rho of each element; each element's
+    area; and the integral of E rho^2 over both films.
+    """
+    balloon = pair[0]
+    nodes = balloon.nodes[balloon.edge :]
+    places, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    length = np.diff(nodes)
+    r = nodes[:-1, None] + length[:, None] * (places + 1) / 2
+    area = math.tau * r * length[:, None] * weights / 2
+    s, n = r - balloon.pocket, WAVE_NUMBERS[:, None, None]
+    around = 1 / r - n**2 * s / r**2
+    twist = n * (1 / r - s / r**2)
+    plate = bonded_bending_stiffness(pair) / (1 - balloon.poisson**2)
+    cost = plate / 4 * (area * (around**2 + 2 * (1 - balloon.poisson) * twist**2)).sum((1, 2))
+    rho = (n**2 * s**2 / r**2 - s / r) / 4
+    size = area.sum(-1)
+    stiff = sum(film.membrane_stiffness for film in pair) * (area * rho**2).sum((1, 2))
+    return cost, (area * rho).sum(-1) / size, size, stiff
+
+
+def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
+    """Return the bending stiffness in kPa mm3 of both films bonded, as a strip free to narrow."""
+    (e1, t1), (e2, t2) = ((film.modulus, film.thickness) for film in pair)
+    mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
+    return (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))
+
+
+def squared_tilt(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> Array:
+    """Return the squared tilt a^2 of least energy, a row a balloon."""
+    return np.asarray(_ripple_drive(_rim_hoop(flat, edge, r), ripple) / ripple.stiff)
+
+
+class RippleEnergy(NamedTuple):
+    """Energy (rows,); derivatives by the rim's radii (nodes, rows), (nodes, nodes, rows)."""
+
+    energy: Array
+    slopes: Array
+    curves: Array
+
+
+def ripple_energy(flat: FlatFilm, edge: int, ripple: Ripple, r: Array) -> RippleEnergy:
+    """Return the energy that ripples take off that of a smooth rim: below 0, or 0."""
+    drive = _ripple_drive(_rim_hoop(flat, edge, r), ripple)
+    middles = flat.middles[edge:]
+    wide = (r[:, edge + 1 :] + r[:, edge:-1]) / (2 * middles)
+    # Slopes of the hoop strain by the radius of either node, and what they change by.
+    first = wide ** (flat.order - 1) / (2 * middles)
+    second = (flat.order - 1) * wide ** (flat.order - 2) / (2 * middles) ** 2
+    tilt = drive / ripple.stiff
+    pulled = (ripple.pull * first).T
+    steep = np.zeros((len(pulled) + 1, len(r)))
+    steep[:-1] += pulled
+    steep[1:] += pulled
+    curves = np.where(drive > 0, -1 / ripple.stiff, 0.0) * steep[:, None] * steep
+    bent = (tilt[:, None] * ripple.pull * second).T
+    number = np.arange(len(bent))
+    for i in (0, 1):
+        for j in (0, 1):
+            curves[number + i, number + j] += bent
+    return RippleEnergy(-drive * tilt / 2, tilt * steep, curves)
+
+
+def _rim_hoop(flat: FlatFilm, edge: int, r: Array) -> Array:
+    return strain(flat, r, np.zeros_like(r)).hoop[:, edge:]
+
+
+def _ripple_drive(hoop: Array, ripple: Ripple) -> Array:
+    """Return the excess of the hoop's compression over the ripples' cost; 0 where there is none."""
+    return np.asarray(np.maximum(-(ripple.cost + (hoop * ripple.pull).sum(-1)), 0.0))
+
+
+# A balloon of two unlike films: each with its thickness and modulus, bonded at one rim.
+#
+# Both films are solved at once. They share the rim, which moves to where their pulls are equal and
+# tilts as they twist it: as a ring whose section turns.
+
+
+COUPLED = 5
+"""Number of coordinates further on to which one is coupled."""
+TwoFilms = tuple["Balloon", "Balloon"]
+Loads = tuple["BalloonLoad", "BalloonLoad"]
+
+
+def inflate_two_films(films: TwoFilms, load: BalloonLoad) -> Shapes:
+    """Return the shapes under a load; ``r`` and ``z`` are those of the film that stretches more
+    easily.
+
+    Raises DesignError where Newton's method finds no equilibrium.
+    """
+    loads = (load, load)
+    basis = _basis(films[0], is_free=bool(np.isinf(load.half).any()))
+    begin = [coordinates(*initial_shape(film, load)) for film in films]
+    y = np.asarray(np.linalg.pinv(basis) @ np.concatenate(begin), dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        y = _two_film_equilibrium(films, loads, basis, y)
+        if films[0].wrinkles:
+            zones = [
+                compressed_length(film, *node_positions(part))
+                for film, part in zip(films, np.split(basis @ y, 2), strict=True)
+            ]
+            for _ in range(WRINKLE_ROUNDS):
+                shapes = [node_positions(part) for part in np.split(basis @ y, 2)]
+                ripples = ripples_at(films, shapes)
+                loads = tuple(
+                    load._replace(cap=wrinkle_stress(film, *shape, zone), ripple=ripple)
+                    for film, shape, zone, ripple in zip(films, shapes, zones, ripples, strict=True)
+                )  # type: ignore[assignment]
+                y = _two_film_equilibrium(films, loads, basis, y)
+    x = basis @ y
+    energy = (_rim_twist(films) @ x) ** 2 / 2
+    volume, force = np.zeros_like(energy), np.zeros_like(energy)
+    shapes = []
+    for film, load_of, part in zip(films, loads, np.split(x, 2), strict=True):
+        r, z = (np.ascontiguousarray(each) for each in node_positions(part))
+        state = total_energy(film, load_of, part)
+        half_volume = air_volume(film.film, film.edge, Elements.of(r, z)).energy
+        energy, volume = energy + state.energy + load.pressure * half_volume, volume + half_volume
+        force = force + state.force / 2
+        shapes.append((r, z))
+    height = shapes[0][1][:, 0] + shapes[1][1][:, 0]
+    softer = shapes[int(films[1].membrane_stiffness < films[0].membrane_stiffness)]
+    return Shapes(load.pressure, height, volume, force, energy, *softer)
+
+
+def _rim_twist(films: TwoFilms) -> Array:
+    """Return the row whose product with the coordinates is the square root of twice the rim's twist
+    energy.
+
+    A ring of both films bonded turns round its middle line: hoops are bent.
+    """
+    film = films[0]
+    stiff = (
+        math.tau
+        * bonded_bending_stiffness(films)
+        * math.log((film.pocket + film.ring) / film.pocket)
+    )
+    row = np.zeros(4 * len(film.nodes))
+    row[[2 * len(film.nodes) - 1, 2 * film.edge + 1]] = 1.0, -1.0
+    return np.asarray(row * math.sqrt(stiff) / film.ring)
+
+
+def _basis(balloon: Balloon, is_free: bool) -> Array:
+    """Return the motion of a unit of each degree of freedom: (coordinates of both films, freedoms).
+
+    First come those of each film alone, then the shared ones: the rim's radii, its tilt, and its
+    height. A free balloon's rim stays in its plane: its height as a whole is no freedom.
+    """
+    count, inner = len(balloon.nodes), _inner_freedoms(balloon)
+    basis = np.zeros((4 * count, 2 * len(inner) + count - balloon.edge + 1 + (not is_free)))
+    for film, start in ((0, 0), (2 * count, len(inner))):
+        basis[film + inner, start + np.arange(len(inner))] = 1.0
+        basis[
+            film + 1 : film + balloon.level : 2, start + np.searchsorted(inner, balloon.level)
+        ] = 1.0
+    rim, shared = np.arange(balloon.edge, count), 2 * len(inner)
+    for film, side in ((0, 1.0), (2 * count, -1.0)):
+        basis[film + 2 * rim, shared + np.arange(len(rim))] = 1.0
+        basis[film + 2 * rim + 1, shared + len(rim)] = side * (balloon.nodes[rim] - balloon.pocket)
+        basis[film + 2 * rim + 1, shared + len(rim) + 1 :] = side
+    return basis
+
+
+def _inner_freedoms(film: Balloon) -> NDArray[np.int_]:
+    """Return the coordinates that only one film has: those inside the pocket's edge."""
+    return film.freedoms[film.freedoms < 2 * film.edge]
+
+
+def _two_film_equilibrium(films: TwoFilms, loads: Loads, basis: Array, y: Array) -> Array:
+    """Return the freedoms (freedoms, rows) of least energy downhill of these."""
+    try:
+        return equilibrium(_TwoFilmEnergy(films, loads, basis), y)
+    except (NoEquilibrium, np.linalg.LinAlgError):
+        raise DesignError(
+            f"no equilibrium found for a balloon of radius {films[0].pocket:g} mm with two unlike "
+            "films; try another load"
+        ) from None
+
+
+class _TangentBlocks(NamedTuple):
+    """Blocks of the tangent stiffness, rows last.
+
+    ``inner`` are bands of each film's inner freedoms (freedoms, 6, 2 rows), the first film's rows
+    before the second's; ``between`` couples the last of them with the shared ones (``COUPLED``,
+    shared, 2 rows), all others are 0; ``shared`` (rows, shared, shared).
+    """
+
+    inner: Array
+    between: Array
+    shared: Array
+
+
+class _TwoFilmEnergy:
+    """The energy of both films under their loads, by freedoms, as a ``least_energy.Potential``."""
+
+    def __init__(self, films: TwoFilms, loads: Loads, basis: Array) -> None:
+        self.films, self.loads, self.basis = films, loads, basis
+        self.wrings = _rim_twist(films) @ basis
+        self.scale, self.close = tolerances(films[0], loads[0])
+        inner = _inner_freedoms(films[0])
+        self.packing = least_energy.packing(inner, len(basis) // 2, COUPLED + 1)
+        self.alone = len(inner)
+
+    def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
+        first = 2 * self.alone
+        by = self.wrings[first:]
+        wrung = self.wrings @ x
+        energy, slopes = wrung**2 / 2, wrung * self.wrings[:, None]
+        shared = np.tile(np.multiply.outer(by, by), (x.shape[1], 1, 1))
+        bases, parts = np.split(self.basis, 2), np.split(self.basis @ x, 2)
+        inner, between = [], []
+        for film, load, part, basis in zip(self.films, self.loads, parts, bases, strict=True):
+            state = total_energy(film, load.rows(rows), part)
+            energy = energy + state.energy
+            slopes += basis.T @ state.gradient
+            neck_tied(film, state)
+            inner.append(least_energy.packed(state.matrix, self.packing))
+            # The rim, and what is near enough to be joined with it.
+            edge = 2 * film.edge
+            end, moved = least_energy.dense(state.matrix[edge - COUPLED :]), basis[edge:, first:]
+            rim = np.arange(COUPLED, end.shape[1], 2)
+            end[:, rim[:, None], rim] += np.moveaxis(state.rim, -1, 0)
+            between.append(np.moveaxis(end[:, :COUPLED, COUPLED:] @ moved, 0, -1))
+            shared += moved.T @ end[:, COUPLED:, COUPLED:] @ moved
+        matrix = _TangentBlocks(np.concatenate(inner, -1), np.concatenate(between, -1), shared)
+        return Descent(energy, slopes, matrix)
+
+    def newton_step(self, state: Descent, damping: Array) -> Array:
+        """Return Newton's step by the Schur complement of the shared freedoms."""
+        matrix, first = state.matrix, 2 * self.alone
+        several, rows = matrix.shared.shape[1], len(damping)
+        band, shared = matrix.inner.copy(), matrix.shared.copy()
+        band[:, 0] += _regularisation(band[:, 0], np.tile(damping, 2))
+        number = np.arange(several)
+        shared[:, number, number] += _regularisation(shared[:, number, number].T, damping).T
+        right_side = np.zeros((self.alone, several + 1, 2 * rows))
+        right_side[-COUPLED:, :-1] = matrix.between
+        right_side[:, -1] = -np.concatenate(np.split(state.gradient[:first], 2), -1)
+        alone = least_energy.solve(band, right_side)
+        passed = np.einsum("iar,ibr->rab", matrix.between, alone[-COUPLED:])
+        passed = passed[:rows] + passed[rows:]
+        remainder = -state.gradient[first:].T - passed[..., -1]
+        shared_step = np.linalg.solve(shared - passed[..., :-1], remainder[..., None])[..., 0].T
+        inner_step = alone[:, -1] - (alone[:, :-1] * np.tile(shared_step, 2)).sum(1)
+        return np.concatenate([inner_step[:, :rows], inner_step[:, rows:], shared_step])
+
+    def change(self, x: Array, ahead: Array) -> Array:
+        parts = zip(np.split(self.basis @ x, 2), np.split(self.basis @ ahead, 2), strict=True)
+        return np.asarray(np.max([relative_change(*part) for part in parts], axis=0))
+
+
+def _regularisation(diagonal: Array, damping: Array) -> Array:
+    """Return the addition to a diagonal (n, rows): damping, and a share of the order of rounding.
+
+    The second is for slack films without pressure, which nothing may hold.
+    """
+    size = np.abs(diagonal)
+    return np.asarray(damping * size + 1e-15 * size.max(0))

@@ -1,12 +1,12 @@
-"""One balloon as a smooth map: what it holds and pushes with, at any pressure and height.
+"""One balloon as a smooth map: its volume and its force, at any pressure and height.
 
 Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
 -dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
-both derivatives of balloons between plates. So the map keeps energy: what the air gives on any
-way round comes back. A balloon of least energy holds the more the higher its pressure, and pushes
-the less the higher it stands (W is concave in p, convex in h): of all splines that do, and hold a
-volume above 0, the map is the one nearest to the balloons. Lengths mm, pressures kPa, volumes ul,
-forces mN, energies uJ.
+both derivatives of balloons between plates. So the map conserves energy: no cycle of pressure and
+height gives or takes work. A balloon of least energy holds the more the higher its pressure, and
+pushes the less the higher it stands (W is concave in p, convex in h): of all splines that do, and
+hold a volume above 0, the map is the one nearest to the balloons. Lengths mm, pressures kPa,
+volumes ul, forces mN, energies uJ.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes
-from sbafab.models.nearest import nearest
-from sbafab.models.rippled import pressed, risen
+from sbafab.models.rippled import compressed_shapes, free_shapes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -30,43 +29,42 @@ if TYPE_CHECKING:
 
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
-"""Pieces of the spline each way."""
+"""Pieces of the spline by pressure and by height."""
 PRESSURE_POINTS, HEIGHT_POINTS = 16, 24
-"""Balloons computed each way."""
+"""Balloons computed by pressure and by height."""
 P0 = 0.1
-"""Pressure in kPa below which the spline's pieces are alike in pressure, above alike in ratio."""
-RISES = 65
-"""Pressures at which free heights are kept to begin with."""
-CAVES_IN = 0.1
-"""Suction in kPa by which a slack film caves in: about what brings one taut, ours, not measured."""
-ABOVE = 1.15
-"""How far the map goes on above the highest free balloon, as a share of it."""
-FLATTEST = 0.01
-"""Least height in mm that is computed; what lies below is carried on."""
-FLAT = 0.1
+"""Pressure in kPa below which the spline's pieces are equal in pressure, above equal in ratio."""
+RISE_POINTS = 65
+"""Pressures at which free heights are tabulated, to start from."""
+COLLAPSE_SUCTION = 0.1
+"""Suction in kPa at which a slack film collapses: about what brings one taut, not measured."""
+HEADROOM = 1.15
+"""Height of the map over that of the highest free balloon."""
+LEAST_HEIGHT = 0.01
+"""Least height in mm that is computed; below it the map extrapolates."""
+FLAT_WEIGHT = 0.1
 """Weight of balloons that are pressed flat and hold nothing."""
-LOW = 0.1
-"""Pressure in kPa below which forces are fitted all alike, above by their share of it."""
-VOLUMES = 0.6
+LOW_PRESSURE = 0.1
+"""Pressure in kPa below which force errors are weighted absolutely, above relatively."""
+VOLUME_WEIGHT = 0.6
 """Weight of volumes beside forces."""
-NEARLY_FLAT = 0.2
-"""Height in mm above which volumes are fitted by their share of what they are, below all alike."""
+LOW_HEIGHT = 0.2
+"""Height in mm below which volume errors are weighted absolutely, above relatively."""
 PRESSURE_CHECKS, HEIGHT_CHECKS = 8 * PRESSURE_SPANS + 1, 4 * HEIGHT_SPANS + 1
-"""Places each way at which volumes are made to rise with pressure and forces to fall with height.
-"""
-LOWEST = np.array([0.001, 0.002, 0.004, 0.007])
-"""Further ones near the flat, as shares of the map's height."""
-EMPTIEST = 0.005
-"""Share of the map's height from which on volumes are made to be above 0."""
+"""Points at which volumes must rise with pressure and forces fall with height, each way."""
+LOW_CHECKS = np.array([0.001, 0.002, 0.004, 0.007])
+"""Further heights near the flat, as shares of the map's height."""
+LEAST_CHECK = 0.005
+"""Share of the map's height from which on volumes must be above 0."""
 MARGIN = 5e-5
-"""By how much, as a share, they do so there, that they do it between as well."""
-ROUNDS = 12
-"""How often places at which they do not are looked for."""
+"""Share by which the limits are met at these points, so that they hold in between as well."""
+ACTIVE_SET_ROUNDS = 12
+"""Rounds in which limits that are violated join the active set."""
 MOST_STRETCH = 0.15
 """Share by which films may stretch; one modulus is unlikely to hold beyond."""
 
 
-def _pieces() -> Array:
+def _spline_pieces() -> Array:
     """Polynomials of the uniform B-spline: row j is that of coefficient j, in powers of u."""
     rows = np.ones((1, 1))
     for degree in range(1, DEGREE + 1):
@@ -82,19 +80,19 @@ def _pieces() -> Array:
     return rows
 
 
-PIECES = _pieces()
+PIECES = _spline_pieces()
 POWERS = np.arange(DEGREE + 1.0)
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
 PIECES_IN_ALL = HEIGHT_SPANS + 2
-"""Those of a spline by height, and what it goes on with at either end."""
+"""Pieces of a spline by height, with an extrapolation at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
 
 
 def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
-    """Where the piece at ``x`` (in pieces) begins among the coefficients, and their weights there:
-    of the value, or of its first or second derivative.
+    """Return the first coefficient of the piece at ``x`` (in pieces), and the weights there of it
+    and the next ones: for the value, or for the first or second derivative.
     """
     first = x.astype(np.int_)
     table = (PIECES, SLOPES, CURVES)[order]
@@ -103,17 +101,17 @@ def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
     return first, powers @ table.T
 
 
-def _shifted(by: float, count: int) -> Array:
-    """What the first three powers of a polynomial are about a place ``by`` further: (3, count)."""
-    found = np.zeros((3, count))
+def _taylor_shift(by: float, count: int) -> Array:
+    """Return the first three powers of a polynomial about a point ``by`` further: (3, count)."""
+    rows = np.zeros((3, count))
     for k in range(count):
         for j in range(min(k, 2) + 1):
-            found[j, k] = math.comb(k, j) * by ** (k - j)
-    return found
+            rows[j, k] = math.comb(k, j) * by ** (k - j)
+    return rows
 
 
-ENDS = _shifted(-1.0, 3), _shifted(1.0, DEGREE + 1)
-"""What goes on below the first piece, and above the last one."""
+ENDS = _taylor_shift(-1.0, 3), _taylor_shift(1.0, DEGREE + 1)
+"""Extrapolations below the first piece and above the last one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +132,7 @@ class BalloonMap:
 
     @cached_property
     def _polynomials(self) -> Array:
-        """By powers of both places: (pieces in pressure, powers, pieces by height x powers)."""
+        """Polynomials by both: (pieces by pressure, powers, pieces by height x powers)."""
         by_height = pieces(self.coefficients).reshape(len(self.coefficients), -1)
         rows = by_height[np.arange(PRESSURE_SPANS)[:, None] + np.arange(DEGREE + 1)]
         return np.asarray(PIECES.T @ rows)
@@ -161,41 +159,43 @@ class BalloonMap:
         powers[..., 0, :] = (x - first)[..., None] ** POWERS
         powers[..., 1, 0] = 0.0
         powers[..., 1, 1:] = powers[..., 0, :-1] * POWERS[1:] * -rate[..., None]
-        found = powers @ self._polynomials[first]
-        found = found.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
+        polynomials = powers @ self._polynomials[first]
+        polynomials = polynomials.reshape(*p.shape, 2, PIECES_IN_ALL, DEGREE + 1)
         if sucked:
-            kept = np.exp((below - p) / CAVES_IN)[..., None, None]
-            found[..., 0, :, :] -= CAVES_IN * (kept - 1) * found[..., 1, :, :]
-            found[..., 1, :, :] *= kept
-        return found
+            fall = np.exp((below - p) / COLLAPSE_SUCTION)[..., None, None]
+            polynomials[..., 0, :, :] -= COLLAPSE_SUCTION * (fall - 1) * polynomials[..., 1, :, :]
+            polynomials[..., 1, :, :] *= fall
+        return polynomials
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
-        """Place among the pieces in pressure, and its rate by pressure."""
+        """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
         each = PRESSURE_SPANS / math.asinh(self.most_pressure / P0)
         x = np.minimum(np.arcsinh(p / P0) * each, PRESSURE_SPANS * (1 - 1e-12))
         return x, each / np.hypot(p, P0)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """MN on the plate at either end; below 0 where the balloon is pulled on."""
+        """Return the force in mN on the plate at either end; below 0 for a pull."""
         return -self._along(0, pressure, height).first * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """Ul in the balloon."""
+        """Return the volume of the balloon, ul."""
         return self._along(1, pressure, height).value
 
     def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """uJ: energy of the films less pressure times volume."""
+        """Return the energy of the films less pressure times volume, uJ."""
         return self._along(0, pressure, height).value
 
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> Along:
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-        found = self.pressed(p)[..., which, :, :].reshape(-1, DEGREE + 1)
+        polynomials = self.pressed(p)[..., which, :, :].reshape(-1, DEGREE + 1)
         return along(
-            derivatives(found), PIECES_IN_ALL * np.arange(p.size).reshape(p.shape), h * self.spans
+            derivatives(polynomials),
+            PIECES_IN_ALL * np.arange(p.size).reshape(p.shape),
+            h * self.spans,
         )
 
     def free_height(self, pressure: ArrayLike) -> Array:
-        """Mm to which it rises where nothing holds it."""
+        """Return the height in mm of the unloaded balloon."""
         p = np.asarray(pressure, float)
         low, high = np.zeros(p.shape), np.full(p.shape, self.most_height)
         for _ in range(50):
@@ -205,12 +205,12 @@ class BalloonMap:
         return np.asarray((low + high) / 2)
 
     def rises(self, pressure: ArrayLike) -> Array:
-        """About its free height, at little cost: where to begin a search."""
+        """Return an interpolated free height, to start a search from."""
         return np.interp(np.arcsinh(np.asarray(pressure, float) / P0), *self._rises)
 
     @cached_property
     def _rises(self) -> tuple[Array, Array]:
-        x = np.linspace(0, math.asinh(self.most_pressure / P0), RISES)
+        x = np.linspace(0, math.asinh(self.most_pressure / P0), RISE_POINTS)
         return x, self.free_height(np.minimum(P0 * np.sinh(x), self.most_pressure))
 
 
@@ -228,78 +228,78 @@ def pieces(coefficients: Array) -> Array:
     The first goes on below the spline and the last above it, with the second derivative there.
     """
     inner = coefficients[..., WINDOWS] @ PIECES
-    found = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
-    found[..., 1:-1, :] = inner
-    found[..., 0, :3] = inner[..., 0, :3] @ ENDS[0].T
-    found[..., -1, :3] = inner[..., -1, :] @ ENDS[1].T
-    return found
+    polynomials = np.zeros((*inner.shape[:-2], PIECES_IN_ALL, DEGREE + 1))
+    polynomials[..., 1:-1, :] = inner
+    polynomials[..., 0, :3] = inner[..., 0, :3] @ ENDS[0].T
+    polynomials[..., -1, :3] = inner[..., -1, :] @ ENDS[1].T
+    return polynomials
 
 
 def derivatives(polynomials: Array) -> Array:
     """Polynomials (rows, powers) with their first two derivatives: (powers, 3, rows)."""
-    found = np.zeros((DEGREE + 1, 3, len(polynomials)))
+    table = np.zeros((DEGREE + 1, 3, len(polynomials)))
     powers = np.arange(1.0, DEGREE + 1)[:, None]
-    found[:, 0] = polynomials.T
-    np.multiply(found[1:, 0], powers, out=found[:-1, 1])
-    np.multiply(found[1:-1, 1], powers[:-1], out=found[:-2, 2])
-    return found
+    table[:, 0] = polynomials.T
+    np.multiply(table[1:, 0], powers, out=table[:-1, 1])
+    np.multiply(table[1:-1, 1], powers[:-1], out=table[:-2, 2])
+    return table
 
 
 def along(table: Array, which: NDArray[np.int_], y: Array) -> Along:
-    """Splines at places ``y``, in pieces.
+    """Return splines with derivatives at heights ``y``, in pieces.
 
-    ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` says at which row each
-    one begins.
+    ``table`` are the ``derivatives`` of the pieces of all splines; ``which`` is the row at which
+    each one begins.
     """
-    found = horner(table, which, y)
-    return Along(*found)
+    values = horner(table, which, y)
+    return Along(*values)
 
 
 def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
-    """Polynomials (powers, ..., rows) of splines at places ``y``, in pieces."""
+    """Return polynomials (powers, ..., rows) of splines at heights ``y``, in pieces."""
     # Pieces are counted from the one below the spline.
     after = y + 1.0
     piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
     u = after - piece
     powers = table.take(which + piece, axis=-1)
-    found = powers[DEGREE] * u
+    values = powers[DEGREE] * u
     for power in powers[DEGREE - 1 : 0 : -1]:
-        found += power
-        found *= u
-    found += powers[0]
-    return np.asarray(found)
+        values += power
+        values *= u
+    values += powers[0]
+    return np.asarray(values)
 
 
 @lru_cache(maxsize=64)
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
-    top = ABOVE * highest(balloon, most_pressure)
+    top = HEADROOM * highest(balloon, most_pressure)
     p = P0 * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / P0))
     # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
     even = _spread(HEIGHT_POINTS)
-    h = FLATTEST + (top - FLATTEST) * (even + even**2) / 2
+    h = LEAST_HEIGHT + (top - LEAST_HEIGHT) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
-    found = pressed(balloon, pressures, heights, tied=True)
+    shapes = compressed_shapes(balloon, pressures, heights, tied=True)
     return BalloonMap(
-        balloon, most_pressure, top, _fitted(pressures, heights, found, most_pressure, top)
+        balloon, most_pressure, top, _fitted(pressures, heights, shapes, most_pressure, top)
     )
 
 
 def highest(balloon: Balloon, most_pressure: float) -> float:
     """Height in mm to which it may rise freely: at a pressure, or where its films stretch most."""
     pressures = np.linspace(most_pressure / 8, most_pressure, 8)
-    free = risen(balloon, pressures)
+    free = free_shapes(balloon, pressures)
     longer = stretch(balloon, free)
     return float(np.interp(MOST_STRETCH, longer, free.height))
 
 
 def _spread(count: int) -> Array:
-    """Points from 0 to 1, closer at the ends."""
+    """Return points from 0 to 1, closer together at the ends."""
     even = np.linspace(0, 1, count)
     return (even + (1 - np.cos(math.pi * even)) / 2) / 2
 
 
-def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array:
+def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Array:
     """Coefficients of the potential: least squares of W, the force and the volume."""
     blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
     x, rate = BalloonMap(Balloon(), most, top, blank)._scaled(p)
@@ -315,10 +315,10 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
 
     # ``inflate`` keeps what wrinkles carry while it looks for balance, so that its forces and its
     # volumes are not quite slopes of one potential. Heights and bends hang on the forces.
-    area = found.r[:, -1].max() ** 2 * math.pi
-    push = 1 / (area * (p + LOW) + 3 * np.abs(found.force))
-    room = VOLUMES / (area * np.minimum(h + NEARLY_FLAT, top))
-    potential = found.energy - p * found.volume
+    area = shapes.r[:, -1].max() ** 2 * math.pi
+    push = 1 / (area * (p + LOW_PRESSURE) + 3 * np.abs(shapes.force))
+    room = VOLUME_WEIGHT / (area * np.minimum(h + LOW_HEIGHT, top))
+    potential = shapes.energy - p * shapes.volume
     scale = push / top
     matrix = np.concatenate(
         [
@@ -326,13 +326,13 @@ def _fitted(p: Array, h: Array, found: Shapes, most: float, top: float) -> Array
             equations(0, 1, (-push * HEIGHT_SPANS / top)[:, None]),
             equations(1, 0, (-rate * room)[:, None]),
             # Pressed flat, it holds nothing.
-            equations(1, 0, (-FLAT * rate * room)[:, None], flat)[lowest],
+            equations(1, 0, (-FLAT_WEIGHT * rate * room)[:, None], flat)[lowest],
         ]
     )
-    wanted = np.concatenate(
-        [potential * scale, found.force * push, found.volume * room, np.zeros(lowest.sum())]
+    right_side = np.concatenate(
+        [potential * scale, shapes.force * push, shapes.volume * room, np.zeros(lowest.sum())]
     )
-    best = _admissible(matrix, wanted, _limits(most, top, area))
+    best = _admissible(matrix, right_side, _limits(most, top, area))
     if best is None:
         raise DesignError(
             f"no smooth map of a balloon fits up to {most:g} kPa; ask for less pressure"
@@ -354,56 +354,56 @@ class MapLimits(NamedTuple):
 
     def rows(self, chosen: list[NDArray[np.bool_]]) -> Array:
         """Return the equations of the places chosen: (places, coefficients)."""
-        found = []
+        rows = []
         for (across, along), these in zip(self.kinds, chosen, strict=True):
             i, j = np.nonzero(these)
             size = across.shape[1] * along.shape[1]
-            found.append((across[i][:, :, None] * along[j][:, None]).reshape(len(i), size))
-        return np.concatenate(found)
+            rows.append((across[i][:, :, None] * along[j][:, None]).reshape(len(i), size))
+        return np.concatenate(rows)
 
 
 def _limits(most: float, top: float, area: float) -> MapLimits:
-    """Return what W has to obey: volumes that rise with pressure and are above 0 without any, as
-    shares of what area times height holds; forces that fall with height, of pressure times area.
+    """Return the limits on W: volumes that rise with pressure and are above 0 without any, as
+    shares of area times height; forces that fall with height, as shares of pressure times area.
     """
     each = PRESSURE_SPANS / math.asinh(most / P0)
     x = np.linspace(0, PRESSURE_SPANS * (1 - 1e-12), PRESSURE_CHECKS)
     even = np.linspace(0, 1 - 1e-12, HEIGHT_CHECKS)
-    y = HEIGHT_SPANS * np.sort(np.concatenate([(even + even**2) / 2, LOWEST]))
+    y = HEIGHT_SPANS * np.sort(np.concatenate([(even + even**2) / 2, LOW_CHECKS]))
     value, slope, curve = (_rows(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
     slope, curve = each * slope, each**2 * curve
     # With p = P0 sinh s the volume is -W_s / (P0 cosh s).
     s = (x / each)[:, None]
     rises = (np.tanh(s) * slope - curve) / (P0 * np.cosh(s) * area * top)
-    falls = value * HEIGHT_SPANS**2 / top / (area * (P0 * np.sinh(s) + LOW))
-    share = np.maximum(y / HEIGHT_SPANS, EMPTIEST)
+    falls = value * HEIGHT_SPANS**2 / top / (area * (P0 * np.sinh(s) + LOW_PRESSURE))
+    share = np.maximum(y / HEIGHT_SPANS, LEAST_CHECK)
     by_height, bent = (_rows(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
     by_height /= share[:, None]
     holds = _rows(share * HEIGHT_SPANS * (1 - 1e-12), 0, HEIGHT_SPANS + DEGREE) / share[:, None]
     return MapLimits(((rises, by_height), (falls, bent), (-slope[:1] / (P0 * area * top), holds)))
 
 
-def _admissible(matrix: Array, wanted: Array, limits: MapLimits) -> Array | None:
-    """Return the coefficients of least squares that keep the limits; None where none are found.
+def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | None:
+    """Return the least-squares coefficients within the limits; None where there are none.
 
-    Limits are taken up where they are not kept, until all are.
+    An active-set method: violated limits are added until all are met.
     """
     stiff = 1e-9 * np.abs(matrix).max() * np.eye(matrix.shape[1])
     upper = np.linalg.qr(np.concatenate([matrix, stiff]), mode="r")
     back = np.linalg.inv(upper)
-    free = back.T @ (matrix.T @ wanted)
-    best, chosen = back @ free, [np.zeros(one.shape, bool) for one in limits.values(back @ free)]
-    for _ in range(ROUNDS):
+    free = back.T @ (matrix.T @ right_side)
+    best, chosen = back @ free, [np.zeros(kind.shape, bool) for kind in limits.values(back @ free)]
+    for _ in range(ACTIVE_SET_ROUNDS):
         values = limits.values(best)
-        if min(one.min() for one in values) >= MARGIN / 2:
+        if min(kind.min() for kind in values) >= MARGIN / 2:
             return np.asarray(best)
-        chosen = [old | (one < 2 * MARGIN) for old, one in zip(chosen, values, strict=True)]
+        chosen = [old | (kind < 2 * MARGIN) for old, kind in zip(chosen, values, strict=True)]
         rows = limits.rows(chosen) @ back
         size = np.linalg.norm(rows, axis=1)
-        kept = nearest(free, rows / size[:, None], MARGIN / size)
-        if kept is None:
+        closest = nearest_admissible(free, rows / size[:, None], MARGIN / size)
+        if closest is None:
             return None
-        best = back @ kept
+        best = back @ closest
     return None
 
 
@@ -415,7 +415,58 @@ def _rows(x: Array, order: int, count: int) -> Array:
 
 
 def stretch(kind: Balloon, shape: Shapes) -> Array:
-    """By what share the film between neck and rim is longer than it was flat."""
-    part = slice(kind.held, kind.edge + 1)
+    """Return the relative elongation of the film between neck and rim."""
+    part = slice(kind.neck_edge, kind.edge + 1)
     lengths = np.hypot(np.diff(shape.r[:, part]), np.diff(shape.z[:, part]))
     return np.asarray(lengths.sum(-1) / (kind.pocket - kind.neck) - 1)
+
+
+# Projection onto linear limits: a convex quadratic program.
+
+
+QP_STEPS = 80
+CLOSE, SMALL = 1e-5, 1e-8
+"""Residual that counts as none; violation, and slack times its multiplier, that count as none."""
+STEP_SHARE = 0.99
+"""Share of the way to the next limit that a step may go."""
+
+
+def nearest_admissible(point: Array, rows: Array, least: Array) -> Array | None:
+    """Return the x nearest to ``point`` (n,) with ``rows @ x >= least``; None where there is none.
+
+    Rows (m, n) are unit vectors. Mehrotra's predictor and corrector (Nocedal and Wright, Numerical
+    Optimization, Sec. 16.6).
+    """
+    x = point.copy()
+    room = rows @ x - least
+    begin = max(1e-2 * float(np.abs(room).max(initial=0.0)), 1e-4)
+    slack, push = np.maximum(room, begin), np.full(len(rows), begin)
+    for _ in range(QP_STEPS):
+        off = x - point - push @ rows
+        gap = rows @ x - slack - least
+        mean = float(slack @ push) / len(rows)
+        if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
+            return x
+        weighted = rows * np.sqrt(push / slack)[:, None]
+        # A matrix times its own transpose: BLAS does half of the work.
+        inverse = np.linalg.inv(np.eye(len(x)) + weighted.T @ weighted)
+
+        def step(target: Array) -> tuple[Array, Array, Array]:
+            ahead = inverse @ (((-target - push * gap) / slack) @ rows - off)  # noqa: B023
+            slacker = rows @ ahead + gap  # noqa: B023
+            return ahead, slacker, (-target - push * slacker) / slack  # noqa: B023
+
+        _, slacker, harder = step(slack * push)
+        to = _share(slack, slacker), _share(push, harder)
+        remainder = (slack + to[0] * slacker) @ (push + to[1] * harder) / len(rows)
+        aim = (remainder / mean) ** 3 * mean
+        ahead, slacker, harder = step(slack * push + slacker * harder - aim)
+        share = min(1.0, STEP_SHARE * min(_share(slack, slacker), _share(push, harder)))
+        x, slack, push = x + share * ahead, slack + share * slacker, push + share * harder
+    return None
+
+
+def _share(values: Array, by: Array) -> float:
+    """Return the share of a step after which the first value is 0; inf where none ever is."""
+    falls = by < 0
+    return float((values[falls] / -by[falls]).min(initial=np.inf))

@@ -1,8 +1,9 @@
-"""Drawn pockets: what holds of any outline, and discs in place of one that is nearly round.
+"""Drawn pockets: discs in place of one that is nearly round, and bounds that hold for any outline.
 
-A pocket holds every disc within it and lies in every disc round it: its films are bonded where the
-outer disc's are free, and free where the inner disc's are bonded. So the figures of both discs,
-round the chamber's axis, bound its own, where a wider pocket rises more and pushes harder.
+A pocket contains every disc within it and lies in every disc round it: its films are bonded where
+the outer disc's are free, and free where the inner disc's are bonded. So the figures of both
+discs, round the chamber's axis, bound its own, where a wider pocket rises more and pushes
+harder.
 """
 
 from __future__ import annotations
@@ -12,19 +13,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from sbafab.design.form import Discs, Drawn, Form
 from sbafab.design.outline import read_outline
-from sbafab.design.records import Design
-from sbafab.models.actuator import Actuator
-from sbafab.models.figures import Asked, Figure, LeftOut, Model, Relation
-from sbafab.models.force import force
+from sbafab.design.records import Design, Discs, Drawn, Form
+from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest, Relation
+from sbafab.models.formulas import force
+from sbafab.models.kinematics import Actuator
 
-ROUND = 1.2
-"""How many times as far from its axis as elsewhere the edge of a nearly round pocket lies at most:
-its stroke, in proportion to the diameter, is then known to some 10 % either way.
+ROUNDNESS = 1.2
+"""Largest ratio of the farthest to the nearest distance of a nearly round pocket's edge from its
+axis: its stroke, in proportion to the diameter, is then known to some 10 % either way.
 """
-EXACT = ("size", "inlet")
-"""Groups of figures that are those of the drawn pocket itself."""
+EXACT_GROUPS = ("size", "inlet")
+"""Groups of figures that are computed for the drawn pocket itself."""
 BY_DISC = "disc of equal area"
 
 
@@ -39,10 +39,10 @@ class NearDiscs(NamedTuple):
 
     @property
     def is_round(self) -> bool:
-        return self.outer <= ROUND * self.inner
+        return self.outer <= ROUNDNESS * self.inner
 
     def form(self, design: Design, diameter: float) -> Form:
-        """The form of a design whose pockets are discs of this diameter."""
+        """Return the form of a design whose pockets are discs of this diameter."""
         return replace(design.form, pockets=Discs((diameter,) * design.stack.balloons))
 
 
@@ -64,46 +64,54 @@ def model_form(design: Design) -> Form:
 
 
 def why_no_disc(design: Design) -> str:
-    """Return why a drawn pocket has no stroke, and what has one."""
+    """Return the reason why a drawn pocket has no stroke, and the command that computes one."""
     discs = near_discs(design)
     instead = "sbafab simulate --with calculix, or sofa, inflates it"
     if discs is None:
         return f"no model knows the form of a drawn pocket outline round a tube; {instead}"
     return (
         "no model knows the form of this drawn pocket outline: a nearly round one is taken for a "
-        f"disc, its edge at most {ROUND:g} times as far from the axis as elsewhere, and this one's "
-        f"lies {discs.inner / 2:.3g} to {discs.outer / 2:.3g} mm from it; {instead}"
+        f"disc, its edge at most {ROUNDNESS:g} times as far from the axis as elsewhere, and this "
+        f"one's lies {discs.inner / 2:.3g} to {discs.outer / 2:.3g} mm from it; {instead}"
     )
 
 
 def bounded(
-    found: Sequence[Figure | LeftOut],
+    figures: Sequence[Figure | LeftOut],
     bounds: Sequence[Sequence[Figure | LeftOut]],
     discs: NearDiscs,
 ) -> Iterator[Figure | LeftOut]:
-    """Figures by the disc of equal area, each between those by the discs of ``bounds``.
+    """Yield figures by the disc of equal area, each between those by the discs of ``bounds``.
 
-    One that a bound has not is left out.
+    A figure that one of the bounds lacks is left out.
     """
-    known = [
-        {(one.name, one.model.name): one.value for one in figures if isinstance(one, Figure)}
-        for figures in bounds
+    values_of = [
+        {
+            (figure.name, figure.model.name): figure.value
+            for figure in bound
+            if isinstance(figure, Figure)
+        }
+        for bound in bounds
     ]
-    for one in found:
-        if isinstance(one, LeftOut) or one.model is FLAT or one.group in EXACT:
-            yield one
+    for figure in figures:
+        if (
+            isinstance(figure, LeftOut)
+            or figure.model is FLAT_PLATES
+            or figure.group in EXACT_GROUPS
+        ):
+            yield figure
             continue
-        ends = [values.get((one.name, one.model.name)) for values in known]
-        values = [one.value, *(end for end in ends if end is not None)]
+        ends = [values.get((figure.name, figure.model.name)) for values in values_of]
+        values = [figure.value, *(end for end in ends if end is not None)]
         if None in ends:
-            yield LeftOut(one.name, "a disc within or round the drawn pocket has none")
+            yield LeftOut(figure.name, "a disc within or round the drawn pocket has none")
             continue
         between = min(values), max(values)
-        yield replace(one, model=by_disc(one.model, discs), between=between)
+        yield replace(figure, model=by_disc(figure.model, discs), between=between)
 
 
 def by_disc(model: Model, discs: NearDiscs) -> Model:
-    """The same model of a disc in place of the drawn pocket."""
+    """Return a model as applied to a disc in place of the drawn pocket."""
     return replace(
         model,
         name=f"{model.name}, {BY_DISC}",
@@ -114,7 +122,7 @@ def by_disc(model: Model, discs: NearDiscs) -> Model:
 
 
 def relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
-    """The same curves, their models named likewise."""
+    """Return curves with the models of ``by_disc``."""
     return replace(
         relation,
         title=f"{relation.title}, {BY_DISC}",
@@ -125,7 +133,7 @@ def relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
     )
 
 
-FLAT = Model(
+FLAT_PLATES = Model(
     "pressure x pocket area",
     "statics of a stiff plate",
     "an upper bound, for plates that lie flat on the whole pocket: the paper's 3-DoF actuator "
@@ -133,12 +141,12 @@ FLAT = Model(
 )
 
 
-def flat_forces(actuator: Actuator, asked: Asked) -> Iterator[Figure]:
-    """The most that drawn pockets push with at the pressures asked for, before plates part."""
+def flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
+    """Yield upper bounds of the drawn pockets' blocked force, before plates part."""
     drawing = actuator.design.drawing
     if drawing is None or actuator.form.wrap is not None:
         return
     area = actuator.form.pushing * read_outline(drawing).area
-    for pressure in asked.pressures_kpa:
+    for pressure in request.pressures_kpa:
         name = f"blocked force at {pressure:g} kPa, flat, at most"
-        yield Figure("force", name, float(force(pressure, area)), "N", FLAT)
+        yield Figure("force", name, float(force(pressure, area)), "N", FLAT_PLATES)

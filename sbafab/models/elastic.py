@@ -1,18 +1,42 @@
-"""Strokes, volumes and stored energy at a pressure, by the elastic balloon, free to rise."""
+"""Predictions by the elastic balloon and the elastic stack: free strokes, blocked forces, bending,
+clearances, times, stiffness, and the curves of these.
+"""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon, Shapes
+from sbafab.models import paper
+from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.figures import Asked, Factors, Figure, LeftOut, Model
-from sbafab.models.rippled import risen
+from sbafab.models.figures import (
+    Factors,
+    Figure,
+    LeftOut,
+    Model,
+    PredictionRequest,
+    Relation,
+    Trace,
+)
+from sbafab.models.kinematics import Actuator
+from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
+from sbafab.models.rippled import free_shapes
+from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from sbafab.models.balloon_map import BalloonMap
+    from sbafab.models.film_elements import Array
 
 Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
@@ -25,29 +49,33 @@ ELASTIC = Model(
 
 
 def calibrated(model: Model, factors: Factors) -> Model:
-    """The same model with the factors it took, named unless they are the defaults."""
-    said = []
+    """Return a model with its calibration factors in its name, unless they are the defaults."""
+    factor_names = []
     if factors.press_factor != 1:
-        said.append(f"press factor {factors.press_factor:g}")
+        factor_names.append(f"press factor {factors.press_factor:g}")
     if factors.pocket_loss:
-        said.append(f"pocket loss {factors.pocket_loss:g} mm")
+        factor_names.append(f"pocket loss {factors.pocket_loss:g} mm")
     if factors.modulus_mpa is not None:
-        said.append(f"E = {factors.modulus_mpa:g} MPa")
-    return replace(model, name=f"{model.name}, {', '.join(said)}") if said else model
+        factor_names.append(f"E = {factors.modulus_mpa:g} MPa")
+    return (
+        replace(model, name=f"{model.name}, {', '.join(factor_names)}") if factor_names else model
+    )
 
 
-def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
-    """What a stack of round pockets rises by, holds and stores at the pressures asked for."""
-    if not one.radii:
+def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
+    """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
+    if not actuator.radii:
         return
     try:
-        kinds = Counter(balloons_of(one.design, one.laminate, asked.calibration, one.form))
+        kinds = Counter(
+            balloons_of(actuator.design, actuator.laminate, request.calibration, actuator.form)
+        )
     except DesignError as error:
         yield LeftOut("free stroke, elastic balloon", str(error))
         return
-    model = calibrated(ELASTIC, asked.calibration)
-    together = _inflated(kinds, asked.pressures_kpa)
-    for row, pressure in enumerate(asked.pressures_kpa):
+    model = calibrated(ELASTIC, request.calibration)
+    together = _inflated(kinds, request.pressures_kpa)
+    for row, pressure in enumerate(request.pressures_kpa):
         at = f"at {pressure:g} kPa"
         try:
             stroke, volume, stored = _risen(kinds, pressure, together[row] if together else None)
@@ -55,31 +83,31 @@ def free_strokes(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue
         yield Figure("stroke", f"free stroke {at}", stroke, "mm", model)
-        yield Figure("stroke", f"free height {at}", one.thickness + stroke, "mm", model)
-        yield Figure("stroke", f"volume a balloon {at}", volume / one.balloons, "ul", model)
-        work = stored * one.form.stacks / 1000
+        yield Figure("stroke", f"free height {at}", actuator.thickness + stroke, "mm", model)
+        yield Figure("stroke", f"volume a balloon {at}", volume / actuator.balloons, "ul", model)
+        work = stored * actuator.form.stacks / 1000
         yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
-    """The balloons at each pressure, all in one go; None where one finds no balance."""
+    """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
     try:
-        found = {kind: risen(kind, pressures) for kind in kinds}
+        shapes = {kind: free_shapes(kind, pressures) for kind in kinds}
     except DesignError:
         return None
     return [
-        {kind: Shapes(*(values[row : row + 1] for values in found[kind])) for kind in found}
+        {kind: Shapes(*(values[row : row + 1] for values in shapes[kind])) for kind in shapes}
         for row in range(len(pressures))
     ]
 
 
 def _risen(
-    kinds: Counter[Balloon], pressure: float, known: Inflated | None
+    kinds: Counter[Balloon], pressure: float, shapes: Inflated | None
 ) -> tuple[float, float, float]:
-    """Stroke in mm, air in ul and energy in uJ (to 3 % the integral of p dV) of one stack."""
+    """Return stroke (mm), air (ul) and energy (uJ, to 3 % the integral of p dV) of one stack."""
     stroke = volume = stored = 0.0
     for kind, count in kinds.items():
-        shape = known[kind] if known else risen(kind, pressure)
+        shape = shapes[kind] if shapes else free_shapes(kind, pressure)
         longer = float(stretch(kind, shape)[0])
         if longer > MOST_STRETCH:
             raise DesignError(
@@ -90,3 +118,366 @@ def _risen(
         volume += count * float(shape.volume[0])
         stored += count * float(shape.energy[0])
     return stroke, volume, stored
+
+
+# The elastic stack: forces, bending, time, stiffness.
+
+
+SAMPLES = 21
+ANGLES = (30.0, 60.0, 90.0)
+PROBE_FORCE = 1e-5
+"""Lateral force in N on the tip with which its stiffness is probed."""
+SOURCE = "membrane of revolution between plates, the film's modulus"
+FORCE = Model(
+    "elastic stack",
+    SOURCE,
+    "no shear between plates; films of constant modulus to 100 kPa. The paper's 3-DoF at 100 kPa "
+    "has 0.9, 0.8 and 0.6 of it, its 1-DoF less",
+)
+BEND = Model(
+    "elastic stack",
+    SOURCE,
+    "rigid plates that tilt, balloons that push by the gap at their ring, rims that touch on the "
+    "inner side. The 3-DoF at 5 kPa has 87 deg with two chambers, 106 with one, where shells in "
+    "SOFA, whose rims do not touch, have 85 and 109; the paper's largest is 81 +- 6 at a pressure "
+    "that it does not give",
+)
+CONTACT = Model(
+    "elastic stack",
+    SOURCE,
+    "films as wide as their meridians in balance; 0 is touching, which the stack then allows for",
+)
+TIME = Model(
+    "elastic stack in time",
+    f"Poiseuille or Blasius in {TUBE_LENGTH:g} mm of tube to each chamber",
+    "the paper gives no length, and this one makes its 0.92 s come out; the sensor is taken to sit "
+    "at the pump; no lag of valve and pump",
+)
+AT_PRESSURE = Model(
+    "elastic stack",
+    SOURCE,
+    "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure "
+    "that it does not give",
+)
+CHAMBERS_SHUT = Model(
+    "elastic stack, chambers shut",
+    SOURCE,
+    "the air that is in the chambers stays in, tubes left out; no shear between plates",
+)
+
+
+def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
+    """Return the stack of an actuator with round pockets, or why not; None for others."""
+    if not actuator.radii:
+        return None
+    most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
+    try:
+        return stack(actuator.design, actuator.laminate, most, request.calibration, actuator.form)
+    except DesignError as error:
+        return LeftOut("elastic stack", str(error))
+
+
+def stack_figures(
+    actuator: Actuator, request: PredictionRequest, stack: Stack
+) -> Iterator[Figure | LeftOut]:
+    """Yield forces, bending, times and stiffness of the stack."""
+    yield from _forces(actuator, request, stack)
+    if actuator.form.is_parallel:
+        yield from _bends(request, stack)
+        yield from _bent_forces(request, stack)
+    yield from _times(request, stack)
+    yield from _stiffness(request, stack)
+
+
+def stroke_at(actuator: Actuator, share: float) -> float:
+    """Return the stroke in mm at a share of the way from the flat to the paper's full height."""
+    return max(share * (actuator.full_height - actuator.thickness), 0.0)
+
+
+def _forces(
+    actuator: Actuator, request: PredictionRequest, stack: Stack
+) -> Iterator[Figure | LeftOut]:
+    model = calibrated(FORCE, request.calibration)
+    for pressure in request.pressures_kpa:
+        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
+            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+            name = f"blocked force at {pressure:g} kPa, {at}"
+            try:
+                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
+            except DesignError as error:
+                yield LeftOut(f"{name}, elastic stack", str(error))
+                continue
+            yield Figure("force", name, actuator.form.pushing * value, "N", model)
+
+
+def _pressures(
+    stack: Stack, chambers: int, pressure: float, rest: float = 0.0
+) -> tuple[float, ...]:
+    return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
+
+
+def chamber_count(number: int) -> str:
+    """Return a number of chambers in words."""
+    return "one chamber" if number == 1 else f"{number} chambers"
+
+
+def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(BEND, request.calibration)
+    for pressure in request.pressures_kpa:
+        for chambers in range(1, stack.chambers):
+            name = f"bend at {pressure:g} kPa in {chamber_count(chambers)}, the others empty"
+            try:
+                pose = stack.pose(_pressures(stack, chambers, pressure))
+            except DesignError as error:
+                yield LeftOut(name, str(error))
+                continue
+            yield Figure("bending", name, pose.bend, "deg", model)
+            yield from _clearances(name.replace("bend at ", "", 1), request, stack, pose)
+            aside = float(np.hypot(*pose.tip[:2]))
+            yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
+
+
+def _clearances(
+    where: str, request: PredictionRequest, stack: Stack, pose: Pose
+) -> Iterator[Figure]:
+    """Yield the clearances of a bent stack: between rims, and between chambers."""
+    model = calibrated(CONTACT, request.calibration)
+    room = rim_gap(stack, pose)
+    yield Figure("bending", f"room between rims on the inner side, {where}", room, "mm", model)
+    room = chamber_gap(stack, pose)
+    yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
+
+
+def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
+    """Return the pose bent by an angle in degrees with some chambers pressurised and the others
+    empty; None where no pressure gives it.
+    """
+    low, high = 0.01, stack.most_pressure
+    pose = None
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        try:
+            pose = stack.pose(_pressures(stack, chambers, middle), near=pose)
+        except DesignError:
+            high = middle
+            continue
+        if abs(pose.bend - angle) < 1e-3:
+            break
+        low, high = (middle, high) if pose.bend < angle else (low, middle)
+    return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
+
+
+def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+    """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
+    if not request.pressures_kpa:
+        return
+    model = calibrated(FORCE, request.calibration)
+    pressure = max(request.pressures_kpa)
+    for chambers in range(1, min(stack.chambers, 3)):
+        for angle in ANGLES:
+            name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
+            pose = pose_bent_by(stack, chambers, angle)
+            if pose is None or pose.pressures[0] > pressure:
+                yield LeftOut(name, "it does not bend so far")
+                continue
+            plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
+            try:
+                pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=pose)
+            except DesignError as error:
+                yield LeftOut(name, str(error))
+                continue
+            yield Figure("force", name, pressed.force, "N", model)
+
+
+def _three(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def time_to_fill(
+    stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
+) -> tuple[float, Pose]:
+    """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
+    in mm, until the pump shows a pressure in kPa; and the pose by then.
+
+    Raises DesignError where the pressure drop of the tubes alone is as large.
+    """
+    flow = flow_ml_min * 1000 / 60 / stack.chambers
+    tube = Line(WATER, length).source_pressure(flow, 0.0)
+    if tube >= until:
+        raise DesignError(f"at this flow a tube of {length:g} mm alone takes {tube:.3g} kPa")
+    pose = stack.pose((until - tube,) * stack.chambers)
+    empty = stack.pose((0.0,) * stack.chambers)
+    return float((pose.volumes - empty.volumes).mean()) / flow, pose
+
+
+def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+    model = calibrated(TIME, request.calibration)
+    until = f"{paper.FULL_KPA:g} kPa at the pump"
+    name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
+    try:
+        time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
+    except DesignError as error:
+        yield LeftOut(name, str(error))
+        return
+    yield Figure("actuation", name, time, "s", model)
+    name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
+    yield Figure("actuation", name, pose.height, "mm", model)
+
+
+def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+    for pressure in request.pressures_kpa[:1]:
+        name = f"lateral tip stiffness at {pressure:g} kPa"
+        try:
+            start = stack.pose((pressure,) * stack.chambers)
+            aside = (PROBE_FORCE, 0.0, 0.0)
+            pushed = stack.pose(start.pressures, aside, near=start)
+            yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request)
+            shut = Motion(stack, Line(AIR, length=1e-3), {"tip_load": aside}, start)
+            shut.step(1.0, flows=(0.0,) * stack.chambers)
+            yield _tip_stiffness(f"{name}, chambers shut", shut.pose, CHAMBERS_SHUT, request)
+        except DesignError as error:
+            yield LeftOut(name, str(error))
+
+
+def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:
+    value = PROBE_FORCE / float(pose.tip[0])
+    return Figure("stiffness", name, value, "N/mm", calibrated(model, request.calibration))
+
+
+def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:
+    """Return curves of force against stroke, one a pressure."""
+    most = actuator.full_height - actuator.thickness
+    if not actuator.knows_full:
+        most = min(k.largest_stroke for k in actuator.kinematics)
+    strokes = np.linspace(0, most, SAMPLES)
+    model = calibrated(FORCE, request.calibration)
+    lines = []
+    for pressure in request.pressures_kpa:
+        if pressure > stack.most_pressure:
+            continue
+        values = (actuator.form.pushing * blocked_force(stack, pressure, strokes)).tolist()
+        lines.append(Trace(f"elastic stack, {pressure:g} kPa", strokes.tolist(), values, model))
+    return lines
+
+
+def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
+    """Return the curves of bend against pressure."""
+    model = calibrated(BEND, request.calibration)
+    pressures = np.geomspace(0.01, 20.0, SAMPLES)
+    lines = []
+    for chambers in range(1, stack.chambers):
+        poses = _poses(stack, chambers, pressures)
+        label = f"{chamber_count(chambers)}, the others empty"
+        x = [pose.pressures[0] for pose in poses]
+        lines.append(Trace(label, x, [pose.bend for pose in poses], model))
+    return Relation(
+        "bend", "Bending against pressure", "pressure, kPa", "bend of the top, deg", tuple(lines)
+    )
+
+
+def workspace_traces(request: PredictionRequest, stack: Stack) -> list[Trace]:
+    """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
+    model = calibrated(BEND, request.calibration)
+    pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
+    lines = []
+    for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):
+        for chambers in range(1, stack.chambers):
+            poses = _poses(stack, chambers, pressures, rest)
+            label = f"elastic stack, {chamber_count(chambers)} to 10 kPa, the others {words}"
+            aside = [float(np.hypot(*pose.tip[:2])) for pose in poses]
+            lines.append(Trace(label, aside, [pose.height for pose in poses], model))
+    return lines
+
+
+def _poses(
+    stack: Stack, chambers: int, pressures: Sequence[float] | Array, rest: float = 0.0
+) -> list[Pose]:
+    poses: list[Pose] = []
+    for pressure in pressures:
+        try:
+            near = poses[-1] if poses else None
+            poses.append(stack.pose(_pressures(stack, chambers, float(pressure), rest), near=near))
+        except DesignError:
+            break
+    return poses
+
+
+# Clearances of an inflated stack.
+#
+# Balloons on each other meet at the plate between them, which the elastic balloon has; levels that
+# lean meet at their rims, which the stack has. Balloons side by side do not touch where the
+# clearance below is more than 0. Lengths mm.
+
+
+LEAST_GAP = 0.02
+"""Least gap in mm of a balloon whose radius is computed."""
+
+
+def rim_gap(stack: Stack, pose: Pose) -> float:
+    """Return the smallest gap in mm between rims of neighbouring levels.
+
+    0 for flat levels, and where levels lean so far that their rims touch.
+    """
+    gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
+    return max(float(gaps.min()), 0.0)
+
+
+def chamber_gap(stack: Stack, pose: Pose) -> float:
+    """Return the smallest clearance in mm between the films of balloons side by side.
+
+    Below 0 they would pass through each other. Both stand in the frame of their level, and those of
+    other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError for
+    a balloon without an equilibrium.
+    """
+    widest = _radii(stack, pose)
+    nearest = []
+    for first, second in combinations(range(stack.chambers), 2):
+        apart = float(np.hypot(*(stack.axes[first] - stack.axes[second])))
+        nearest.append(apart - float((widest[:, first] + widest[:, second]).max()))
+    thick = max(first.balloon.thickness for first in stack.maps)
+    return min(nearest) - thick
+
+
+def _radii(stack: Stack, pose: Pose) -> Array:
+    """Return the largest radius of each balloon's middle surface: (levels, chambers)."""
+    radii = np.empty_like(pose.gaps)
+    pressures = np.broadcast_to(np.array(pose.pressures), pose.gaps.shape)
+    for kind, balloon in enumerate(stack.maps):
+        rows = stack.levels == kind
+        states = np.stack([pressures[rows], np.maximum(pose.gaps[rows], LEAST_GAP).round(4)], -1)
+        unique, back = np.unique(states.reshape(-1, 2), axis=0, return_inverse=True)
+        shapes = inflate(balloon.balloon, unique[:, 0], unique[:, 1], tied=True)
+        within = shapes.r[:, balloon.balloon.neck_edge : balloon.balloon.edge + 1].max(-1)
+        radii[rows] = within[back].reshape(states.shape[:2])
+    return radii
+
+
+# Balloons on top of each other: all carry the same force, and their strokes add up.
+
+
+SERIES_SAMPLES = 401
+
+
+def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
+    """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
+    stroke.
+
+    At most the force of its weakest balloon when flat. Below the stroke at which that one shuts,
+    its solid films may carry more; they are not counted.
+    """
+    curves = [_curve(balloon, pressure) for balloon in stack.maps]
+    counts = np.bincount(stack.levels, minlength=len(stack.maps))
+    force = np.linspace(0.0, min(push[0] for _, push in curves), SERIES_SAMPLES)
+    total = np.zeros(SERIES_SAMPLES)
+    for count, (heights, push) in zip(counts, curves, strict=True):
+        total += count * np.interp(force, push[::-1], heights[::-1])
+    return np.asarray(
+        np.interp(np.asarray(stroke, dtype=float), total[::-1], force[::-1], right=0.0) / 1000
+    )
+
+
+def _curve(balloon: BalloonMap, pressure: float) -> tuple[Array, Array]:
+    """Return heights in mm and the force in mN there, made monotonic."""
+    heights = np.linspace(0.0, balloon.most_height, SERIES_SAMPLES)
+    return heights, np.minimum.accumulate(balloon.force(pressure, heights))

@@ -1,4 +1,4 @@
-"""A stack as an environment of Gymnasium: valves are set, the tip is to come to a target."""
+"""A Gymnasium environment of a stack: actions set the valves, the tip is to reach a target."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.motion import Motion
     from sbafab.models.pneumatics import Line
-    from sbafab.models.stack import Stack
+    from sbafab.models.stack import Motion, Stack
 
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):
-    """The tip of a stack is to reach a point that it can reach.
+    """Task of moving the tip of a stack to a point that it can reach.
 
     An action has a number a chamber from -1 (vented) to 1 (``most_pressure`` kPa at its valve).
-    What is seen: places of tip and target and the way from one to the other in mm, pressures in the
-    chambers in kPa. The reward is the distance in mm, negative. It ends within ``near`` mm, and is
-    cut off after ``steps`` of ``dt`` s. ``load`` is what ``Stack.pose`` takes beside pressures.
+    Observations: positions of tip and target and the vector between them in mm, pressures in the
+    chambers in kPa. The reward is the negative distance in mm. An episode ends within ``near`` mm,
+    and is cut off after ``steps`` of ``dt`` s. ``load`` are keyword arguments of ``Stack.pose``
+    beside pressures.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as Gymnasium has it)
@@ -58,28 +58,28 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Vented, with a new target: ``options["target"]`` in mm, or where some pressures lead."""
+        """Vent all chambers; the target is ``options["target"]`` (mm) or a random pose's tip."""
         super().reset(seed=seed)
-        given = (options or {}).get("target")
-        if given is None:
+        target = (options or {}).get("target")
+        if target is None:
             pressures = self.np_random.uniform(0.0, self.most_pressure, self.stack.chambers)
-            given = self.stack.pose(pressures.tolist(), **self.load).tip
-        self._target = np.asarray(given, dtype=float)
+            target = self.stack.pose(pressures.tolist(), **self.load).tip
+        self._target = np.asarray(target, dtype=float)
         self._motion = self.stack.motion(line=self.line, **self.load)
         self._left = self.steps
-        return self._seen(self._motion), {}
+        return self._observation(self._motion), {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """What is seen ``dt`` s later, the reward, whether it is there, and whether time is up."""
+        """Return the observation ``dt`` s later, the reward, if it arrived, and if time is up."""
         if self._motion is None:
             raise DesignError("the environment is at no place yet; call reset first")
         valves = (np.clip(np.asarray(action, dtype=float), -1.0, 1.0) + 1) / 2 * self.most_pressure
         self._motion.step(self.dt, pressures=valves.tolist())
         self._left -= 1
-        seen = self._seen(self._motion)
-        away = float(np.linalg.norm(seen[6:9]))
-        return seen, -away, away <= self.near, self._left <= 0, {"time": self._motion.time}
+        observation = self._observation(self._motion)
+        away = float(np.linalg.norm(observation[6:9]))
+        return observation, -away, away <= self.near, self._left <= 0, {"time": self._motion.time}
 
-    def _seen(self, motion: Motion) -> Array:
+    def _observation(self, motion: Motion) -> Array:
         tip = motion.pose.tip
         return np.concatenate([tip, self._target, self._target - tip, motion.pressures])

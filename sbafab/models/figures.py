@@ -1,29 +1,31 @@
-"""What a prediction is made of: figures and curves that know their model and its trust."""
+"""Records of a prediction: figures and curves with their models, its verdict, and the choice of the
+model to design with.
+"""
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.models.counterparts import Counterpart, is_calibrated
+from sbafab.models import paper, printed
+from sbafab.models.paper import EQ_4, Counterpart, is_calibrated
 from sbafab.notebook import table_html
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from sbafab.models.verdict import VerdictLine
-
 MEASURED = "measured (paper)"
-"""In place of a model's name."""
+"""Stands for a model's name."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Where a number comes from: ``source`` is equation or section, ``trust`` how far it holds."""
+    """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity."""
 
     name: str
     source: str
@@ -34,17 +36,17 @@ class Model:
         """Name and source in one."""
         return f"{self.name} ({self.source})" if self.source else self.name
 
-    def times(self, what: str, factor: float) -> Model:
-        """The same with a calibration factor, named unless it is 1."""
-        return self if factor == 1 else replace(self, name=f"{self.name} x {what} {factor:g}")
+    def times(self, quantity: str, factor: float) -> Model:
+        """Return the model with a calibration factor in its name, unless that is 1."""
+        return self if factor == 1 else replace(self, name=f"{self.name} x {quantity} {factor:g}")
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One predicted number: ``value`` in ``unit``; ``group`` gathers what belongs together.
+    """One predicted number: ``value`` in ``unit``, in its ``group``.
 
     ``other``: another model gives the same quantity, and that one is to design with.
-    ``measured``: what the paper measured, where the model is off by more than a quarter of it.
+    ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
     The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
     """
 
@@ -59,14 +61,14 @@ class Figure:
 
     @property
     def counterpart(self) -> str:
-        """The measured counterpart in a clause; empty where none is needed."""
+        """The measured counterpart as a clause; empty where there is none."""
         if self.measured is None:
             return ""
         return self.measured.sentence(is_calibrated(self.model.name))
 
     @property
     def aside(self) -> str:
-        """The same in parentheses, after the bounds where it has any."""
+        """Bounds and measured counterpart in parentheses; empty without either."""
         bounds = ""
         if self.between is not None:
             low, high = self.between
@@ -90,7 +92,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Trace:
-    """A predicted curve; without a model, what the paper measured along it.
+    """A predicted curve; a measured one of the paper if it has no model.
 
     The unit of ``x`` and that of ``y`` stand in the labels of the relation.
     """
@@ -103,7 +105,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Points:
-    """What the paper measured, each +- its error (0 where it gives none).
+    """Measured points of the paper, each +- its error (0 where it gives none).
 
     The unit of ``x`` and that of ``y`` and its ``error`` stand in the labels of the relation.
     """
@@ -127,10 +129,10 @@ class Relation:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A flat row a point of each curve, and of what was measured: ``x`` and ``y`` in the units
-        of ``x_label`` and ``y_label``, ``error`` of y only where one was measured.
+        """A flat row a point of each curve, and of each measurement: ``x`` and ``y`` in the units
+        of ``x_label`` and ``y_label``, ``error`` of y only for measurements.
         """
-        found = [
+        rows = [
             {
                 "curve": line.label,
                 "x": float(x),
@@ -141,7 +143,7 @@ class Relation:
             for line in self.lines
             for x, y in zip(line.x, line.y, strict=True)
         ]
-        return found + [
+        return rows + [
             {
                 "curve": points.label,
                 "x": float(x),
@@ -157,9 +159,9 @@ class Relation:
         """Return ``rows`` as a pandas DataFrame whose ``attrs`` hold the title and the labels of
         the axes. Raises DesignError without pandas.
         """
-        found = _frame(self.rows)
-        found.attrs.update(title=self.title, x=self.x_label, y=self.y_label)
-        return found
+        frame = _frame(self.rows)
+        frame.attrs.update(title=self.title, x=self.x_label, y=self.y_label)
+        return frame
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -191,7 +193,7 @@ class Relation:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A figure that is not given, and why."""
+    """A figure that is not given, and the reason."""
 
     name: str
     reason: str
@@ -199,9 +201,9 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Factors:
-    """What a measurement of one's own says; the defaults leave models as they are.
+    """Calibration factors from the user's own measurements; the defaults leave models unchanged.
 
-    ``press_factor`` is what is left of the films' thickness after pressing, ``contact_factor`` the
+    ``press_factor`` is the films' thickness after pressing over that before, ``contact_factor`` the
     measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
     by how many mm the press leaves pockets smaller in radius than drawn, and ``modulus_mpa``, the
     film's modulus where it is not the one of the design.
@@ -226,8 +228,10 @@ class Factors:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What a prediction is asked for: kPa, ml/min into each chamber or all, ul a balloon."""
+class PredictionRequest:
+    """Conditions of a prediction: pressures in kPa, flow in ml/min into each chamber or all,
+    volumes in ul a balloon, and calibration factors.
+    """
 
     pressures_kpa: tuple[float, ...] = (10.0, 100.0)
     flow_ml_min: float = 35.0
@@ -239,24 +243,24 @@ class Asked:
 class Prediction:
     """All that is predicted of one design."""
 
-    asked: Asked
+    asked: PredictionRequest
     figures: tuple[Figure, ...]
     relations: tuple[Relation, ...]
     left_out: tuple[LeftOut, ...]
 
     def value(self, name: str, model: str = "") -> float:
-        """The value, in its figure's unit, of this name by the model whose title begins so.
+        """Return the value, in its figure's unit, of this name by the model whose title begins so.
 
         Raises KeyError where there is none, or where several models give one and none is named.
         """
         named = [figure for figure in self.figures if figure.name == name]
-        found = [figure for figure in named if figure.model.title.startswith(model)]
+        matching = [figure for figure in named if figure.model.title.startswith(model)]
         if not named:
             raise KeyError(_unknown("figure", name, [figure.name for figure in self.figures]))
-        if len(found) != 1:
-            titles = ", ".join(repr(figure.model.title) for figure in found or named)
+        if len(matching) != 1:
+            titles = ", ".join(repr(figure.model.title) for figure in matching or named)
             raise KeyError(f"{name!r} is given by {titles}; name one of these models")
-        return found[0].value
+        return matching[0].value
 
     def relation(self, name: str) -> Relation:
         """Return the curves of this name, such as "force". Raises KeyError where there are none."""
@@ -267,9 +271,7 @@ class Prediction:
 
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
-        """What it reaches, how far that is to be trusted, and what is left out: a line each."""
-        from sbafab.models.verdict import verdict
-
+        """Lines that say what it reaches, how valid that is, and what is left out."""
         return verdict(self)
 
     @property
@@ -282,8 +284,8 @@ class Prediction:
         return _frame(self.rows)
 
     def __repr__(self) -> str:
-        left = f", {len(self.left_out)} left out" if self.left_out else ""
-        return f"Prediction({len(self.figures)} figures, {len(self.relations)} curves{left})"
+        omitted = f", {len(self.left_out)} left out" if self.left_out else ""
+        return f"Prediction({len(self.figures)} figures, {len(self.relations)} curves{omitted})"
 
     def _repr_html_(self) -> str:
         head = ("", "", "unit", "model", "validity")
@@ -298,11 +300,13 @@ class Prediction:
             )
             for f in first
         ]
-        left = [(left.name, None, "", "not predicted", left.reason) for left in self.left_out]
-        return table_html(head, [*rows, *left])
+        omitted = [
+            (omitted.name, None, "", "not predicted", omitted.reason) for omitted in self.left_out
+        ]
+        return table_html(head, [*rows, *omitted])
 
     def as_dict(self) -> dict[str, Any]:
-        """What ``predict.json`` holds of it."""
+        """Return the content of ``predict.json``, its schema apart."""
         return {
             "asked": {
                 "pressures_kpa": list(self.asked.pressures_kpa),
@@ -315,16 +319,16 @@ class Prediction:
             },
             "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],
-            "left_out": [{"name": left.name, "reason": left.reason} for left in self.left_out],
+            "left_out": [{"name": item.name, "reason": item.reason} for item in self.left_out],
             "relations": [relation.as_dict() for relation in self.relations],
         }
 
 
-def _unknown(what: str, name: str, names: Sequence[str]) -> str:
-    """That nothing has this name, with the nearest names, each once."""
+def _unknown(kind: str, name: str, names: Sequence[str]) -> str:
+    """Return the message that nothing has this name, with the nearest names, each once."""
     near = difflib.get_close_matches(name, list(dict.fromkeys(names)), 3)
     hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-    return f"no {what} is named {name!r}{hint}"
+    return f"no {kind} is named {name!r}{hint}"
 
 
 def _frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
@@ -339,8 +343,149 @@ def _frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
 
 
 def _rounded(value: float) -> float:
-    """Seven digits: what a model says, without the noise of arithmetic."""
+    """Return a value to seven digits, without the noise of arithmetic."""
     if value == 0 or not math.isfinite(value):
         return 0.0
     digits = 6 - math.floor(math.log10(abs(value)))
     return 0.0 if abs(value) < 1e-9 else round(float(value), digits)
+
+
+# The verdict: the first lines of a prediction.
+
+
+LEFT_OUT = "left out"
+STROKES = ("full stroke", "free stroke at ", "reached diameter")
+BENDS = ("bend at ", "bend with one chamber")
+RADIUS = 2.5
+"""Pocket radius in mm of the actuators whose forces were measured."""
+FULL_NOTE = (
+    "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
+)
+
+
+class VerdictLine(NamedTuple):
+    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), its
+    ``figure``, and its validity in ``note``.
+    """
+
+    quantity: str
+    figure: str
+    note: str
+
+
+def verdict(prediction: Prediction) -> tuple[VerdictLine, ...]:
+    """Return the lines of a prediction: strokes, a bend, a force, then what is left out and why."""
+    lines = [
+        VerdictLine(quantity, _shown(figure), _note(figure))
+        for quantity, figure in _main_figures(prediction)
+    ]
+    why: dict[str, list[str]] = {}
+    for omission in prediction.left_out:
+        why.setdefault(omission.reason, []).append(omission.name)
+    lines += [VerdictLine(LEFT_OUT, ", ".join(names), reason) for reason, names in why.items()]
+    return tuple(lines)
+
+
+def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
+    """Yield the main figures with their quantities, each by the model to design with."""
+    to_design_with = [figure for figure in prediction.figures if not figure.other]
+    for begins in STROKES:
+        yield from (("stroke", item) for item in _first(to_design_with, begins))
+    for begins in BENDS:
+        bend = _first(to_design_with, begins)
+        if bend:
+            yield "bend", bend[0]
+            break
+    blocked = [
+        item
+        for item in to_design_with
+        if item.name.startswith("blocked force") and ", flat" in item.name
+    ]
+    blocked = [item for item in blocked if not item.name.endswith("at most")] or blocked
+    if blocked:
+        # Of the highest pressure that was asked for.
+        at = f"at {max(prediction.asked.pressures_kpa):g} kPa"
+        yield "force", next(item for item in blocked if at in item.name)
+
+
+def _first(figures: list[Figure], begins: str) -> list[Figure]:
+    return [figure for figure in figures if figure.name.startswith(begins)][:1]
+
+
+def _shown(figure: Figure) -> str:
+    return f"{figure.value:.4g} {figure.unit}, {figure.name} ({figure.model.name})"
+
+
+def _note(figure: Figure) -> str:
+    """Return the measured counterpart, else the interval of measurements, else the validity."""
+    if figure.measured or figure.between:
+        return figure.aside
+    if figure.model.name.startswith("the paper's full height"):
+        return FULL_NOTE
+    if figure.model.name.startswith(EQ_4):
+        low, high = eq_4_ratios()
+        return (
+            f"{low * figure.value:.3g} to {high * figure.value:.3g} N by the paper's six forces at "
+            f"{paper.FORCE_KPA:g} kPa, {low:.2f} to {high:.2f} times this model"
+        )
+    return figure.model.trust
+
+
+@lru_cache(maxsize=1)
+def eq_4_ratios() -> tuple[float, float]:
+    """Return the range of ratios of the paper's forces (Sec. 4.3) to virtual work on Eq. 4."""
+    full = paper.FULL_SHARE * RADIUS
+    ratios = [
+        measured.value / (chambers * paper.FORCE_KPA / 1000 * float(printed.rate(h, RADIUS)))
+        for chambers, forces in ((1, paper.FORCE_1DOF), (3, paper.FORCE_3DOF))
+        for h, measured in zip([s * full for s in paper.HEIGHTS], forces, strict=True)
+    ]
+    return min(ratios), max(ratios)
+
+
+# Choice of the figure to design with where several models give one quantity.
+
+
+STACK = "elastic stack"
+REACHED = "lens of two arcs"
+WIDEST = "cylinder of unstretched film"
+SUPERSEDED = (
+    # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
+    ("bending", "constant curvature", STACK),
+    # The modulus was measured, at a pressure that nobody knows; the stack's is a tenth of it.
+    ("stiffness", STACK, "3 E I / l^3"),
+    # No air drives a balloon to the cylinder that its film could be: short ones stay far below it.
+    ("size", WIDEST, REACHED),
+)
+"""(group, superseded model, preferred model); models by the beginnings of their names."""
+FREE_SUFFIX = ", free"
+"""End of the name of the elastic balloon's work; the upper bound's lacks it."""
+
+
+def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Figure, ...]:
+    """Return the figures with those marked as ``other`` that are not to be designed with.
+
+    ``to_come`` are beginnings of models whose figures are left out for now. Of one name the first
+    is chosen: the paper's Eq. 4, whose force is nearest to the six that the paper measured at 100
+    kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
+    """
+    candidates = tuple(figures)
+    return tuple(
+        replace(figure, other=_is_superseded(figure, candidates, to_come)) for figure in candidates
+    )
+
+
+def _is_superseded(subject: Figure, figures: Sequence[Figure], to_come: tuple[str, ...]) -> bool:
+    group_figures = [figure for figure in figures if figure.group == subject.group]
+    if next(figure for figure in group_figures if figure.name == subject.name) is not subject:
+        return True
+    if any(figure.name == subject.name + FREE_SUFFIX for figure in group_figures):
+        return True
+    return any(
+        subject.group == group
+        and subject.model.name.startswith(behind)
+        and (
+            first in to_come or any(figure.model.name.startswith(first) for figure in group_figures)
+        )
+        for group, behind, first in SUPERSEDED
+    )

@@ -1,9 +1,10 @@
-"""What a film of revolution feels, element by element: stretching, wrinkling, bending, air.
+"""Energy of a film of revolution by element: membrane stretch, wrinkling, bending, and its air.
 
 A film is a chain of nodes r, z (mm), many films at once: arrays have a row a film. Each function
 returns an energy (uJ: kPa mm3) a film with its first and second derivatives, by what an element
-feels of its two nodes: how far apart they are in r and in z, and their middle radius. Kinks join
-neighbours. ``matrix`` makes of it derivatives by the coordinates of nodes.
+feels of its two nodes: how far apart they are in r and in z, and their middle radius. Kinks couple
+neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into derivatives by the
+coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-ROOT = 0.645
+ROOT_LENGTH = 0.645
 """Thicknesses by which a film bends on past the edge of its bond: end correction of Williams (1989)
 for a double cantilever beam, isotropic, nu = 0.2.
 """
 
 
-class Flat(NamedTuple):
+class FlatFilm(NamedTuple):
     """The flat film: radii of its nodes and thickness in mm, modulus in kPa, Poisson's ratio.
 
-    ``order`` m says which strain the energy is quadratic in: (stretch^m - 1) / m, of the family of
-    Seth (1964) and Hill (1968). 0 is Hencky's logarithmic strain, 2 Green's.
+    ``order`` m selects the strain in which the energy is quadratic: (stretch^m - 1) / m, of the
+    family of Seth (1964) and Hill (1968). 0 is Hencky's logarithmic strain, 2 Green's.
     """
 
     nodes: Array
@@ -47,8 +48,8 @@ class Flat(NamedTuple):
 
 
 class Elements(NamedTuple):
-    """Elements as they lie, (rows, elements): from node to node in r and z, middle radius, mm; and
-    the square of their length.
+    """Deformed elements, (rows, elements): from node to node in r and z, middle radius, mm; and the
+    square of their length.
     """
 
     dr: Array
@@ -68,7 +69,7 @@ SecondSlopes = list["Array"]
 """Second derivatives: dr dr, dr dz, dz dz, dr middle, dz middle, middle middle."""
 
 
-class Term(NamedTuple):
+class EnergyTerm(NamedTuple):
     """An energy, (rows,), with its derivatives."""
 
     energy: Array
@@ -77,32 +78,32 @@ class Term(NamedTuple):
 
 
 class Strain(NamedTuple):
-    """Strains of the elements along the meridian and round the hoop."""
+    """Meridional and hoop strain of the elements."""
 
     meridian: Array
     hoop: Array
 
 
-def strain(flat: Flat, r: Array, z: Array) -> Strain:
-    """Strains of each element."""
-    along, around = _squares(flat, Elements.of(r, z))
-    return Strain(_measure(flat, along), _measure(flat, around))
+def strain(flat: FlatFilm, r: Array, z: Array) -> Strain:
+    """Return the strains of each element."""
+    along, around = _squared_stretches(flat, Elements.of(r, z))
+    return Strain(_strain_measure(flat, along), _strain_measure(flat, around))
 
 
-def curvature(flat: Flat, r: Array, z: Array) -> Array:
-    """Curvature of the meridian in 1/mm by element: mean of its two ends."""
+def curvature(flat: FlatFilm, r: Array, z: Array) -> Array:
+    """Return the curvature of the meridian in 1/mm by element: mean of its two ends."""
     slope = np.arctan2(-np.diff(z), np.diff(r))
     bent = np.diff(slope) / ((flat.lengths[1:] + flat.lengths[:-1]) / 2)
     ends = np.concatenate([bent[:, :1], bent, bent[:, -1:]], axis=1)
     return np.asarray((ends[:, 1:] + ends[:, :-1]) / 2)
 
 
-def _squares(flat: Flat, at: Elements) -> tuple[Array, Array]:
-    """Squared stretches of each element."""
+def _squared_stretches(flat: FlatFilm, at: Elements) -> tuple[Array, Array]:
+    """Return the squared meridional and hoop stretch of each element."""
     return at.square / flat.lengths**2, (at.middle / flat.middles) ** 2
 
 
-def _measure(flat: Flat, square: Array) -> Array:
+def _strain_measure(flat: FlatFilm, square: Array) -> Array:
     if flat.order == 0:
         return np.asarray(np.log(square) / 2)
     return np.asarray((_power(square, flat.order / 2) - 1) / flat.order)
@@ -112,24 +113,24 @@ def _power(square: Array, exponent: float) -> Array:
     return square if exponent == 1.0 else square**exponent
 
 
-def membrane(flat: Flat, at: Elements, cap: Array) -> Term:
-    """Stretching; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
+def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
+    """Return the membrane energy; where the hoop stress falls to ``-cap`` (kPa) the film wrinkles.
 
     Plane stress. With logarithmic strains it is Hencky's (1928) law, good for stretches of 0.7 to
-    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. From there on the hoop
-    follows at no more than that stress: the relaxed energy of a tension field (Pipkin, 1986), with
-    what the wrinkles themselves carry.
+    1.3 (Anand, 1979); with Green's it is Saint Venant's and Kirchhoff's. In a wrinkled element the
+    hoop stress stays at ``-cap``: the relaxed energy of a tension field (Pipkin, 1986), with what
+    the wrinkles themselves carry.
     """
     nu, plane = flat.poisson, flat.modulus / (1 - flat.poisson**2)
-    sq1, sq2 = _squares(flat, at)
-    e1, e2 = _measure(flat, sq1), _measure(flat, sq2)
+    sq1, sq2 = _squared_stretches(flat, at)
+    e1, e2 = _strain_measure(flat, sq1), _strain_measure(flat, sq2)
     wrinkled = plane * (e2 + nu * e1) < -cap
     # The hoop strain of the film itself, the wrinkles' waste of length left out.
-    held = np.where(wrinkled, cap, 0.0)
-    own = np.where(wrinkled, held / -plane - nu * e1, e2)
-    s1, s2 = plane * (e1 + nu * own), plane * (own + nu * e1)
+    support = np.where(wrinkled, cap, 0.0)
+    film_hoop = np.where(wrinkled, support / -plane - nu * e1, e2)
+    s1, s2 = plane * (e1 + nu * film_hoop), plane * (film_hoop + nu * e1)
     volume = math.tau * flat.middles * flat.lengths * flat.thickness
-    density = (s1 * e1 + s2 * own) / 2 + held * (own - e2)
+    density = (s1 * e1 + s2 * film_hoop) / 2 + support * (film_hoop - e2)
     c11 = np.where(wrinkled, flat.modulus, plane)
     c12 = np.where(wrinkled, 0.0, plane * nu)
     c22 = np.where(wrinkled, 0.0, plane)
@@ -148,7 +149,7 @@ def membrane(flat: Flat, at: Elements, cap: Array) -> Term:
         k12 = by1 * 2 / flat.middles**2 * (c12 * f1 * f2)
     dr, dz, middle = at.dr, at.dz, at.middle
     k1_dr, k12_middle = k1 * dr, k12 * middle
-    return Term(
+    return EnergyTerm(
         (volume * density).sum(-1),
         [g1 * dr, g1 * dz, g2 * middle],
         [
@@ -162,26 +163,28 @@ def membrane(flat: Flat, at: Elements, cap: Array) -> Term:
     )
 
 
-class Bent(NamedTuple):
-    """Bending: its term, and the second derivatives that join elements before and after a kink,
+class BendingTerm(NamedTuple):
+    """Bending energy, and the second derivatives that couple the elements before and after a kink,
     by dr dr, dr dz, dz dr and dz dz of the two; each (rows, kinks).
     """
 
-    term: Term
+    term: EnergyTerm
     joined: list[Array]
 
 
-def bending(flat: Flat, rigidity: float, bent: slice, at: Elements) -> Bent:
-    """Bending along the meridian and round the hoop between clamped edges.
+def bending(flat: FlatFilm, rigidity: float, bent: slice, at: Elements) -> BendingTerm:
+    """Return the bending energy along the meridian and round the hoop between clamped edges.
 
-    What lies outside the nodes ``bent`` is bonded face to face with its mirror. It
-    does not bend, but gives way at its root as the arms of a double cantilever beam do.
+    The elements outside the nodes ``bent`` are bonded face to face with their mirror image: they do
+    not bend, but give way at their root as the arms of a double cantilever beam do.
     """
     slope = np.arctan2(-at.dz, at.dr)
-    held, edge = bent.start, bent.stop
+    first, edge = bent.start, bent.stop
     kink = slope[:, 1 : edge + 1] - slope[:, :edge]
     number = np.arange(len(flat.lengths))
-    along = np.where((number >= held) & (number < edge), flat.lengths, 2 * ROOT * flat.thickness)
+    along = np.where(
+        (number >= first) & (number < edge), flat.lengths, 2 * ROOT_LENGTH * flat.thickness
+    )
     between = (along[:edge] + along[1 : edge + 1]) / 2
     stiff = math.tau * rigidity * flat.nodes[1 : edge + 1] / between
     ring = math.tau * rigidity * flat.lengths / flat.middles
@@ -200,14 +203,14 @@ def bending(flat: Flat, rigidity: float, bent: slice, at: Elements) -> Bent:
     stiff_a, stiff_b = stiffness * a, stiffness * b
     none, twice = np.zeros_like(a), 2 * turn * a * b
     curves = [stiff_a * a + twice, stiff_a * b + turn * (b * b - a * a), stiff_b * b - twice]
-    term = Term(energy, [turn * a, turn * b, none], [*curves, none, none, none])
+    term = EnergyTerm(energy, [turn * a, turn * b, none], [*curves, none, none, none])
     before = -stiff * a[:, :edge], -stiff * b[:, :edge]
     after = a[:, 1 : edge + 1], b[:, 1 : edge + 1]
-    return Bent(term, [x * y for x in before for y in after])
+    return BendingTerm(term, [x * y for x in before for y in after])
 
 
-def air(flat: Flat, edge: int, at: Elements) -> Term:
-    """Air (ul) between the inner face of a film and the plane of its edge.
+def air_volume(flat: FlatFilm, edge: int, at: Elements) -> EnergyTerm:
+    """Return the air (ul) between the inner face of a film and the plane of its edge.
 
     The film's middle starts half a thickness above that plane, and its inner face is smaller: what
     the volume of a thick film is by Steiner's formula.
@@ -238,34 +241,34 @@ def air(flat: Flat, edge: int, at: Elements) -> Term:
     by_middle[:, last] += disc * rim
     for curve, share in ((0, 0.25), (3, 0.5), (5, 1.0)):
         curves[curve][:, last] += disc * share
-    return Term(volume + disc / 2 * rim**2, [by_dr, by_dz, by_middle], curves)
+    return EnergyTerm(volume + disc / 2 * rim**2, [by_dr, by_dz, by_middle], curves)
 
 
-def gradient(slopes: Slopes) -> Array:
-    """Derivatives by the coordinates r, z of each node in turn: (coordinates, rows)."""
+def assembled_gradient(slopes: Slopes) -> Array:
+    """Return the derivatives by the coordinates r, z of each node in turn: (coordinates, rows)."""
     by_dr, by_dz, by_middle = (slope.T for slope in slopes)
     count, rows = by_dr.shape
-    found = np.zeros((2 * count + 2, rows))
+    by_node = np.zeros((2 * count + 2, rows))
     half = by_middle / 2
-    found[0:-2:2] = half - by_dr
-    found[2::2] += half + by_dr
-    found[1:-2:2] = -by_dz
-    found[3::2] += by_dz
-    return found
+    by_node[0:-2:2] = half - by_dr
+    by_node[2::2] += half + by_dr
+    by_node[1:-2:2] = -by_dz
+    by_node[3::2] += by_dz
+    return by_node
 
 
-def matrix(curves: SecondSlopes, joined: list[Array]) -> Array:
-    """Second derivatives by coordinates, as a band: (coordinates, 6, rows), of which ``[i, k]`` is
-    that by coordinates i and i + k.
+def assembled_tangent(curves: SecondSlopes, joined: list[Array]) -> Array:
+    """Return the second derivatives by coordinates, as a band: (coordinates, 6, rows), of which
+    ``[i, k]`` is that by coordinates i and i + k.
     """
     rr, rz, zz, rm, zm, mm = (curve.T for curve in curves)
     count, rows = rr.shape
-    found = np.zeros((2 * count + 2, 6, rows))
-    r, z = found[0::2], found[1::2]
+    band = np.zeros((2 * count + 2, 6, rows))
+    r, z = band[0::2], band[1::2]
     quarter, half = mm / 4, zm / 2
-    alike = rr + quarter
-    r[:-1, 0] = alike - rm
-    r[1:, 0] += alike + rm
+    diagonal = rr + quarter
+    r[:-1, 0] = diagonal - rm
+    r[1:, 0] += diagonal + rm
     r[:-1, 1] = rz - half
     r[1:, 1] += rz + half
     z[:-1, 0] = zz
@@ -274,14 +277,14 @@ def matrix(curves: SecondSlopes, joined: list[Array]) -> Array:
     z[:-1, 1], z[:-1, 2] = -rz - half, -zz
     # A kink joins three nodes: of those before and after it, and of its own with each of them.
     c_rr, c_rz, c_zr, c_zz = (each.T for each in joined)
-    before, own = slice(0, len(c_rr)), slice(1, len(c_rr) + 1)
-    for node in (before, own):
+    before, centre = slice(0, len(c_rr)), slice(1, len(c_rr) + 1)
+    for node in (before, centre):
         r[node, 2] += c_rr
         r[node, 3] += c_rz
         z[node, 1] += c_zr
         z[node, 2] += c_zz
     r[before, 4], r[before, 5], z[before, 3], z[before, 4] = -c_rr, -c_rz, -c_zr, -c_zz
-    r[own, 0] -= 2 * c_rr
-    r[own, 1] -= c_rz + c_zr
-    z[own, 0] -= 2 * c_zz
-    return found
+    r[centre, 0] -= 2 * c_rr
+    r[centre, 1] -= c_rz + c_zr
+    z[centre, 0] -= 2 * c_zz
+    return band

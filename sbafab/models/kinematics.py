@@ -1,8 +1,9 @@
-"""Stroke and volume of a stack of balloons, by each model that knows its pockets.
+"""Stroke and volume of a stack of balloons by each geometric model of its pockets, and the actuator
+that the models take.
 
 Balloons of unlike size (a tapered stack) are taken at equal height over radius, so that one
 formula holds for all: strokes add up with l, volumes with l^3. Volumes are the mean of a chamber's
-balloons. Held at a height they all carry one force, and are then at unlike heights over radius.
+balloons. Blocked at a height they all carry one force, and are then at unlike heights over radius.
 """
 
 from __future__ import annotations
@@ -13,16 +14,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sbafab.design.records import Design, Discs, Form, Slots
+from sbafab.geometry.edges import Point
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
+from sbafab.laminate.laminate import Laminate
 from sbafab.models import lens, parabola, printed
-from sbafab.models.figures import Model
-from sbafab.models.numeric import within
+from sbafab.models.figures import Factors, Model
 from sbafab.models.paper import FULL_SHARE, VALID, VALID_RADIUS
+from sbafab.models.parabola import within
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Law = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-
 
 SAMPLES = 401
 
@@ -43,22 +47,23 @@ class Kinematics:
     _push: Law | None = None
 
     def stroke(self, volume: ArrayLike) -> NDArray[np.float64]:
-        """Stroke of the stack in mm at ul a balloon. Raises DesignError out of range."""
-        wanted = within(volume, self.largest_volume, "volume", "ul a balloon", self.model.name)
-        return self._stroke(wanted)
+        """Return the stroke of the stack in mm at ul a balloon. Raises DesignError out of range."""
+        volumes = within(volume, self.largest_volume, "volume", "ul a balloon", self.model.name)
+        return self._stroke(volumes)
 
     def volume(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Volume in ul a balloon at a stroke of the stack. Raises DesignError out of range."""
+        """Return ul a balloon at a stroke of the stack. Raises DesignError out of range."""
         return self._volume(self._within(stroke))
 
     def rate(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """dv/dh of the stack in mm2: the chamber's whole volume by the stack's stroke."""
+        """Return dv/dh of the stack in mm2: the chamber's whole volume by the stack's stroke."""
         return self._rate(self._within(stroke))
 
     def push(self, stroke: ArrayLike) -> NDArray[np.float64]:
-        """Force over pressure in mm2 of the stack held at a stroke: that of every balloon in it.
+        """Return force over pressure in mm2 of the stack blocked at a stroke: that of every balloon
+        in it.
 
-        Of a tapered stack at most what its weakest balloon has when flat; what solid films of shut
+        Of a tapered stack at most that of its weakest balloon when flat; what solid films of shut
         balloons may carry beyond is not counted.
         """
         return (self._push or self._rate)(self._within(stroke))
@@ -68,7 +73,7 @@ class Kinematics:
 
 
 def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
-    """Eq. 4 and Eqs. 1 to 3 for balloons with these pocket radii (mm)."""
+    """Return Eq. 4 and Eqs. 1 to 3 for balloons with these pocket radii (mm)."""
     first, third = sum(radii), sum(radius**3 for radius in radii)
     scale = third / len(radii)
 
@@ -106,7 +111,7 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
 
 
 def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
-    """Force over pressure by stroke of unlike balloons that carry the same force.
+    """Return force over pressure by stroke of unlike balloons that carry the same force.
 
     ``rate`` is dv/dh of a balloon of radius 1 up to the stroke ``most``.
     """
@@ -120,7 +125,7 @@ def _in_series(radii: Sequence[float], rate: Law, most: float) -> Law:
 
 
 def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
-    """The lens of two arcs for oblong pockets of a width and straight run (mm)."""
+    """Return the lens of two arcs for oblong pockets of a width and straight run (mm)."""
     most = lens.fullest(width, run)
     model = Model(
         lens.MODEL,
@@ -140,7 +145,7 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
 
 
 def full_stroke(radii: Sequence[float]) -> float:
-    """What the paper's balloons reach, mm of a stack: 17.5 mm for 15 of radius 2.5 (Sec. 4.6)."""
+    """Return a stack's full stroke in mm by the paper: 17.5 for 15 of radius 2.5 (Sec. 4.6)."""
     return FULL_SHARE * sum(radii)
 
 
@@ -151,7 +156,97 @@ def _eq_4_trust(radius: float) -> str:
         f"{volume * scale:.3g} ul in {fluid}"
         for fluid, volume, error in VALID
     ]
-    said = "" if radius == VALID_RADIUS else f", scaled from d = {2 * VALID_RADIUS:g}"
+    origin = "" if radius == VALID_RADIUS else f", scaled from d = {2 * VALID_RADIUS:g}"
     if radius == 2.5:
-        said += "; the regime ends near 0.95 kPa"
-    return f"geometric regime only: {', '.join(limits)} (measured{said})"
+        origin += "; the regime ends near 0.95 kPa"
+    return f"geometric regime only: {', '.join(limits)} (measured{origin})"
+
+
+# The actuator of a design, as the models take it.
+
+
+NOT_MEASURED = (
+    f"the paper measured it with its own film, {film_name(PAPER_PRODUCT, PAPER_THICKNESS)} of "
+    f"{PAPER_TPE[0]:g} MPa, and no model predicts it for another: take the free stroke at a "
+    "pressure, or simulate the design"
+)
+NO_OUTLINE = "no model knows the form of a drawn pocket outline; simulate the design instead"
+"""Message of a search, which compares designs by figures without bounds."""
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A design as the models take it.
+
+    Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of round
+    pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
+    drawn outlines. ``full_stroke`` mm counts as full actuation, ``full_height`` mm is its height
+    then; ``thickness`` mm the flat laminate's, the press factor included.
+    """
+
+    design: Design
+    form: Form
+    laminate: Laminate
+    balloons: int
+    radii: tuple[float, ...]
+    kinematics: tuple[Kinematics, ...]
+    full_stroke: float
+    full_height: float
+    thickness: float
+
+    def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a chamber's length at a stroke: from the flat thickness to the full height."""
+        return self.thickness + stroke * (self.full_height - self.thickness) / self.full_stroke
+
+    @property
+    def axes(self) -> list[Point]:
+        """Centres of the chambers of a lobed actuator."""
+        return [chamber.centres[0] for chamber in self.laminate.chambers]
+
+    @property
+    def is_tapered(self) -> bool:
+        return len(set(self.radii)) > 1
+
+    @property
+    def has_the_papers_film(self) -> bool:
+        """True if the films are the paper's, so that its measurements apply."""
+        return all(layer.film.is_the_papers for layer in self.laminate.tpe_layers)
+
+    @property
+    def knows_full(self) -> bool:
+        """True if full stroke and full height are known: of round pockets they were measured."""
+        return not self.radii or self.has_the_papers_film
+
+    def is_like_paper(self, stacks: int, radius: float) -> bool:
+        """Return True if the paper measured so many stacks of such balloons on common plates: its
+        1-DoF actuators have one, its 3-DoF actuator three.
+        """
+        return (
+            self.has_the_papers_film
+            and self.form.wrap is None
+            and self.form.stacks == stacks
+            and set(self.radii) == {radius}
+        )
+
+
+def actuator(
+    design: Design, laminate: Laminate, calibration: Factors, form: Form | None = None
+) -> Actuator:
+    """Return the actuator of a design of any family; ``form`` replaces its own."""
+    balloons, form = design.stack.balloons, form or design.form
+    radii: tuple[float, ...] = ()
+    kinematics: tuple[Kinematics, ...] = ()
+    full = full_height = 0.0
+    thickness = laminate.thickness * calibration.press_factor
+    if isinstance(form.pockets, Slots):
+        kinematics = slot_stack(form.pockets.width, form.pockets.run, balloons)
+        full = kinematics[0].largest_stroke
+        full_height = thickness + full
+    elif isinstance(form.pockets, Discs):
+        radii = tuple(d / 2 for d in form.pockets.diameters)
+        kinematics = round_stack(radii)
+        # The paper divides its whole height by its balloons (Sec. 4.6: 1.2 mm each).
+        full = full_height = full_stroke(radii)
+    return Actuator(
+        design, form, laminate, balloons, radii, kinematics, full, full_height, thickness
+    )

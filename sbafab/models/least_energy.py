@@ -1,4 +1,6 @@
-"""Shapes of least energy, many at once: Newton's method, damped where it climbs."""
+"""Equilibria as minima of energy, many at once: damped Newton's method with a line search, and its
+linear algebra (banded solvers, safeguarded steps).
+"""
 
 from __future__ import annotations
 
@@ -11,23 +13,23 @@ if TYPE_CHECKING:
 
     from sbafab.models.film_elements import Array
 
-FARTHEST = 0.7
+LONGEST_STEP = 0.7
 """Share of its length by which an element may change in one step."""
 MOST_STEPS = 400
 ROUNDING = 1e-13
-"""Share of the energy that is lost in its own digits."""
+"""Share of the energy that is lost to rounding."""
 HALVINGS = 12
-LAST = 1e-4
-"""Share of its length that an element may change by in a step that is not looked at."""
+LAST_STEP = 1e-4
+"""Share of its length by which the last step, without line search, may change an element."""
 
 
-class NoBalance(Exception):  # noqa: N818
-    """No end was found."""
+class NoEquilibrium(Exception):  # noqa: N818
+    """Newton's method did not converge."""
 
 
 class Descent(NamedTuple):
-    """Energies (rows,), their slopes by coordinate (coordinates, rows), 0 where none may move, and
-    second derivatives as the problem keeps them, rows last.
+    """Energies (rows,), their gradient by coordinate (coordinates, rows), 0 for fixed ones, and
+    tangent stiffness in the form that the problem uses, rows last.
     """
 
     energy: Array
@@ -38,64 +40,239 @@ class Descent(NamedTuple):
 class Potential(Protocol):
     """Energies of a row of shapes.
 
-    ``scale`` (rows,) is an energy of their size, ``close`` (rows,) what slope counts as none.
+    ``scale`` (rows,) is an energy of their size, ``close`` (rows,) the residual that counts as
+    none.
     """
 
     scale: Array
     close: Array
 
     def at(self, x: Array, rows: NDArray[np.int_]) -> Descent:
-        """The energies of ``rows`` at coordinates ``x`` (coordinates, rows)."""
+        """Return the energies of ``rows`` at coordinates ``x`` (coordinates, rows)."""
         ...
 
-    def ahead(self, state: Descent, damping: Array) -> Array:
-        """Where Newton's step leads, (coordinates, rows), with that share of the diagonal more."""
+    def newton_step(self, state: Descent, damping: Array) -> Array:
+        """Return Newton's step (coordinates, rows), the diagonal increased by ``damping``."""
         ...
 
     def change(self, x: Array, ahead: Array) -> Array:
-        """The largest share of its length by which a step changes an element: (rows,)."""
+        """Return the largest share of its length by which a step changes an element: (rows,)."""
         ...
 
 
-def settled(problem: Potential, x: Array) -> Array:
-    """The coordinates (coordinates, rows) of least energy downhill of these.
+def equilibrium(problem: Potential, x: Array) -> Array:
+    """Return the coordinates (coordinates, rows) of least energy downhill of these.
 
-    Raises NoBalance where no end is found.
+    Raises NoEquilibrium where Newton's method does not converge.
     """
-    found, live = x.copy(), np.arange(x.shape[1])
-    ahead, share = np.zeros_like(x), np.ones(len(live))
+    minimum, live = x.copy(), np.arange(x.shape[1])
+    step_taken, share = np.zeros_like(x), np.ones(len(live))
     damping, slope = np.zeros(len(live)), np.zeros(len(live))
     energy = np.full(len(live), np.inf)
     halved = np.zeros(len(live), dtype=int)
     for _ in range(MOST_STEPS):
         scale = problem.scale[live]
-        to = x + share * ahead
+        to = x + share * step_taken
         state = problem.at(to, live)
         room = 1e-12 * (np.abs(energy) + scale)
         good = (share == 0.0) | (state.energy <= energy + 1e-4 * share * slope + room)
         x, energy = np.where(good, to, x), np.where(good, state.energy, energy)
         lower = np.where(share > 0, damping / 10, np.clip(10 * damping, 1e-3, 1e9))
         damping = np.where(good, np.where(lower < 1e-6, 0.0, lower), damping)
-        move = problem.ahead(state, damping)
-        falls = (move * state.gradient).sum(0)
+        step = problem.newton_step(state, damping)
+        falls = (step * state.gradient).sum(0)
         # Where rounding alone decides whether the energy falls, there is nothing left to gain.
         still = np.abs(state.gradient).max(0) <= problem.close[live]
         still |= (np.abs(falls) <= ROUNDING * (np.abs(energy) + scale)) & (damping == 0.0)
         still &= good
-        # No element is stretched, turned or shortened by more than its own length: none collapses.
-        full = np.minimum(1.0, FARTHEST / np.maximum(problem.change(x, move), 1e-300))
+        # No element is stretched, turned or shortened by more than its length: none collapses.
+        full = np.minimum(1.0, LONGEST_STEP / np.maximum(problem.change(x, step), 1e-300))
         halved = np.where(good, 0, halved + 1)
         less = np.where(halved < HALVINGS, share / 2, 0.0)
         share = np.where(good, np.where(falls <= 0, full, 0.0), less)
-        ahead, slope = np.where(good, move, ahead), np.where(good, falls, slope)
+        step_taken, slope = np.where(good, step, step_taken), np.where(good, falls, slope)
         if still.any():
             # The last step is too short to be judged by the energy, and squares what is amiss.
-            last = np.where(problem.change(x, move) < LAST, x + move, x)
-            found[:, live[still]] = last[:, still]
+            last = np.where(problem.change(x, step) < LAST_STEP, x + step, x)
+            minimum[:, live[still]] = last[:, still]
             if still.all():
-                return found
-            left = ~still
-            live, x, ahead = live[left], x[:, left], ahead[:, left]
-            share, damping, slope = share[left], damping[left], slope[left]
-            energy, halved = energy[left], halved[left]
-    raise NoBalance
+                return minimum
+            is_open = ~still
+            live, x, step_taken = live[is_open], x[:, is_open], step_taken[:, is_open]
+            share, damping, slope = share[is_open], damping[is_open], slope[is_open]
+            energy, halved = energy[is_open], halved[is_open]
+    raise NoEquilibrium
+
+
+# Banded symmetric systems, many small ones at once.
+
+
+def solve(band: Array, right_side: Array) -> Array:
+    """Return the solution of A x = ``right_side``: (n, rows), or (n, several, rows) with several
+    right sides for each A.
+
+    ``band`` (n, width, rows) holds ``A[i, i + k]`` at ``[i, k]``. By A = L D L^T without pivoting,
+    all rows in step; a negative pivot is replaced by its absolute value, so that for the gradient
+    of an energy the solution is always a descent direction.
+    """
+    size, width, rows = band.shape
+    reach = width - 1
+    # Room for both halves and beyond the end; A[i, i + k] at [i, reach + k].
+    full = np.zeros((size + reach, 2 * reach + 1, rows))
+    full[:size, reach:] = band
+    several = right_side.reshape(size, -1, rows)
+    solution = np.zeros((size + reach, *several.shape[1:]))
+    solution[:size] = several
+    step, across, row = full.strides
+    # Of each pivot, the square of the rows and columns behind it that it reaches.
+    squares = np.lib.stride_tricks.as_strided(
+        full[1:, reach:], (size, reach, reach, rows), (step, step - across, across, row)
+    )
+    lower, pivots = np.empty((size, reach, 1, rows)), np.empty((size, 1, rows))
+    product, side = np.empty((reach, reach, rows)), np.empty((reach, *several.shape[1:]))
+    for i in range(size):
+        right = full[i, reach + 1 :]
+        pivot = np.abs(full[i, reach], out=pivots[i, 0])
+        share = lower[i]
+        np.divide(right, pivot, out=share[:, 0])
+        np.multiply(share, right, out=product)
+        squares[i] -= product
+        np.multiply(share, solution[i], out=side)
+        solution[i + 1 : i + width] -= side
+    solution[:size] /= pivots
+    for i in reversed(range(size)):
+        np.multiply(lower[i], solution[i + 1 : i + width], out=side)
+        solution[i] -= side.sum(0)
+    return solution[:size].reshape(right_side.shape)
+
+
+def solve_positive(band: Array, right_side: Array) -> Array | None:
+    """Return the solution of A x = ``right_side`` (n, rows) as ``solve`` does; None unless all A
+    are positive definite.
+
+    Block by block as wide as the band: quicker where that is wide and rows are few.
+    """
+    size, width, rows = band.shape
+    count = -(-size // width)
+    # Beyond the end A is 1, so that all blocks are whole.
+    whole = np.zeros((rows, count * width, width))
+    whole[:, size:, 0] = 1.0
+    whole[:, :size] = band.transpose(2, 0, 1)
+    whole = whole.reshape(rows, count, width, width)
+    number = np.arange(width)
+    off = number - number[:, None]
+    row = np.broadcast_to(number[:, None], off.shape)
+    upper = np.where(off >= 0, whole[:, :, row, off.clip(0)], 0.0)
+    diagonal = upper + np.triu(upper, 1).swapaxes(2, 3)
+    beside = np.where(off < 0, whole[:, :, row, (off + width).clip(max=width - 1)], 0.0)
+    right = np.zeros((rows, count * width, 1))
+    right[:, :size, 0] = right_side.T
+    right = right.reshape(rows, count, width, 1)
+    turned = np.ascontiguousarray(beside.swapaxes(2, 3))
+    # Each block's coupling to the next, and its part of the solution.
+    both = np.concatenate([beside, right], 3)
+    for k in range(count):
+        if k:
+            lower = turned[:, k - 1] @ both[:, k - 1]
+            diagonal[:, k] -= lower[..., :-1]
+            both[:, k, :, -1] -= lower[..., -1]
+        try:
+            np.linalg.cholesky(diagonal[:, k])
+        except np.linalg.LinAlgError:
+            return None
+        both[:, k] = np.linalg.solve(diagonal[:, k], both[:, k])
+    solution = both[..., -1].copy()
+    for k in reversed(range(count - 1)):
+        solution[:, k] -= (both[:, k, :, :-1] @ solution[:, k + 1, :, None])[..., 0]
+    return np.asarray(solution.reshape(rows, -1)[:, :size].T)
+
+
+def tie(band: Array, from_: int, to: int) -> None:
+    """Add the row and column of one unknown to those of another that it is equal to."""
+    size, width = band.shape[:2]
+    for i in range(max(0, from_ - width + 1), min(size, from_ + width)):
+        value = band[min(i, from_), abs(i - from_)]
+        if i == to:
+            value = 2 * value
+        at = to if i == from_ else i
+        band[min(at, to), abs(at - to)] += value
+
+
+class Packing(NamedTuple):
+    """Entries [i, k] of a band that belong to free unknowns, and their places in their band."""
+
+    row: NDArray[np.int_]
+    off: NDArray[np.int_]
+    to_row: NDArray[np.int_]
+    to_off: NDArray[np.int_]
+    size: int
+
+
+def packing(freedoms: NDArray[np.int_], size: int, width: int) -> Packing:
+    """Return the map from a band (size, width) to that of the ``freedoms`` alone."""
+    number = np.full(size + width, -1)
+    number[freedoms] = np.arange(len(freedoms))
+    row, off = (part.ravel() for part in np.meshgrid(freedoms, np.arange(width), indexing="ij"))
+    is_free = number[row + off] >= 0
+    row, off = row[is_free], off[is_free]
+    return Packing(row, off, number[row], number[row + off] - number[row], len(freedoms))
+
+
+def packed(band: Array, to: Packing) -> Array:
+    """Return the band (freedoms, width, rows) of the free unknowns, from one (n, width, rows)."""
+    narrow = np.zeros((to.size, *band.shape[1:]))
+    narrow[to.to_row, to.to_off] = band[to.row, to.off]
+    return narrow
+
+
+def dense(band: Array) -> Array:
+    """Return the full matrices: (rows, n, n)."""
+    size, width, rows = band.shape
+    whole = np.zeros((rows, size, size))
+    for k in range(width):
+        i = np.arange(size - k)
+        whole[:, i, i + k] = whole[:, i + k, i] = band[: size - k, k].T
+    return whole
+
+
+# Safeguarded Newton steps of a stack's levels.
+
+
+LARGEST_MOVE = np.array([0.4, 0.15, 0.15])
+"""Largest rise (mm) and tilts (rad) in one step."""
+SMALLEST_STEP = 1e-6
+"""Step (mm, rad) below which an equilibrium counts as converged."""
+
+
+def is_last_step(largest: float, before: float, fine: float = SMALLEST_STEP) -> bool:
+    """Return True if the step after this one would be below ``fine``, by quadratic convergence from
+    ``before``, the largest move of the full step before it.
+    """
+    return largest * largest < fine * before
+
+
+def newton_step(gradient: Array, matrix: Array) -> tuple[Array, bool]:
+    """Return Newton's step of each row, a descent direction even where the tangent stiffness is
+    indefinite, and True if it is positive definite in all rows.
+    """
+    if not is_positive_definite(matrix):
+        values, vectors = np.linalg.eigh(matrix)
+        least = 1e-6 * np.abs(values).max(-1, keepdims=True) + 1e-9
+        values = np.maximum(np.abs(values), least)
+        within = (vectors.transpose(0, 2, 1) @ gradient[..., None])[..., 0]
+        return np.asarray(-(vectors @ (within / values)[..., None])[..., 0]), False
+    return np.asarray(-np.linalg.solve(matrix, gradient[..., None])[..., 0]), True
+
+
+def step_limit(move: Array) -> Array:
+    """Return the share of each row's step that stays within ``LARGEST_MOVE``."""
+    return np.asarray(np.minimum(1.0, (LARGEST_MOVE / np.maximum(np.abs(move), 1e-12)).min(-1)))
+
+
+def is_positive_definite(matrix: Array) -> bool:
+    """Return True if all matrices are positive definite."""
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return False
+    return True

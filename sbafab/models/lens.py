@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.models.numeric import ROUNDS, inverse, within
+from sbafab.models.parabola import BISECTIONS, inverse, within
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -36,9 +36,9 @@ class Fullest(NamedTuple):
 
 @cache
 def fullest(width: float, run: float) -> Fullest:
-    """Where dv/dh has come down to 0."""
+    """Return the balloon at which dv/dh has come down to 0."""
     low, high = SHALLOW, math.pi / 2
-    for _ in range(ROUNDS):
+    for _ in range(BISECTIONS):
         b = (low + high) / 2
         low, high = (b, high) if _rate(np.asarray(b), width, run) > 0 else (low, b)
     angle = np.asarray(low)
@@ -46,26 +46,26 @@ def fullest(width: float, run: float) -> Fullest:
 
 
 def stroke(v: ArrayLike, width: float, run: float) -> NDArray[np.float64]:
-    """Height (mm) of a balloon that holds ``v`` ul. Raises DesignError out of range."""
+    """Return the height (mm) of a balloon that holds ``v`` ul. Raises DesignError out of range."""
     most = fullest(width, run)
-    wanted = within(v, most.volume, "volume of a balloon", "ul", MODEL)
-    return _stroke(inverse(lambda b: _volume(b, width, run), wanted, most.angle), width)
+    volumes = within(v, most.volume, "volume of a balloon", "ul", MODEL)
+    return _stroke(inverse(lambda b: _volume(b, width, run), volumes, most.angle), width)
 
 
 def volume(h: ArrayLike, width: float, run: float) -> NDArray[np.float64]:
-    """Volume (ul) of a balloon ``h`` mm high. Raises DesignError out of range."""
+    """Return the volume (ul) of a balloon ``h`` mm high. Raises DesignError out of range."""
     return _volume(_angle(h, width, run), width, run)
 
 
 def rate(h: ArrayLike, width: float, run: float) -> NDArray[np.float64]:
-    """dv/dh in mm2 of a balloon ``h`` mm high."""
+    """Return dv/dh in mm2 of a balloon ``h`` mm high."""
     return _rate(_angle(h, width, run), width, run)
 
 
 def _angle(h: ArrayLike, width: float, run: float) -> NDArray[np.float64]:
     most = fullest(width, run)
-    wanted = within(h, most.stroke, "stroke of a balloon", "mm", MODEL)
-    return inverse(lambda b: _stroke(b, width), wanted, most.angle)
+    heights = within(h, most.stroke, "stroke of a balloon", "mm", MODEL)
+    return inverse(lambda b: _stroke(b, width), heights, most.angle)
 
 
 def _stroke(b: NDArray[np.float64], width: float) -> NDArray[np.float64]:
@@ -77,8 +77,8 @@ def _stroke(b: NDArray[np.float64], width: float) -> NDArray[np.float64]:
 def _volume(b: NDArray[np.float64], width: float, run: float) -> NDArray[np.float64]:
     safe = np.maximum(b, SHALLOW)
     radius = width / (2 * safe)
-    held = radius**2 * (2 * safe - np.sin(2 * safe)) * run + radius**3 * _caps(safe)
-    return np.asarray(np.where(b > SHALLOW, held, held * b / SHALLOW))
+    content = radius**2 * (2 * safe - np.sin(2 * safe)) * run + radius**3 * _caps(safe)
+    return np.asarray(np.where(b > SHALLOW, content, content * b / SHALLOW))
 
 
 def _rate(b: NDArray[np.float64], width: float, run: float) -> NDArray[np.float64]:
@@ -92,6 +92,6 @@ def _rate(b: NDArray[np.float64], width: float, run: float) -> NDArray[np.float6
 
 
 def _caps(b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Volume of two caps of half angle ``b`` of a sphere of radius 1."""
+    """Return the volume of two caps of half angle ``b`` of a sphere of radius 1."""
     rise = 2 * np.sin(b / 2) ** 2
     return np.asarray(2 * math.pi / 3 * rise**2 * (3 - rise))

@@ -1,6 +1,6 @@
-"""The balloons of a design as files for other programs: CSV, JSON, and Python that needs nothing.
+"""The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies.
 
-Pressures kPa, heights mm (what a balloon has risen by), forces mN, volumes ul, potentials uJ.
+Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FORMATS = ("csv", "json", "py")
 
 
 def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
-    """The text of a file of one of FORMATS."""
+    """Return the text of a file of one of FORMATS."""
     if form == "py":
         return _python(name, stack)
     if form == "json":
@@ -34,19 +34,19 @@ def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
     return _csv(stack, points)
 
 
-def _grid(one: BalloonMap, points: int) -> tuple[Array, Array]:
-    """Pressures, closer together where they are low, and heights."""
+def _grid(balloon: BalloonMap, points: int) -> tuple[Array, Array]:
+    """Return pressures, closer together where they are low, and heights."""
     even = np.linspace(0.0, 1.0, points)
-    pressures = one.most_pressure * even**2
-    return pressures, one.most_height * even
+    pressures = balloon.most_pressure * even**2
+    return pressures, balloon.most_height * even
 
 
 def _csv(stack: Stack, points: int) -> str:
     rows: list[Sequence[str]] = [COLUMNS]
-    for number, one in enumerate(stack.maps, start=1):
-        pressures, heights = _grid(one, points)
+    for number, balloon in enumerate(stack.maps, start=1):
+        pressures, heights = _grid(balloon, points)
         p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
-        columns = (p, h, one.force(p, h), one.volume(p, h), one.potential(p, h))
+        columns = (p, h, balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h))
         for row in zip(*(column.tolist() for column in columns), strict=True):
             rows.append([str(number), *(f"{value:.7g}" for value in row)])
     return csv_text(rows)
@@ -60,25 +60,25 @@ def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
         "levels": [int(kind) + 1 for kind in stack.levels],
         "flat_level_mm": _short(stack.pitch),
         "chamber_axes_mm": [[_short(x) for x in axis] for axis in stack.axes.tolist()],
-        "balloons": [_balloon(one, points) for one in stack.maps],
+        "balloons": [_balloon(balloon, points) for balloon in stack.maps],
     }
 
 
-def _balloon(one: BalloonMap, points: int) -> dict[str, Any]:
-    pressures, heights = _grid(one, points)
+def _balloon(balloon: BalloonMap, points: int) -> dict[str, Any]:
+    pressures, heights = _grid(balloon, points)
     p, h = np.meshgrid(pressures, heights, indexing="ij")
     return {
-        **_drawn(one),
+        **_dimensions(balloon),
         "pressure": [_short(value) for value in pressures.tolist()],
         "height": [_short(value) for value in heights.tolist()],
-        "force": _rows(one.force(p, h)),
-        "volume": _rows(one.volume(p, h)),
-        "potential": _rows(one.potential(p, h)),
+        "force": _rows(balloon.force(p, h)),
+        "volume": _rows(balloon.volume(p, h)),
+        "potential": _rows(balloon.potential(p, h)),
     }
 
 
-def _drawn(one: BalloonMap) -> dict[str, float]:
-    film = one.balloon
+def _dimensions(balloon: BalloonMap) -> dict[str, float]:
+    film = balloon.balloon
     return {
         "pocket_radius_mm": film.pocket,
         "neck_radius_mm": film.neck,
@@ -94,7 +94,7 @@ def _rows(values: Array) -> list[list[float]]:
 
 
 def _short(value: float) -> float:
-    """Seven digits."""
+    """Return a number to seven digits."""
     return float(f"{value:.7g}")
 
 
@@ -175,14 +175,14 @@ def area(p, h, balloon=0):
 def _python(name: str, stack: Stack) -> str:
     balloons = [
         {
-            **_drawn(one),
-            "most_pressure": one.most_pressure,
-            "most_height": one.most_height,
+            **_dimensions(balloon),
+            "most_pressure": balloon.most_pressure,
+            "most_height": balloon.most_height,
             "coefficients": [
-                [float(f"{c:.10g}") for c in row] for row in one.coefficients.tolist()
+                [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
             ],
         }
-        for one in stack.maps
+        for balloon in stack.maps
     ]
     return PYTHON.format(
         name=name,

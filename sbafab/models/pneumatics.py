@@ -1,4 +1,4 @@
-"""What feeds a chamber: fluid, tube, valve and pump (paper, Sec. 4.5 and 7).
+"""Supply of a chamber: fluid, tube, valve and pump, and filling times (paper, Sec. 4.5 and 7).
 
 Flow through the tube is laminar (Poiseuille) or, where that is less, turbulent in a smooth tube
 (Blasius). A gas is isothermal: pressures squared take the place of pressures, and its volumes are
@@ -9,9 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.flow import ATMOSPHERE_KPA
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
 
 TUBE_DIAMETER = 0.635
 """Inner diameter of Braintree RPT040 in mm (paper, Sec. 2)."""
@@ -21,7 +26,7 @@ TUBE_LENGTH = 150.0
 
 @dataclass(frozen=True)
 class Fluid:
-    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3, and whether it is a gas."""
+    """A fluid at 20 C: ``viscosity`` in kPa s, ``density`` in kg/m3; compressible if ``is_gas``."""
 
     name: str
     viscosity: float
@@ -36,11 +41,11 @@ FLUIDS = {"water": WATER, "air": AIR}
 
 @dataclass(frozen=True)
 class Line:
-    """The line to each chamber.
+    """The supply line of a chamber.
 
     ``length`` and inner ``diameter`` of its tube in mm; ``dead_volume`` ul between pump and tube
-    (syringe, valve, fittings), where a gas is squeezed before it flows; ``delay`` s until valve or
-    pump act.
+    (syringe, valve, fittings), where a gas is compressed before it flows; ``delay`` s until valve
+    or pump act.
     """
 
     fluid: Fluid = AIR
@@ -61,11 +66,11 @@ class Line:
 
     @property
     def tube_volume(self) -> float:
-        """Ul in the tube."""
+        """Volume of the tube, ul."""
         return math.pi * self.diameter**2 / 4 * self.length
 
     def flow(self, source: float, chamber: float) -> float:
-        """ul/s from a pressure at the pump to one in the chamber; a gas at the atmosphere."""
+        """Return ul/s, of a gas at the atmosphere, between pressures at pump and in chamber."""
         drop = self._drop(source, chamber)
         head = abs(drop)
         laminar = head * math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
@@ -77,7 +82,7 @@ class Line:
         return math.copysign(min(laminar, turbulent), drop)
 
     def source_pressure(self, flow: float, chamber: float) -> float:
-        """Pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
+        """Return the pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
         low, high = chamber, chamber + 1.0
         while self.flow(high, chamber) < flow:
             high = chamber + 2 * (high - chamber)
@@ -93,5 +98,29 @@ class Line:
         return (up * up - down * down) / (2 * ATMOSPHERE_KPA)
 
     def content(self, volume: float, pressure: float) -> float:
-        """How much fluid a volume holds: ul, of a gas at the atmosphere."""
+        """Return the fluid in ul in a volume, of a gas at the atmosphere."""
         return volume * (1 + pressure / ATMOSPHERE_KPA) if self.fluid.is_gas else volume
+
+
+# Filling time at a steady flow (paper, Sec. 4.5 and 7).
+
+
+ATMOSPHERE_KPA = 101.325
+LEAST_FLOW, MOST_FLOW = 1e-6, 1e6
+"""ml/min: from a nanolitre a minute, of the slowest syringe pumps, to 1,000 litres."""
+
+
+def seconds(
+    volume_ul: ArrayLike, flow_ml_min: float, gas_at_kpa: float = 0.0
+) -> NDArray[np.float64]:
+    """Return the seconds to a volume at a steady flow.
+
+    ``gas_at_kpa`` is the pressure that a gas is compressed to, above the atmosphere at which its
+    flow is counted; leave it for a liquid. Raises DesignError for a flow that no pump has.
+    """
+    if not LEAST_FLOW <= flow_ml_min <= MOST_FLOW:
+        raise DesignError(
+            f"flow = {flow_ml_min:g} ml/min must be from {LEAST_FLOW:g} to {MOST_FLOW:g} ml/min"
+        )
+    squeezed = 1 + gas_at_kpa / ATMOSPHERE_KPA
+    return np.asarray(volume_ul, dtype=float) * squeezed / (flow_ml_min * 1000 / 60)

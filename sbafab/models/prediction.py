@@ -1,44 +1,420 @@
-"""All that the models say of one design, put together."""
+"""All figures and curves that the models give for a design: sizes, stroke, force, work and time of
+chambers in step, bending and workspace of parallel ones, and their order in a prediction.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.actuators import build
-from sbafab.design.form import Slots, Wrap
-from sbafab.design.records import Design
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.design.records import Design, Slots, Wrap
+from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.region import Region
-from sbafab.laminate.extent import film_mass
-from sbafab.laminate.laminate import Laminate
-from sbafab.models import axial, elastic, lobes, paper, stacked
-from sbafab.models.actuator import NOT_MEASURED, Actuator, actuator
-from sbafab.models.choice import REACHED, STACK, WIDEST, chosen
-from sbafab.models.counterparts import counterpart
-from sbafab.models.drawn import (
-    bounded,
-    flat_forces,
-    near_discs,
-    relation_by_disc,
-    why_no_disc,
-)
+from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models import elastic, paper
+from sbafab.models.drawn import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
+from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
-    Asked,
+    REACHED,
+    STACK,
+    WIDEST,
     Figure,
     LeftOut,
     Model,
+    Points,
     Prediction,
+    PredictionRequest,
     Relation,
     Trace,
+    chosen,
 )
-from sbafab.models.inlet import largest_tube
-from sbafab.models.sizes import sizes
+from sbafab.models.formulas import (
+    LOBES,
+    bend,
+    folded_diameter,
+    force,
+    largest_tube,
+    second_moments,
+    sizes,
+    tip_stiffness,
+    work_uj,
+)
+from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics, actuator
+from sbafab.models.paper import counterpart
+from sbafab.models.parabola import fullest
+from sbafab.models.pneumatics import seconds
 from sbafab.models.stack import Stack
-from sbafab.models.stiffness import second_moments, tip_stiffness
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+SAMPLES = 61
+
+
+def check_request(actuator: Actuator, request: PredictionRequest) -> None:
+    """Raise DesignError for pressures, flows or volumes out of every model's range."""
+    force(request.pressures_kpa, 0.0)
+    seconds(0.0, request.flow_ml_min)
+    if actuator.kinematics:
+        widest = max(actuator.kinematics, key=lambda k: k.largest_volume)
+        widest.stroke(request.volumes_ul)
+
+
+def full_model(actuator: Actuator) -> Model:
+    """Return the model of the full stroke."""
+    if actuator.radii:
+        return Model(
+            "the paper's full height",
+            "Sec. 4.6: 17.5 mm for 15 balloons of d = 5, in proportion to d",
+            "measured, not predicted: one actuator of d = 5; as in the paper, all of the height "
+            "counts as stroke",
+        )
+    return Model(
+        "the largest volume", actuator.kinematics[0].model.name, actuator.kinematics[0].model.trust
+    )
+
+
+def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
+    """Yield the full state, the largest volumes, and strokes at each volume of the request."""
+    if actuator.knows_full:
+        full = full_model(actuator)
+        yield Figure("stroke", "full stroke", actuator.full_stroke, "mm", full)
+        yield Figure("stroke", "full height", actuator.full_height, "mm", full)
+        for k in actuator.kinematics:
+            at_full = float(k.volume(actuator.full_stroke))
+            yield Figure("stroke", "volume a balloon at full stroke", at_full, "ul", k.model)
+    else:
+        yield LeftOut("full stroke, full height, and what is predicted at them", NOT_MEASURED)
+    for k in actuator.kinematics:
+        yield Figure("stroke", "largest volume a balloon", k.largest_volume, "ul", k.model)
+        yield Figure("stroke", "stroke at the largest volume", k.largest_stroke, "mm", k.model)
+    if actuator.radii:
+        widest = max(actuator.radii)
+        drawn_in = 2 * fullest(widest).radius
+        by_eqs_1_to_3 = actuator.kinematics[-1].model
+        name = "balloon's diameter at the largest volume"
+        yield Figure("stroke", name, drawn_in, "mm", by_eqs_1_to_3)
+    for volume in request.volumes_ul:
+        for k in actuator.kinematics:
+            yield _stroke(k, volume)
+
+
+def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
+    name = f"stroke at {volume:g} ul a balloon"
+    try:
+        return Figure("stroke", name, float(k.stroke(volume)), "mm", k.model)
+    except DesignError as error:
+        return LeftOut(f"{name}, {k.model.name}", str(error))
+
+
+def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
+    """Yield the blocked force at each pressure, flat and at the paper's shares of full stroke."""
+    for pressure in request.pressures_kpa:
+        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
+            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+            for k in actuator.kinematics:
+                value = _force(actuator, k, pressure, share * actuator.full_stroke, request)
+                name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
+                yield Figure("force", name, float(value), "N", _force_model(actuator, k, request))
+
+
+def _force(
+    actuator: Actuator,
+    k: Kinematics,
+    pressure: float,
+    stroke: ArrayLike,
+    request: PredictionRequest,
+) -> NDArray[np.float64]:
+    factor = actuator.form.pushing * request.calibration.contact_factor
+    return factor * force(pressure, k.push(stroke))
+
+
+def _each(actuator: Actuator) -> str:
+    return "" if actuator.form.pushing == actuator.form.stacks else " of one SBA"
+
+
+def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) -> Model:
+    trust = (
+        "no film tension, no stretch; for d = 5 at 100 kPa the paper measured 0.76 to 1.24 times "
+        "what Eq. 4 says, 0.74 to 1.65 times what Eqs. 1-3 say"
+        if actuator.radii
+        else "no film tension, no stretch, one balloon stack; not measured"
+    )
+    model = Model(f"virtual work on {k.model.name}", "Sec. 4.3, F = p dv/dh", trust)
+    return model.times("contact factor", request.calibration.contact_factor)
+
+
+def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Iterator[Figure]:
+    """Yield time, work, speed and power density, all of it at the volume of the full stroke: where
+    that is not known only times to the volumes of the request, and without a mass no power density.
+    """
+    first = actuator.kinematics[0]
+    whole = None
+    if actuator.knows_full:
+        chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
+        whole = chamber * actuator.form.stacks
+        yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
+    flow = Model(
+        f"{first.model.name} over flow",
+        "Sec. 4.5, 7",
+        "a liquid at a steady flow into all chambers together, no lag of pump or tube: the paper's "
+        "water took 0.92 +- 0.08 s; a gas takes 10 % longer at 10 kPa, and valves much longer",
+    )
+    if whole is not None:
+        time = float(seconds(whole, request.flow_ml_min))
+        name = f"time to full stroke at {request.flow_ml_min:g} ml/min"
+        yield Figure("actuation", name, time, "s", flow)
+    for volume in request.volumes_ul:
+        content = volume * actuator.balloons * actuator.form.stacks
+        name = f"time to {volume:g} ul a balloon at {request.flow_ml_min:g} ml/min"
+        plain = Model("volume over flow", "Sec. 7", flow.trust)
+        yield Figure("actuation", name, float(seconds(content, request.flow_ml_min)), "s", plain)
+    if whole is None:
+        return
+    bound = Model(
+        f"p v with {first.model.name}",
+        "Sec. 4.1",
+        "end pressure times volume: more than the integral of p dV that the paper means, which the "
+        "elastic balloon gives",
+    )
+    for pressure in request.pressures_kpa:
+        name = f"pneumatic input work at {pressure:g} kPa"
+        yield Figure("actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound)
+    if request.pressures_kpa and mass_g is not None:
+        yield _power_density(actuator, request, whole, mass_g)
+
+
+def _power_density(
+    actuator: Actuator, request: PredictionRequest, whole: float, mass_g: float
+) -> Figure:
+    """Return the power density with the paper's air: its pump's flow, up to 10 kPa."""
+    time = float(seconds(whole, paper.AIR_FLOW, paper.FULL_KPA))
+    highest = max(request.pressures_kpa)
+    push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, request))
+    pushes = actuator.form.stacks / actuator.form.pushing
+    model = Model(
+        "F v / m",
+        "Sec. 7",
+        "largest force times mean speed, as in the paper; the two never occur together. No lag of "
+        "valve and pump: the paper's 0.067 s of air make it a fifth of this",
+    ).times("contact factor", request.calibration.contact_factor)
+    watts = pushes * push * actuator.full_stroke / 1000 / time
+    return Figure(
+        "actuation",
+        f"power density, blocked force flat at {highest:g} kPa and "
+        f"{paper.AIR_FLOW / 1000:g} l/min of air",
+        watts / (mass_g / 1000),
+        "W/kg",
+        model,
+    )
+
+
+def stroke_relation(actuator: Actuator) -> Relation:
+    """Return stroke against volume, by every model of the pockets."""
+    lines = []
+    for k in actuator.kinematics:
+        stroke = np.linspace(0, k.largest_stroke, SAMPLES)
+        lines.append(Trace(k.model.name, k.volume(stroke).tolist(), stroke.tolist(), k.model))
+    points = []
+    if actuator.is_like_paper(1, paper.VALID_RADIUS):
+        first = actuator.kinematics[0]
+        for fluid, volume, error in paper.VALID:
+            label = f"paper: Eq. 4 within {error.value:g} mm a balloon to here ({fluid})"
+            at, slack = float(first.stroke(volume)), error.value * actuator.balloons
+            points.append(Points(label, [volume], [at], [slack]))
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        ends = [0.0, max(k.largest_volume for k in actuator.kinematics)]
+        label = f"paper: {paper.FULL_HEIGHT.value:g} mm high when full"
+        lines.append(Trace(label, ends, [paper.FULL_HEIGHT.value] * 2))
+    return Relation(
+        "stroke",
+        "Stroke against volume",
+        "volume a balloon, ul" if not actuator.is_tapered else "mean volume a balloon, ul",
+        "stroke of the stack, mm",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
+    """Return force against stroke, to full stroke, at every pressure of the request."""
+    most = min(k.largest_stroke for k in actuator.kinematics)
+    stroke = np.linspace(0, actuator.full_stroke if actuator.knows_full else most, SAMPLES)
+    lines = []
+    for pressure in request.pressures_kpa:
+        for k in actuator.kinematics:
+            values = _force(actuator, k, pressure, stroke, request)
+            model = _force_model(actuator, k, request)
+            label = f"{k.model.name}, {pressure:g} kPa"
+            lines.append(Trace(label, stroke.tolist(), values.tolist(), model))
+    measured = None
+    if actuator.is_like_paper(1, 2.5):
+        measured = "1-DoF", paper.FORCE_1DOF
+    elif actuator.is_like_paper(3, 2.5):
+        measured = "3-DoF", paper.FORCE_3DOF
+    points = []
+    if measured is not None:
+        name, values_at = measured
+        places = [share * actuator.full_stroke for share in paper.HEIGHTS]
+        label = f"paper: {name}, {paper.FORCE_KPA:g} kPa"
+        y, errors = [m.value for m in values_at], [m.error for m in values_at]
+        points.append(Points(label, places, y, errors))
+    each = _each(actuator)
+    return Relation(
+        "force",
+        f"Blocked force{each} against stroke, by virtual work",
+        "stroke at which it is blocked, mm",
+        f"blocked force{each}, N",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+# Bending and workspace of parallel chambers, and how they fold.
+
+
+CURVATURE = Model(
+    "constant curvature",
+    "from chamber lengths, each at its own stroke",
+    "upper bound: chambers are taken to lengthen freely, and films between them do not hold back; "
+    "the paper's largest is 81 +- 6 deg",
+)
+
+
+class Path(NamedTuple):
+    """Motion of 1, 2 ... neighbouring chambers from flat to full stroke: stroke (mm), angle (rad),
+    lateral displacement and height of the tip (mm).
+    """
+
+    chambers: int
+    stroke: NDArray[np.float64]
+    angle: NDArray[np.float64]
+    aside: NDArray[np.float64]
+    height: NDArray[np.float64]
+
+
+def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
+    """Return one path for 1, 2 ... chambers next to each other; the others flat, or full.
+
+    A path ends where the top has turned by half a turn.
+    """
+    axes = actuator.axes
+    stroke = np.linspace(0, actuator.full_stroke, SAMPLES)
+    rest = actuator.full_height if others_full else actuator.thickness
+    all_paths = []
+    for chambers in range(1, len(axes)):
+        lengths = np.full((SAMPLES, len(axes)), rest)
+        lengths[:, :chambers] = actuator.lengths(stroke)[:, None]
+        bent = bend(lengths, axes)
+        good = bent.angle <= math.pi
+        aside = np.hypot(bent.tip[:, 0], bent.tip[:, 1])
+        all_paths.append(
+            Path(chambers, stroke[good], bent.angle[good], aside[good], bent.tip[good, 2])
+        )
+    return all_paths
+
+
+def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
+    """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
+    if not actuator.knows_full:
+        yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
+        return
+    all_paths = paths(actuator)
+    for path in all_paths:
+        name = f"bend with {chamber_count(path.chambers)} at full stroke, the others flat"
+        if len(path.stroke) < SAMPLES:
+            reason = "more than half a turn: the tip would come down through the base"
+            yield LeftOut(name, reason)
+        else:
+            yield Figure("bending", name, math.degrees(path.angle[-1]), "deg", CURVATURE)
+    every = [*all_paths, *paths(actuator, others_full=True)]
+    reach = max(float(path.aside.max()) for path in every)
+    yield Figure("bending", "maximum lateral tip displacement", reach, "mm", CURVATURE)
+
+
+def folding(actuator: Actuator, request: PredictionRequest) -> Figure | LeftOut:
+    """Return the diameter of the channel that three folded lobes pass."""
+    if actuator.form.stacks != LOBES:
+        reason = f"the model is of {LOBES} lobes folded into a triangle"
+        return LeftOut("folded diameter", f"{reason}; this design has {actuator.form.stacks}")
+    model = Model(
+        "three lobes as chords of a circle",
+        "our geometry; the paper reports 9.25",
+        "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
+        "paper measures, between which its 9.25 lies",
+    ).times("press factor", request.calibration.press_factor)
+    width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
+    value = folded_diameter(width, actuator.thickness)
+    return Figure("size", "folded diameter", value, "mm", model)
+
+
+def bending_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
+    """Return bend against time, each chamber fed at the flow of the request."""
+    first = actuator.kinematics[0]
+    model = Model(
+        f"{CURVATURE.name}, {first.model.name} over flow",
+        CURVATURE.source,
+        f"{CURVATURE.trust}; no lag of pump or tube",
+    )
+    lines = []
+    for path in paths(actuator):
+        content = first.volume(path.stroke) * actuator.balloons
+        time = seconds(content, request.flow_ml_min)
+        label = f"{chamber_count(path.chambers)} inflated, the others flat"
+        lines.append(Trace(label, time.tolist(), np.degrees(path.angle).tolist(), model))
+    points = []
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        ends = [0.0, max(max(line.x) for line in lines)]
+        largest = paper.LARGEST_BEND
+        if request.flow_ml_min == paper.WATER_FLOW:
+            x = [time for time, _ in paper.BENDING]
+            y = [angle.value for _, angle in paper.BENDING]
+            label = "paper: time to steady angles"
+            points.append(Points(label, x, y, [angle.error for _, angle in paper.BENDING]))
+            ends[1] = max(x)
+        label = f"paper: largest bend, {largest.value:g} +- {largest.error:g} deg"
+        lines.append(Trace(label, ends, [largest.value] * 2))
+    return Relation(
+        "bending",
+        "Bending against time",
+        f"time with {request.flow_ml_min:g} ml/min into each inflated chamber, s",
+        "bend of the top, deg",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+def workspace_relation(actuator: Actuator) -> Relation:
+    """Return the paths of the tip in the plane in which neighbouring chambers bend; no lines of
+    constant curvature where the full stroke is not known.
+    """
+    lines = []
+    rests = (("flat", False), ("full", True)) if actuator.knows_full else ()
+    for rest, others_full in rests:
+        for path in paths(actuator, others_full):
+            label = f"{chamber_count(path.chambers)}, the others {rest}"
+            lines.append(Trace(label, path.aside.tolist(), path.height.tolist(), CURVATURE))
+    points = []
+    if actuator.is_like_paper(3, 2.5) and actuator.balloons == paper.BALLOONS:
+        label = f"paper: all full, {paper.FULL_HEIGHT.value:g} mm"
+        points.append(Points(label, [0.0], [paper.FULL_HEIGHT.value], [0.0]))
+    return Relation(
+        "workspace",
+        "Paths of the tip",
+        "reach aside, mm",
+        "height of the tip, mm",
+        tuple(lines),
+        tuple(points),
+    )
+
+
+# The whole prediction of one design.
+
 
 GROUPS = ("size", "inlet", "stroke", "force", "actuation", "bending", "stiffness")
 GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
@@ -71,16 +447,17 @@ NOMINAL = Model(
 
 def predict(
     design: Design,
-    asked: Asked | None = None,
+    request: PredictionRequest | None = None,
     laminate: Laminate | None = None,
     quick: bool = False,
 ) -> Prediction:
-    """Figures and curves of a design of any family; ``quick`` gives no curves and no elastic stack.
+    """Return the figures and curves of a design of any family; ``quick`` leaves out curves and the
+    elastic stack.
 
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
-    wish = asked or Asked()
+    wish = request or PredictionRequest()
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -88,29 +465,32 @@ def predict(
     discs = near_discs(design)
     if discs is not None and not discs.is_round:
         discs = None
-    one = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
-    axial.check_asked(one, wish)
-    together = None if quick else stacked.stacked(one, wish)
-    found = _found(one, wish, together)
-    relations = () if quick else tuple(_relations(one, wish, _stack(together)))
+    subject = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
+    check_request(subject, wish)
+    together = None if quick else elastic.elastic_stack(subject, wish)
+    items = _figures(subject, wish, together)
+    relations = () if quick else tuple(_relations(subject, wish, _stack(together)))
     if discs is not None:
         bounds = [
             actuator(design, flat, wish.calibration, discs.form(design, diameter))
             for diameter in (discs.inner, discs.outer)
         ]
-        each = [_found(end, wish, None if quick else stacked.stacked(end, wish)) for end in bounds]
-        found = list(bounded(found, each, discs))
+        each = [
+            _figures(end, wish, None if quick else elastic.elastic_stack(end, wish))
+            for end in bounds
+        ]
+        items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
-    to_come = (STACK,) if quick and one.radii else ()
-    figures = chosen((item for item in found if isinstance(item, Figure)), to_come)
+    to_come = (STACK,) if quick and subject.radii else ()
+    figures = chosen((item for item in items if isinstance(item, Figure)), to_come)
     return Prediction(
         wish,
         tuple(
-            replace(figure, measured=counterpart(one.form, figure.name, figure.model.name))
+            replace(figure, measured=counterpart(subject.form, figure.name, figure.model.name))
             for figure in figures
         ),
         relations,
-        tuple(item for item in found if isinstance(item, LeftOut)),
+        tuple(item for item in items if isinstance(item, LeftOut)),
     )
 
 
@@ -118,86 +498,92 @@ def _stack(together: Stack | LeftOut | None) -> Stack | None:
     return together if isinstance(together, Stack) else None
 
 
-def _found(one: Actuator, asked: Asked, together: Stack | LeftOut | None) -> list[Figure | LeftOut]:
-    """All figures, and what is left out, in the order of their groups."""
-    found = list(_all(one, asked))
+def _figures(
+    actuator: Actuator, request: PredictionRequest, together: Stack | LeftOut | None
+) -> list[Figure | LeftOut]:
+    """Return all figures, and the ones left out, in the order of their groups."""
+    items = list(_geometric_figures(actuator, request))
     if isinstance(together, LeftOut):
-        found.append(together)
+        items.append(together)
     elif together is not None:
-        found += stacked.figures(one, asked, together)
-    return sorted(found, key=_place)
+        items += elastic.stack_figures(actuator, request, together)
+    return sorted(items, key=_group_order)
 
 
-def _all(one: Actuator, asked: Asked) -> Iterator[Figure | LeftOut]:
-    mass = _mass(one.laminate)
+def _geometric_figures(
+    actuator: Actuator, request: PredictionRequest
+) -> Iterator[Figure | LeftOut]:
+    mass = _mass(actuator.laminate)
     grams = None if isinstance(mass, LeftOut) else mass.value
-    yield from _sizes(one, asked)
-    if one.kinematics and one.form.is_parallel:
-        yield lobes.folding(one, asked)
+    yield from _sizes(actuator, request)
+    if actuator.kinematics and actuator.form.is_parallel:
+        yield folding(actuator, request)
     yield mass
-    if isinstance(mass, LeftOut) and one.kinematics:
+    if isinstance(mass, LeftOut) and actuator.kinematics:
         yield LeftOut("power density", mass.reason)
-    yield from _tubes(one)
-    pushed = list(flat_forces(one, asked))
+    yield from _tubes(actuator)
+    pushed = list(flat_forces(actuator, request))
     yield from pushed
-    if not one.kinematics:
+    if not actuator.kinematics:
         force = "force once the plates part" if pushed else "force"
-        for what in ("stroke", force, "actuation", "bending", "folded diameter"):
-            yield LeftOut(what, why_no_disc(one.design))
+        for quantity in ("stroke", force, "actuation", "bending", "folded diameter"):
+            yield LeftOut(quantity, why_no_disc(actuator.design))
         return
-    yield from axial.strokes(one, asked)
-    yield from elastic.free_strokes(one, asked)
-    yield from axial.forces(one, asked)
-    yield from axial.power(one, asked, grams)
-    if one.form.is_parallel:
-        yield from lobes.bending(one)
-    yield from _stiffness(one)
+    yield from strokes(actuator, request)
+    yield from elastic.free_strokes(actuator, request)
+    yield from forces(actuator, request)
+    yield from power(actuator, request, grams)
+    if actuator.form.is_parallel:
+        yield from bending(actuator)
+    yield from _stiffness(actuator)
 
 
-def _place(item: Figure | LeftOut) -> int:
-    """Where the figures of a group stand; within it the order is as they come."""
+def _group_order(item: Figure | LeftOut) -> int:
+    """Return the place of a figure's group; within it the order is as they come."""
     if isinstance(item, LeftOut):
         return len(GROUPS)
     return GROUPS.index(item.group)
 
 
-def _relations(one: Actuator, asked: Asked, together: Stack | None) -> Iterator[Relation]:
-    if not one.kinematics:
+def _relations(
+    actuator: Actuator, request: PredictionRequest, together: Stack | None
+) -> Iterator[Relation]:
+    if not actuator.kinematics:
         return
-    yield axial.stroke_relation(one)
-    if asked.pressures_kpa:
-        pushed = axial.force_relation(one, asked)
+    yield stroke_relation(actuator)
+    if request.pressures_kpa:
+        pushed = force_relation(actuator, request)
         if together is not None:
             pushed = replace(
-                pushed, lines=(*pushed.lines, *stacked.force_traces(one, asked, together))
+                pushed, lines=(*pushed.lines, *elastic.force_traces(actuator, request, together))
             )
         yield pushed
-    if one.form.is_parallel:
-        if one.knows_full:
-            yield lobes.bending_relation(one, asked)
+    if actuator.form.is_parallel:
+        if actuator.knows_full:
+            yield bending_relation(actuator, request)
         if together is not None:
-            yield stacked.bend_relation(asked, together)
-        reached = lobes.workspace_relation(one)
+            yield elastic.bend_relation(request, together)
+        reached = workspace_relation(actuator)
         if together is not None:
-            more = stacked.workspace_traces(asked, together)
+            more = elastic.workspace_traces(request, together)
             reached = replace(reached, lines=(*reached.lines, *more))
         if reached.lines:
             yield reached
-    if one.form.wrap is not None:
-        yield _diameter_relation(one, one.form.wrap)
+    if actuator.form.wrap is not None:
+        yield _diameter_relation(actuator, actuator.form.wrap)
 
 
-def _sizes(one: Actuator, asked: Asked) -> Iterator[Figure]:
-    """Flat sizes, and round the tube for radial designs."""
-    factor = asked.calibration.press_factor
+def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
+    """Yield flat sizes, and diameters round the tube for radial designs."""
+    factor = request.calibration.press_factor
     pressed = NOMINAL.times("press factor", factor)
-    for name, value in sizes(one.design, one.laminate).items():
+    for name, value in sizes(actuator.design, actuator.laminate).items():
         shown = name.replace("_", " ")
         if name == "thickness":
-            yield Figure("size", "deflated height", one.thickness, "mm", pressed)
+            yield Figure("size", "deflated height", actuator.thickness, "mm", pressed)
         elif name in ROUND_THE_TUBE:
             # The laminate is in it twice.
-            thinner = 2 * (one.laminate.thickness - one.thickness)
+            thinner = 2 * (actuator.laminate.thickness - actuator.thickness)
             model = ROUND_THE_TUBE[name].times("press factor", factor)
             yield Figure("size", shown, value - thinner, "mm", model)
         else:
@@ -213,42 +599,42 @@ def _mass(laminate: Laminate) -> Figure | LeftOut:
     return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
 
 
-def _tubes(one: Actuator) -> Iterator[Figure]:
-    inlet = min(one.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
+def _tubes(actuator: Actuator) -> Iterator[Figure]:
+    inlet = min(actuator.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     model = Model(
         "half the perimeter",
         "a flat strip opened round, its PTFE beside the tube",
         "cut at its narrowest; films do not stretch; glue not counted",
     )
-    narrowest = inlet.width - one.design.strip_loss
-    most = largest_tube(narrowest, one.design.films.ptfe.thickness)
+    narrowest = inlet.width - actuator.design.strip_loss
+    most = largest_tube(narrowest, actuator.design.films.ptfe.thickness)
     yield Figure("inlet", "largest tube that the inlet opens to", most, "mm", model)
     spare = most - inlet.tube_diameter
     name = f"room round the tube of {inlet.tube_diameter:g} mm"
     yield Figure("inlet", name, spare, "mm", model)
 
 
-def _plate(one: Actuator) -> Region | None:
-    """What is cut of the topmost film, if it has neither tabs nor ears."""
-    if one.balloons == 1 or one.laminate.registration == "ears":
+def _plate(actuator: Actuator) -> Region | None:
+    """Return the profile of the topmost film, if it has neither tabs nor ears."""
+    if actuator.balloons == 1 or actuator.laminate.registration == "ears":
         return None
-    return one.laminate.tpe_layers[-1].profile
+    return actuator.laminate.tpe_layers[-1].profile
 
 
-def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
-    """Bending stiffness of a full actuator by the paper's cantilever formula."""
+def _stiffness(actuator: Actuator) -> Iterator[Figure | LeftOut]:
+    """Yield the bending stiffness of a full actuator by the paper's cantilever formula."""
     name = "lateral tip stiffness, inflated"
-    plate = _plate(one)
-    if not one.radii:
+    plate = _plate(actuator)
+    if not actuator.radii:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")
         return
-    if not one.has_the_papers_film:
+    if not actuator.has_the_papers_film:
         yield LeftOut(name, NOT_MEASURED)
         return
     if plate is None:
         yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")
         return
-    measured = paper.MODULUS_3DOF if one.form.is_parallel else paper.MODULUS_1DOF
+    measured = paper.MODULUS_3DOF if actuator.form.is_parallel else paper.MODULUS_1DOF
     least, _ = second_moments(plate)
     yield Figure("stiffness", "second moment of area of the plate", least, "mm4", GEOMETRY)
     model = Model(
@@ -257,18 +643,18 @@ def _stiffness(one: Actuator) -> Iterator[Figure | LeftOut]:
         "order of magnitude: E is the paper's of its own actuators, not predicted, and its I is "
         "not given",
     )
-    value = tip_stiffness(measured.value, least, one.full_height)
+    value = tip_stiffness(measured.value, least, actuator.full_height)
     yield Figure("stiffness", name, value, "N/mm", model)
 
 
-def _diameter_relation(one: Actuator, wrap: Wrap) -> Relation:
-    """Diameter round the tube against the air in a balloon."""
-    k = one.kinematics[0]
-    stroke = np.linspace(0, k.largest_stroke, axial.SAMPLES)
-    around = wrap.tube_diameter + 2 * (one.thickness + stroke)
+def _diameter_relation(actuator: Actuator, wrap: Wrap) -> Relation:
+    """Return the diameter round the tube against the volume of a balloon."""
+    k = actuator.kinematics[0]
+    stroke = np.linspace(0, k.largest_stroke, SAMPLES)
+    around = wrap.tube_diameter + 2 * (actuator.thickness + stroke)
     lines = [Trace(k.model.name, k.volume(stroke).tolist(), around.tolist(), k.model)]
     label = f"paper: about {paper.RADIAL_FULL.value:g} mm inflated"
-    if (one.form.pockets, one.balloons) == (PAPER_SLOTS, 1):
+    if (actuator.form.pockets, actuator.balloons) == (PAPER_SLOTS, 1):
         lines.append(Trace(label, [0.0, k.largest_volume], [paper.RADIAL_FULL.value] * 2))
     return Relation(
         "diameter",

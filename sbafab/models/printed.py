@@ -1,4 +1,4 @@
-"""The paper's Eq. 4, exactly as printed (paper, Sec. 3.1), both ways round.
+"""The paper's Eq. 4, exactly as printed (Sec. 3.1), and its inverse.
 
 v = pi (32 h^5 - 24 h^3 l^2 + 18 h l^4) / (27 l^2), of one balloon whose stroke is h. It begins 4/3
 as steep as the Eqs. 1 to 3 that it is derived from: docs/prediction.md compares them. It rises for
@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.models.numeric import inverse, within
-from sbafab.models.parabola import fullest
+from sbafab.models.parabola import fullest, inverse, within
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,28 +22,28 @@ MODEL = "Eq. 4"
 
 
 def largest_stroke(length: float) -> float:
-    """Where its range ends, mm: 1.328 at l = 2.5."""
+    """Return the end of its range, mm: 1.328 at l = 2.5."""
     return fullest(length).height
 
 
 def largest_volume(length: float) -> float:
-    """The volume there, ul: 13.30 at l = 2.5."""
+    """Return the volume there, ul: 13.30 at l = 2.5."""
     return float(_volume(np.asarray(largest_stroke(length)), length))
 
 
 def volume(h: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Volume (ul) of a balloon whose stroke is ``h`` mm. Raises DesignError out of range."""
+    """Return ul of a balloon whose stroke is ``h`` mm. Raises DesignError out of range."""
     return _volume(_stroke(h, length), length)
 
 
 def stroke(v: ArrayLike, length: float) -> NDArray[np.float64]:
-    """Stroke (mm) of a balloon that holds ``v`` ul. Raises DesignError out of range."""
-    wanted = within(v, largest_volume(length), "volume of a balloon", "ul", MODEL)
-    return inverse(lambda h: _volume(h, length), wanted, largest_stroke(length))
+    """Return the stroke (mm) of a balloon that holds ``v`` ul. Raises DesignError out of range."""
+    volumes = within(v, largest_volume(length), "volume of a balloon", "ul", MODEL)
+    return inverse(lambda h: _volume(h, length), volumes, largest_stroke(length))
 
 
 def rate(h: ArrayLike, length: float) -> NDArray[np.float64]:
-    """dv/dh in mm2 of a balloon whose stroke is ``h`` mm."""
+    """Return dv/dh in mm2 of a balloon whose stroke is ``h`` mm."""
     x = _stroke(h, length)
     return math.pi / (27 * length**2) * (160 * x**4 - 72 * x**2 * length**2 + 18 * length**4)
 

@@ -1,9 +1,9 @@
 """Free balloons with wide pockets, whose films wrinkle in step with the rim's ripples.
 
-``balloon`` holds the pocket's edge while its rim ripples, and smears out the films' wrinkles. Where
+``balloon`` holds the pocket's edge while its rim ripples, and averages the films' wrinkles. Where
 a pocket is wide beside its ring, CalculiX shows films whose waves fall in step with the rim's, and
-an edge that goes along. ``rippled`` resolves those waves (``waving``, ``wave_energy``): nothing is
-smeared, nothing fitted. Rims stay level as a whole. Lengths mm, pressures kPa, volumes ul.
+an edge that moves with them. ``rippled`` resolves those waves (``rim_modes``): nothing is
+averaged, nothing fitted. Rims stay level as a whole. Lengths mm, pressures kPa, volumes ul.
 """
 
 from __future__ import annotations
@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes, inflate, rippling
-from sbafab.models.least_energy import NoBalance, settled
-from sbafab.models.wave_energy import Waves
-from sbafab.models.waving import EDGE, PLACES, UP, R, Waving, Z
+from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
+from sbafab.models.least_energy import NoEquilibrium, equilibrium
+from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -26,40 +25,40 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
 WIDE = 4.0
-"""Rings' widths in a pocket's radius from which on films fall in step with the rim: strokes of
+"""Ring widths in a pocket's radius from which on films fall in step with the rim: strokes of
 narrower ones are within 0.5 % with either model.
 """
 START = 0.0005
-"""Film strain, p R / (E t), at which ripples are first looked for: they come from 0.001 on."""
+"""Film strain, p R / (E t), at which ripples are first followed: they come from 0.001 on."""
 USUAL = 0.013
-"""Film strain at which the number of waves is taken, where none is given."""
+"""Film strain at which the number of waves is chosen, where none is given."""
 END = 0.256
-"""Film strain from which on films are stretched so far that it is all the same."""
+"""Film strain from which on films are stretched so far that waves make no difference."""
 STEP = 2.0
-"""Ratio of the pressures through which ripples are followed."""
+"""Ratio of the pressures of two rungs, along which ripples are continued."""
 SEED = 0.02
-"""Tilt in rad that a level rim is given to begin with."""
+"""Initial tilt in rad of a level rim."""
 LEVEL = 0.001
-"""Tilt in rad of a rim that does not ripple."""
+"""Tilt in rad below which a rim does not ripple."""
 KICK = 0.02
-"""Share of the radius by which films are pushed in step with the rim, to see whether they stay."""
+"""Share of the radius by which films are pushed in step with the rim, as a trial."""
 CLEARLY = 1e-5
-"""Share of its energy by which a balloon must be better off in step."""
+"""Relative gain of energy from which on a balloon counts as in step."""
 LATEST = 0.02
-"""Film strain by which films have fallen in step where they ever do."""
+"""Film strain up to which films fall in step, if ever."""
 ALIKE = 0.9
-"""Cosine of the angle between waves that are those of one branch."""
+"""Cosine of the angle between waves that belong to one branch."""
 TAUT = 1.4
 """Height over the free one at which waves are pulled straight."""
 NUDGE = 1e-3
-"""Share of a pressure by which rates are found."""
+"""Relative step of the finite differences by pressure."""
 HALVINGS = 3
-"""How often a step between rungs is halved where it finds no balance."""
+"""Times that a step between rungs is halved where it finds no equilibrium."""
 
 
 class Rippled(NamedTuple):
-    """Free balloons: ``shapes`` with r and z of the mean meridian, their rims' ``waves``, and by
-    how much the pocket's edge and the rim's outside go up and down, in mm, a row each.
+    """Free balloons: ``shapes`` with r and z of the mean meridian, their rims' ``waves``, and the
+    amplitudes in mm of the pocket's ``edge`` and the rim's ``outside``, a row each.
     """
 
     shapes: Shapes
@@ -68,96 +67,98 @@ class Rippled(NamedTuple):
     outside: Array
 
 
-def risen(balloon: Balloon, pressure: ArrayLike) -> Shapes:
-    """Free balloons at pressures (kPa): with waves in step where the pocket is wide and its rim
-    ripples, else as ``inflate`` has them.
+def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
+    """Return free balloons at pressures (kPa): with waves in step where the pocket is wide and its
+    rim ripples, else by ``inflate``.
     """
-    found = inflate(balloon, pressure)
-    rows = np.flatnonzero(found.pressure < _first(balloon) * END / START)
-    if not resolved(balloon) or not len(rows):
-        return found
-    own = rippled(balloon, found.pressure[rows])
-    grown = np.abs(own.outside - own.edge) > LEVEL * balloon.ring
-    parts = [part.copy() for part in found]
-    for part, other in zip(parts, own.shapes, strict=True):
-        part[rows[grown]] = other[grown]
+    shapes = inflate(balloon, pressure)
+    rows = np.flatnonzero(shapes.pressure < _first_pressure(balloon) * END / START)
+    if not resolves_waves(balloon) or not len(rows):
+        return shapes
+    resolved_balloons = rippled(balloon, shapes.pressure[rows])
+    grown = np.abs(resolved_balloons.outside - resolved_balloons.edge) > LEVEL * balloon.ring
+    parts = [part.copy() for part in shapes]
+    for part, resolved_part in zip(parts, resolved_balloons.shapes, strict=True):
+        part[rows[grown]] = resolved_part[grown]
     return Shapes(*parts)
 
 
-def pressed(balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False) -> Shapes:
-    """Balloons between plates at heights (mm), as ``inflate`` has them.
+def compressed_shapes(
+    balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False
+) -> Shapes:
+    """Return balloons between plates at heights (mm), by ``inflate`` with a correction for waves.
 
     Where waves are in step with the rim a balloon rises freely by a share more. Between plates it
     is taken for one that is lower, W(p, h) = W'(p, h - e(p) f(h / h1)), with force and volume its
-    slopes: e is by how much the free height h1 is above that of ``inflate``, and f grows from 0
+    slopes: e is the excess of the free height h1 over that of ``inflate``, and f grows from 0
     where it is pressed flat to 1 where it stands freely, and is 0 again where it is pulled to
     TAUT times that: plates press waves flat, and a pull draws them straight. Shapes r and z are the
     lower one's.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-    share, rate = taller(balloon, p)
+    share, rate = height_ratio(balloon, p)
     if not (rate.any() or (share != 1).any()):
         return inflate(balloon, p, h, tied=tied)
-    own, slope = _free_heights(balloon, p)
-    stands, stands_rate = share * own, rate * own + share * slope
-    more, more_rate = stands - own, stands_rate - slope
+    free_height, slope = _free_heights(balloon, p)
+    stands, stands_rate = share * free_height, rate * free_height + share * slope
+    more, more_rate = stands - free_height, stands_rate - slope
     place = h / stands
-    faded, fading = _faded(place)
+    faded, fading = _fade(place)
     lower = more * faded
     by_height = 1 - more * fading / stands
     by_pressure = more * fading * place * stands_rate / stands - more_rate * faded
-    found = inflate(balloon, p, h - lower, tied=tied)
-    more_air = found.force * by_pressure
-    return found._replace(
-        height=found.height + lower,
-        force=found.force * by_height,
-        volume=found.volume + more_air,
-        energy=found.energy + found.pressure * more_air,
+    shapes = inflate(balloon, p, h - lower, tied=tied)
+    more_air = shapes.force * by_pressure
+    return shapes._replace(
+        height=shapes.height + lower,
+        force=shapes.force * by_height,
+        volume=shapes.volume + more_air,
+        energy=shapes.energy + shapes.pressure * more_air,
     )
 
 
 def _free_heights(balloon: Balloon, p: Array) -> tuple[Array, Array]:
-    """Free heights by ``inflate`` in mm, and their rate by pressure; 1 mm where there is none."""
-    known = np.unique(p[p > 0])
+    """Return free heights in mm by ``inflate``, and their rate by pressure; 1 where p is 0."""
+    pressures = np.unique(p[p > 0])
     each = inflate(
-        balloon, np.concatenate([known * (1 - NUDGE), known, known * (1 + NUDGE)])
+        balloon, np.concatenate([pressures * (1 - NUDGE), pressures, pressures * (1 + NUDGE)])
     ).height
     low, height, high = each.reshape(3, -1)
     height = np.append(height, 1.0)
-    slope = np.append((high - low) / (2 * NUDGE * known), 0.0)
-    at = np.where(p > 0, np.searchsorted(known, p), len(known))
+    slope = np.append((high - low) / (2 * NUDGE * pressures), 0.0)
+    at = np.where(p > 0, np.searchsorted(pressures, p), len(pressures))
     return height[at], slope[at]
 
 
-def _faded(place: Array) -> tuple[Array, Array]:
-    """Share of the waves' rise at heights over the free one, and its slope."""
+def _fade(place: Array) -> tuple[Array, Array]:
+    """Return the share of the waves' rise at heights over the free one, and its slope."""
     up = np.clip(place, 0.0, 1.0)
     off = np.clip((place - 1) / (TAUT - 1), 0.0, 1.0)
     value = up**2 * (3 - 2 * up) - off**2 * (3 - 2 * off)
     return value, 6 * up * (1 - up) - 6 * off * (1 - off) / (TAUT - 1)
 
 
-class Taller(NamedTuple):
+class HeightRatio(NamedTuple):
     """A ratio of heights, and its rate by pressure in 1/kPa."""
 
     share: Array
     rate: Array
 
 
-def taller(balloon: Balloon, pressure: Array) -> Taller:
-    """Free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in step with
-    the rim. Between rungs a cubic of the pressure's logarithm.
+def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
+    """Return free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in
+    step with the rim. Between rungs a cubic of the pressure's logarithm.
     """
-    first, rungs = _first(balloon), round(math.log(END / START) / math.log(STEP))
+    first, rungs = _first_pressure(balloon), round(math.log(END / START) / math.log(STEP))
     at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
     inside = (at > 0) & (at < rungs)
-    if not resolved(balloon) or not inside.any():
-        return Taller(np.ones_like(pressure), np.zeros_like(pressure))
+    if not resolves_waves(balloon) or not inside.any():
+        return HeightRatio(np.ones_like(pressure), np.zeros_like(pressure))
     waves = usual_waves(balloon)
     x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
     high = inflate(balloon, first * STEP ** np.arange(rungs)).height
-    ratio = 2 * x[:, PLACES * balloon.held + Z] / high
-    ratio = np.append(np.where([_ripples(balloon, one) for one in x], ratio, 1.0), 1.0)
+    ratio = 2 * x[:, PLACES * balloon.neck_edge + Z] / high
+    ratio = np.append(np.where([_ripples(balloon, state) for state in x], ratio, 1.0), 1.0)
     ratio[0] = 1.0
     slopes = np.gradient(ratio)
     slopes[[0, -1]] = 0.0
@@ -166,67 +167,67 @@ def taller(balloon: Balloon, pressure: Array) -> Taller:
     a, b, rise = ratio[k], slopes[k], ratio[k + 1] - ratio[k]
     c, d = 3 * rise - 2 * b - slopes[k + 1], b + slopes[k + 1] - 2 * rise
     rate = (b + u * (2 * c + 3 * u * d)) * inside / (np.maximum(pressure, first) * math.log(STEP))
-    return Taller(a + u * (b + u * (c + u * d)), rate)
+    return HeightRatio(a + u * (b + u * (c + u * d)), rate)
 
 
-def resolved(balloon: Balloon) -> bool:
-    """Whether its waves are resolved: a wide pocket, both films alike and of the usual law."""
+def resolves_waves(balloon: Balloon) -> bool:
+    """Return True if its waves are resolved: a wide pocket, equal films of the usual law."""
     usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
 
 
 def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> Rippled:
-    """Free balloons at pressures in kPa, all with as many ``waves`` round the rim; else with those
-    that cost least where ripples are well grown.
+    """Return free balloons at pressures in kPa, all with as many ``waves`` round the rim; else with
+    those of least energy where ripples are well grown.
 
     A balloon with a bore is pulled on by the air in it. Raises DesignError for pressures that are
-    not above 0, or where no balance is found.
+    not above 0, or where Newton's method finds no equilibrium.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     if not (np.isfinite(p) & (p > 0)).all():
         raise DesignError("pressure of a balloon must be above 0 kPa")
     n = waves or usual_waves(balloon)
     of = _waving(balloon, n)
-    at = np.maximum(np.log(p / _first(balloon)) / math.log(STEP), 0.0)
-    starts = [_starts(of, float(one)) for one in at]
+    at = np.maximum(np.log(p / _first_pressure(balloon)) / math.log(STEP), 0.0)
+    starts = [_starts(of, float(place)) for place in at]
     x = np.stack([start for several in starts for start in several], 1)
     row = np.repeat(np.arange(len(p)), [len(several) for several in starts])
     problem = Waves(of, p[row], _normals(of, x))
     try:
-        x = _settled(problem, x)
+        x = _equilibrium(problem, x)
     except DesignError:
         # One by one, and on smaller steps.
-        rungs = _first(balloon) * STEP ** at.astype(np.int_)
-        each = (_followed(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
+        rungs = _first_pressure(balloon) * STEP ** at.astype(np.int_)
+        each = (_continued(of, x[:, [i]], rungs[which], p[which]) for i, which in enumerate(row))
         x = np.concatenate(list(each), 1)
     energy = problem.total(x, np.arange(len(row))).energy
     x = x[:, [min(np.flatnonzero(row == i), key=energy.__getitem__) for i in range(len(p))]]
-    found = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
+    state = Waves(of, p, _normals(of, x)).total(x, np.arange(len(p)))
     r, z = (np.ascontiguousarray(x[k::PLACES].T) for k in (R, Z))
-    z[:, : balloon.held] = z[:, balloon.held, None]
-    shapes = Shapes(p, 2 * z[:, 0], 2 * found.volume, np.zeros(len(p)), 2 * found.stored, r, z)
+    z[:, : balloon.neck_edge] = z[:, balloon.neck_edge, None]
+    shapes = Shapes(p, 2 * z[:, 0], 2 * state.volume, np.zeros(len(p)), 2 * state.stored, r, z)
     edge = x[PLACES * balloon.edge + UP]
     return Rippled(shapes, n, edge, edge + balloon.ring * _tilt(balloon, x))
 
 
 @lru_cache(maxsize=256)
 def usual_waves(balloon: Balloon) -> int:
-    """The number of waves of least energy where ripples are well grown, by ``rim_ripple``."""
-    shape = inflate(balloon, _first(balloon) * USUAL / START)
-    (found,) = rippling((balloon,), ((shape.r, shape.z),))
-    return int(found.waves[0])
+    """Return the number of waves of least energy of well-grown ripples, by ``ripples_at``."""
+    shape = inflate(balloon, _first_pressure(balloon) * USUAL / START)
+    (ripple,) = ripples_at((balloon,), ((shape.r, shape.z),))
+    return int(ripple.waves[0])
 
 
 def _starts(of: Waving, at: float) -> list[Array]:
-    """Where to begin at a place among rungs: between two where waves are alike, else at each."""
+    """Return starts between two rungs: one interpolated on a common branch, else both."""
     k = int(at)
     near = [_rung(of.balloon, of.waves, each).x for each in (k, k + 1)]
-    if not _are_alike(of, *near):
+    if not _are_one_branch(of, *near):
         return near
     for each, front in ((k - 1, True), (k + 2, False)):
         if each >= 0 and START * STEP**each < END:
             more = _rung(of.balloon, of.waves, each).x
-            if _are_alike(of, more, near[0 if front else -1]):
+            if _are_one_branch(of, more, near[0 if front else -1]):
                 near = [more, *near] if front else [*near, more]
                 k -= front
     # The polynomial through them (Lagrange).
@@ -235,17 +236,17 @@ def _starts(of: Waving, at: float) -> list[Array]:
     return [sum((share * x for share, x in zip(shares, near, strict=True)), np.zeros_like(near[0]))]
 
 
-def _are_alike(of: Waving, one: Array, other: Array) -> bool:
-    """Whether the waves of two balances are those of one branch."""
-    waves = of.kept.copy()
+def _are_one_branch(of: Waving, first: Array, second: Array) -> bool:
+    """Return True if the waves of two equilibria belong to one branch."""
+    waves = of.is_free.copy()
     waves[:, :2] = False
-    a, b = (each[waves.ravel()] for each in (one, other))
+    a, b = (each[waves.ravel()] for each in (first, second))
     return bool(a @ b > ALIKE * math.sqrt((a @ a) * (b @ b)))
 
 
-def _first(balloon: Balloon) -> float:
-    """Pressure in kPa of the first rung."""
-    return START * balloon.rigid / balloon.pocket
+def _first_pressure(balloon: Balloon) -> float:
+    """Return the pressure in kPa of the first rung."""
+    return START * balloon.membrane_stiffness / balloon.pocket
 
 
 @lru_cache(maxsize=32)
@@ -254,7 +255,7 @@ def _waving(balloon: Balloon, waves: int) -> Waving:
 
 
 class Rung(NamedTuple):
-    """Coordinates at a pressure, and whether films have fallen in step with the rim by then."""
+    """Coordinates at a pressure; ``in_step`` if films have fallen in step with the rim by then."""
 
     x: Array
     in_step: bool
@@ -262,11 +263,11 @@ class Rung(NamedTuple):
 
 @lru_cache(maxsize=512)
 def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
-    """A balloon at the pressure of rung ``k``, followed from the rung below."""
-    of, p = _waving(balloon, waves), np.array([_first(balloon) * STEP**k])
+    """Return a balloon at the pressure of rung ``k``, continued from the rung below."""
+    of, p = _waving(balloon, waves), np.array([_first_pressure(balloon) * STEP**k])
     if k == 0:
         shape = inflate(balloon, p)
-        x, in_step = np.zeros((of.kept.size, 1)), False
+        x, in_step = np.zeros((of.is_free.size, 1)), False
         x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
     else:
         below = _rung(balloon, waves, k - 1)
@@ -277,25 +278,25 @@ def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
     if not in_step and START * STEP**k <= LATEST:
         # Also from there with films pushed in step with the rim.
         x = np.repeat(x, 2, axis=1)
-        x[UP::PLACES, 1] += math.copysign(KICK, x[PLACES * balloon.edge + UP, 1]) * _in_step(of)
-    x = _followed(of, x, p[0] / STEP, p[0])
+        x[UP::PLACES, 1] += math.copysign(KICK, x[PLACES * balloon.edge + UP, 1]) * _film_wave(of)
+    x = _continued(of, x, p[0] / STEP, p[0])
     rows = np.arange(x.shape[1])
     energy = Waves(of, np.repeat(p, len(rows)), _normals(of, x)).total(x, rows).energy
     best = int(energy.argmin())
     return Rung(x[:, best], in_step or energy[best] < energy[0] * (1 + CLEARLY))
 
 
-def _in_step(of: Waving) -> Array:
-    """A film's wave beside the rim, one arch long, mm for each mm of radius: (nodes,)."""
-    one = of.balloon
-    off = np.clip((one.pocket - one.nodes) / (0.4 * one.pocket), 0.0, 1.0)
-    wave = np.where(of.kept[:, UP], one.pocket * np.sin(math.pi * off), 0.0)
-    wave[one.edge :] = 0.0
+def _film_wave(of: Waving) -> Array:
+    """Return a film's wave beside the rim, one arch long, mm for each mm of radius: (nodes,)."""
+    balloon = of.balloon
+    off = np.clip((balloon.pocket - balloon.nodes) / (0.4 * balloon.pocket), 0.0, 1.0)
+    wave = np.where(of.is_free[:, UP], balloon.pocket * np.sin(math.pi * off), 0.0)
+    wave[balloon.edge :] = 0.0
     return wave
 
 
 def _tilt(balloon: Balloon, x: Array) -> Array:
-    """By how much the rim tilts, in rad."""
+    """Return the tilt of the rim, in rad."""
     return np.asarray(-2 / balloon.thickness * x[PLACES * balloon.edge + EDGE])
 
 
@@ -304,35 +305,35 @@ def _ripples(balloon: Balloon, x: Array) -> bool:
 
 
 def _normals(of: Waving, x: Array) -> Array:
-    """Ways out of the mean film, in r and z, and its stretch: (rows, elements, 3)."""
-    one = of.balloon
+    """Return the normals of the mean film, in r and z, and its stretch: (rows, elements, 3)."""
+    balloon = of.balloon
     r, z = x[R::PLACES].T, x[Z::PLACES].T.copy()
-    z[:, : one.held] = z[:, one.held, None]
+    z[:, : balloon.neck_edge] = z[:, balloon.neck_edge, None]
     dr, dz = np.diff(r), np.diff(z)
     length = np.hypot(dr, dz)
-    return np.stack([-dz / length, dr / length, length / one.film.lengths], -1)
+    return np.stack([-dz / length, dr / length, length / balloon.film.lengths], -1)
 
 
-def _followed(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
-    """From a balance at a pressure to that at another, on smaller steps where one finds none."""
+def _continued(of: Waving, x: Array, low: float, high: float, halvings: int = HALVINGS) -> Array:
+    """Return the equilibrium at a pressure from that at another, if need be in smaller steps."""
     try:
-        return _settled(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
+        return _equilibrium(Waves(of, np.full(x.shape[1], high), _normals(of, x)), x)
     except DesignError:
         if not halvings:
             raise
     middle = math.sqrt(low * high)
-    x = _followed(of, x, low, middle, halvings - 1)
-    return _followed(of, x, middle, high, halvings - 1)
+    x = _continued(of, x, low, middle, halvings - 1)
+    return _continued(of, x, middle, high, halvings - 1)
 
 
-def _settled(problem: Waves, x: Array) -> Array:
-    """The shapes of least energy downhill. Raises DesignError where none is found."""
+def _equilibrium(problem: Waves, x: Array) -> Array:
+    """Return the equilibria downhill. Raises DesignError where there are none."""
     try:
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return settled(problem, x)
-    except NoBalance:
+            return equilibrium(problem, x)
+    except NoEquilibrium:
         of = problem.of
         raise DesignError(
-            f"a balloon of radius {of.balloon.pocket:g} mm with {of.waves} waves round its rim "
-            "finds no balance; try another load"
+            f"no equilibrium found for a balloon of radius {of.balloon.pocket:g} mm with "
+            f"{of.waves} waves round its rim; try another load"
         ) from None

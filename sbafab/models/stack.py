@@ -1,4 +1,5 @@
-"""A whole actuator in real time: plates joined by balloons, in balance with what acts on it.
+"""A whole actuator in real time: plates joined by balloons, in equilibrium with external loads, and
+its motion as chambers fill through their lines.
 
 Plates are the planes between balloons. Two neighbours are joined by one balloon a chamber: it
 lengthens and tilts, and carries no shear ("a 2-DoF spring joint", paper, Sec. 4.4). A tilted
@@ -6,57 +7,67 @@ balloon is taken to push at six points of a ring, each as hard as the axisymmetr
 the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
 disc's, and it is taken midway between neck and pocket. Flat balloons do not sink into each other,
 nor do rims where levels lean: contact by a stiff penalty, without friction.
-Balance is the least of one energy, found by Newton's method. Levels of alike balloons without a
-load are alike and found once. Lengths mm, pressures kPa, volumes ul; forces mN inside, N outside.
+The equilibrium is the minimum of one energy, found by Newton's method. Levels of equal balloons
+without a load are equal and solved once. Lengths mm, pressures kPa, volumes ul; forces mN inside,
+N outside.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sbafab.actuators import build
 from sbafab.errors import DesignError
+from sbafab.laminate.laminate import film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
-from sbafab.models.chain import Chain, chain
-from sbafab.models.counterparts import counterparts_of_pose
-from sbafab.models.loads import Load, directed, outer_plate, three
-from sbafab.models.springs import RING, GapPlaces, Springs
-from sbafab.models.stack_balance import free, held
+from sbafab.models.balloons import balloons_of
+from sbafab.models.paper import counterparts_of_pose
+from sbafab.models.pneumatics import Line
+from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
+from sbafab.models.stack_loads import (
+    RING_POINTS,
+    Chain,
+    GapPlaces,
+    Load,
+    Springs,
+    direction_of,
+    outer_plate,
+    plate_chain,
+    vector_of,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sbafab.design.form import Form
-    from sbafab.design.records import Design
+    from sbafab.design.records import Design, Form
     from sbafab.laminate.laminate import Laminate
     from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
-    from sbafab.models.motion import Motion
-    from sbafab.models.pneumatics import Line
 
-AROUND = 24
-"""Points round a level's outline, or a few more, where its rims may meet the next level's."""
+RIM_POINTS = 24
+"""Least number of points round a level's outline where its rims may meet the next level's."""
 MOST_PRESSURE = 110.0
-"""kPa to which maps are made unless more is asked for."""
+"""Highest pressure of maps in kPa, unless a request has a higher one."""
 GRAVITY = 9.80665
 GRIP = 0.15
-"""Radius, as a share of its pocket's, of the disc that a lone balloon's plates hold it by."""
-SHARES = (1.0, 0.5, 0.2, 0.1)
-"""Of the pressure asked for, tried one after the other."""
+"""Radius, as a share of its pocket's, of the disc by which plates hold a lone balloon."""
+PRESSURE_SHARES = (1.0, 0.5, 0.2, 0.1)
+"""Shares of the highest pressure, tried one after the other."""
 
 
 @dataclass(frozen=True)
 class Plate:
     """An outer plate that the tip may push on: through ``point`` (mm), ``normal`` pointing away.
 
-    ``Plate.at(height)`` lies level. The middle of the tip ``sticks`` to the line through the point
-    along the normal, as rubbing holds it, or slides along the plate.
+    ``Plate.at(height)`` lies level. With ``sticks`` friction holds the middle of the tip on the
+    line through the point along the normal; without, it slides along the plate.
     """
 
     point: tuple[float, float, float]
@@ -65,19 +76,19 @@ class Plate:
 
     @classmethod
     def at(cls, height: float) -> Plate:
-        """A level plate so many mm above the base."""
+        """Return a level plate so many mm above the base."""
         return cls((0.0, 0.0, height))
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A stack in balance at ``pressures`` (kPa, one a chamber).
+    """A stack in equilibrium at ``pressures`` (kPa, one a chamber).
 
     ``pitch`` is the height of a flat level in mm, ``freedoms`` (levels, 3) are rise in mm and tilt
     in rad of each level; ``gaps`` (levels, chambers) by how many mm each balloon has risen at its
     own centre; ``volumes`` ul a chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
-    the films. Where it is not ``stable`` it stands as a straight column does that would rather
-    buckle.
+    the films. Where it is not ``stable`` it is an unstable equilibrium, as of a straight column
+    that would buckle.
     """
 
     pressures: tuple[float, ...]
@@ -91,7 +102,7 @@ class Pose:
 
     @cached_property
     def _chain(self) -> Chain:
-        return chain(self.freedoms, self.pitch)
+        return plate_chain(self.freedoms, self.pitch)
 
     @property
     def frames(self) -> tuple[Array, Array]:
@@ -126,10 +137,10 @@ class Pose:
 class Stack:
     """Levels of balloons, bottom to top.
 
-    ``maps`` are those of the unlike balloons, ``levels`` which of them each level has; ``axes``
-    (chambers, 2) where the chambers stand, ``pitch`` the height of a flat level and ``outline`` the
-    radius of the plates, in mm; ``weight`` mN of each level, None where a film's density
-    is not known.
+    ``maps`` are those of the different balloons, ``levels`` the number of each level's map;
+    ``axes`` (chambers, 2) the centres of the chambers, ``pitch`` the height of a flat level and
+    ``outline`` the radius of the plates, in mm; ``weight`` mN of each level, None where a film's
+    density is not known.
     """
 
     maps: tuple[BalloonMap, ...]
@@ -141,14 +152,14 @@ class Stack:
 
     @property
     def chambers(self) -> int:
-        """How many chambers it has."""
+        """Number of chambers."""
         return len(self.axes)
 
     @property
     def counterparts(self) -> dict[str, str]:
-        """What the paper measured beside the "height" and the "bend" of a pose, a clause each."""
+        """Measured counterparts of the "height" and the "bend" of a pose, a clause each."""
         rows = counterparts_of_pose(self.chambers)
-        return {what: row.sentence() for what, row in rows.items()}
+        return {quantity: row.sentence() for quantity, row in rows.items()}
 
     @property
     def flat_height(self) -> float:
@@ -167,16 +178,16 @@ class Stack:
         return np.asarray(np.linalg.pinv(self._centres))
 
     @cached_property
-    def _gap_of(self) -> Array:
+    def _ring_gaps(self) -> Array:
         """Gap at each point of each balloon's ring, by rise and tilt: (chambers x points, 3)."""
-        turn = np.arange(RING) * math.tau / RING
+        turn = np.arange(RING_POINTS) * math.tau / RING_POINTS
         ring = np.stack([np.cos(turn), np.sin(turn)], -1)
-        found = []
-        for one in self.maps:
-            across = (one.balloon.neck + one.balloon.pocket) / 2
+        rows = []
+        for kind in self.maps:
+            across = (kind.balloon.neck + kind.balloon.pocket) / 2
             x, y = (self.axes[:, None] + across * ring).reshape(-1, 2).T
-            found.append(np.stack([np.ones_like(x), y, -x], -1))
-        return np.stack(found)
+            rows.append(np.stack([np.ones_like(x), y, -x], -1))
+        return np.stack(rows)
 
     @cached_property
     def rims(self) -> Array:
@@ -187,44 +198,46 @@ class Stack:
         """
         # An even number a chamber, from the first one's axis on, and half a step off it: no way
         # points between two chambers, where one would stand for both.
-        around = 2 * self.chambers * math.ceil(AROUND / 2 / self.chambers)
+        around = 2 * self.chambers * math.ceil(RIM_POINTS / 2 / self.chambers)
         first = math.atan2(*self.axes[0, ::-1])
         turn = first + (np.arange(around) + 0.5) * math.tau / around
         ways = np.stack([np.cos(turn), np.sin(turn)], -1)
         farthest = self.axes[np.argmax(ways @ self.axes.T, axis=1)]
-        found = []
-        for one in self.maps:
-            x, y = (farthest + (one.balloon.pocket + one.balloon.ring) * ways).T
-            found.append(np.stack([np.ones_like(x), y, -x], -1))
-        return np.stack(found)
+        rows = []
+        for kind in self.maps:
+            x, y = (farthest + (kind.balloon.pocket + kind.balloon.ring) * ways).T
+            rows.append(np.stack([np.ones_like(x), y, -x], -1))
+        return np.stack(rows)
 
     @cached_property
     def _places(self) -> GapPlaces:
-        """Where kinds of balloons are looked at."""
-        return GapPlaces.of(self.maps, self._gap_of, self.rims)
+        """Gaps of each kind of balloon."""
+        return GapPlaces.of(self.maps, self._ring_gaps, self.rims)
 
     @cached_property
     def _level_places(self) -> GapPlaces:
-        """Where levels are."""
+        """Gaps of each level."""
         return self._places.at(self.levels)
 
     def springs(self, pressures: Sequence[float], sucked: bool = False) -> Springs:
-        """What kinds of balloons do at pressures, one a chamber. Raises DesignError.
+        """Return the springs of each kind of balloon at pressures, one a chamber. Raises
+        DesignError.
 
         With ``sucked`` a chamber that is shut may stand below 0 kPa.
         """
         try:
-            asked = np.array(pressures, dtype=float)
+            values = np.array(pressures, dtype=float)
         except (TypeError, ValueError):
             raise DesignError("pressures must be numbers in kPa, one a chamber") from None
-        if asked.shape != (self.chambers,):
+        if values.shape != (self.chambers,):
             raise DesignError(
-                f"{asked.size} pressures are given for {self.chambers} chambers; give one a chamber"
+                f"{values.size} pressures are given for {self.chambers} chambers; give one a "
+                "chamber"
             )
-        return Springs.pressed(self.maps, asked, self._places, sucked)
+        return Springs.pressed(self.maps, values, self._places, sucked)
 
     def each(self, springs: Springs) -> Springs:
-        """What levels do."""
+        """Return the springs of each level."""
         return Springs(springs.table, self._level_places)
 
     def pose(
@@ -236,61 +249,60 @@ class Stack:
         near: Pose | None = None,
         sucked: bool = False,
     ) -> Pose:
-        """The pose at pressures (kPa, one a chamber), in balance.
+        """Return the equilibrium pose at pressures (kPa, one a chamber).
 
         ``tip_load`` is a force in N on the middle of the top; ``gravity`` is True where the base
         lies level, or the direction (3) of down; ``plate`` an outer plate, or its height in mm.
         ``near`` is a pose to start from, such as the last one of a motion. Pressures may be below 0
         only where chambers may be ``sucked``: shut, with a fluid that keeps its volume. Raises
-        DesignError for pressures outside the maps, and where no balance is found.
+        DesignError for pressures outside the maps, and where Newton's method finds no equilibrium.
         """
         springs = self.springs(pressures, sucked)
         load = self._load(tip_load, gravity, plate)
         if load is None:
-            start = self._risen(pressures) if near is None else near.freedoms[self._first]
-            kinds = free(springs, start)
+            start = self._risen(pressures) if near is None else near.freedoms[self._first_levels]
+            kinds = free_equilibrium(springs, start)
             return self._pose(pressures, springs, kinds[self.levels], kinds)
         if near is not None:
             start = near.freedoms
         else:
             start = self._risen(pressures)
             if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
-                start = free(springs, start)
+                start = free_equilibrium(springs, start)
             start = start[self.levels]
-        found, push, stable = held(self.each(springs), self.pitch, load, start, near is not None)
-        return self._pose(pressures, springs, found, None, push / 1000, stable)
+        freedoms, push, stable = loaded_equilibrium(
+            self.each(springs), self.pitch, load, start, near is not None
+        )
+        return self._pose(pressures, springs, freedoms, None, push / 1000, stable)
 
     def _risen(self, pressures: Sequence[float]) -> Array:
-        """Rise and tilt to begin with, a row a kind of balloon: the plane nearest to where each
-        balloon would rise to alone.
+        """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the
+        free heights of the balloons.
         """
-        return np.stack([one.rises(pressures) for one in self.maps]) @ self._planes
+        return np.stack([kind.rises(pressures) for kind in self.maps]) @ self._planes
 
     def motion(
         self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
     ) -> Motion:
-        """A motion that starts at pressures (kPa, by default 0); ``line`` feeds each chamber, and
-        ``load`` is what ``pose`` takes beside pressures.
+        """Return a motion that starts at pressures (kPa, by default 0); ``line`` feeds each
+        chamber, and ``load`` are keyword arguments of ``pose`` beside pressures.
         """
-        from sbafab.models.motion import Motion
-        from sbafab.models.pneumatics import Line
-
         start = self.pose((0.0,) * self.chambers if pressures is None else pressures, **load)
         return Motion(self, line or Line(), load, start)
 
     @cached_property
     def most_pressure(self) -> float:
-        """How far its maps go, in kPa."""
-        return min(one.most_pressure for one in self.maps)
+        """Highest pressure of all maps, kPa."""
+        return min(kind.most_pressure for kind in self.maps)
 
     @cached_property
     def _top(self) -> Array:
-        """How far each level's map goes in mm: (levels, 1)."""
+        """Largest height of each level's map in mm: (levels, 1)."""
         return np.array([self.maps[kind].most_height for kind in self.levels])[:, None]
 
     @cached_property
-    def _first(self) -> NDArray[np.int_]:
-        """The first level with each of the unlike balloons."""
+    def _first_levels(self) -> NDArray[np.int_]:
+        """First level of each kind of balloon."""
         return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
 
     @property
@@ -308,9 +320,9 @@ class Stack:
         gravity: bool | Sequence[float],
         plate: float | Plate | None,
     ) -> Load | None:
-        force, weight = 1000 * three(tip_load, "tip_load in N"), None
+        force, weight = 1000 * vector_of(tip_load, "tip_load in N"), None
         if not isinstance(gravity, (bool, np.bool_)):
-            weight = self._level_weight * directed(gravity, "the direction of gravity")
+            weight = self._level_weight * direction_of(gravity, "the direction of gravity")
         elif gravity:
             weight = np.array([0.0, 0.0, -self._level_weight])
         if not force.any() and weight is None and plate is None:
@@ -318,8 +330,8 @@ class Stack:
         if plate is None:
             return Load(force, weight, None)
         outer = plate if isinstance(plate, Plate) else Plate.at(plate)
-        point = three(outer.point, "the plate's point in mm")
-        normal = directed(outer.normal, "the plate's normal")
+        point = vector_of(outer.point, "the plate's point in mm")
+        normal = direction_of(outer.normal, "the plate's normal")
         wall = outer_plate((*point.tolist(), *normal.tolist()), outer.sticks, self.outline)
         if wall.normal[2] > 1 - 1e-9 and wall.point[2] < self.flat_height - 1e-9:
             raise DesignError(
@@ -332,15 +344,13 @@ class Stack:
         self,
         pressures: Sequence[float],
         springs: Springs,
-        found: Array,
+        freedoms: Array,
         kinds: Array | None = None,
         force: float = 0.0,
         stable: bool = True,
     ) -> Pose:
-        """The record of a pose; ``kinds`` are its freedoms by kind of balloon where levels of one
-        kind are alike.
-        """
-        gaps = found @ self._centres
+        """Return a pose; ``kinds`` are its freedoms by kind of balloon where levels are equal."""
+        gaps = freedoms @ self._centres
         highest = float((gaps - self._top).max())
         if highest > 0:
             raise DesignError(
@@ -348,7 +358,7 @@ class Stack:
                 f"({highest:.2g} mm above {self._top.min():.3g} mm); give less pressure or load"
             )
         if kinds is None:
-            volumes, energies = self.each(springs).contents(found)
+            volumes, energies = self.each(springs).contents(freedoms)
         else:
             each, stored = springs.contents(kinds)
             volumes, energies = each[self.levels], stored[self.levels]
@@ -356,7 +366,7 @@ class Stack:
         p = np.asarray(pressures, dtype=float)
         return Pose(
             tuple(p.tolist()),
-            found,
+            freedoms,
             gaps,
             volumes,
             force,
@@ -373,51 +383,247 @@ def stack(
     factors: Factors | None = None,
     form: Form | None = None,
 ) -> Stack:
-    """The stack of a design with round pockets on one axis or side by side.
+    """Return the stack of a design with round pockets on one axis or side by side.
 
-    ``most_pressure`` in kPa is what maps are made to; those of wide pockets end before. A lone
-    balloon is held by a small disc. ``factors`` are measured ones; ``form`` stands in place of the
+    ``most_pressure`` in kPa is the range of its maps; those of wide pockets end before. A lone
+    balloon is held by a small disc. ``factors`` are calibrated ones; ``form`` replaces the
     design's own, for drawn pockets that are nearly round (``models.drawn.model_form``). Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """
-    from sbafab.actuators import build
-    from sbafab.laminate.extent import film_mass
-    from sbafab.models.balloons import balloons_of
-
     flat = laminate or build(design)
-    row = [_gripped(one) for one in balloons_of(design, flat, factors, form)]
+    row = [_clamped(balloon) for balloon in balloons_of(design, flat, factors, form)]
     press = 1.0 if factors is None else factors.press_factor
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])
     if len(axes) == 1:
         axes = np.zeros((1, 2))
-    reach = float(np.hypot(*axes.T).max()) + max(one.pocket + one.ring for one in row)
-    known = all(layer.film.density is not None for layer in flat.layers)
+    reach = float(np.hypot(*axes.T).max()) + max(balloon.pocket + balloon.ring for balloon in row)
+    has_densities = all(layer.film.density is not None for layer in flat.layers)
     return Stack(
         tuple(_mapped(kind, most_pressure) for kind in kinds),
-        np.array([kinds.index(one) for one in row]),
+        np.array([kinds.index(balloon) for balloon in row]),
         axes,
         flat.thickness * press / len(row),
         reach,
-        film_mass(flat) * GRAVITY / len(row) if known else None,
+        film_mass(flat) * GRAVITY / len(row) if has_densities else None,
     )
 
 
-def _gripped(one: Balloon) -> Balloon:
-    """The same with something that plates hold it by, where it has no neck."""
-    if one.neck:
-        return one
-    mate = None if one.mate is None else replace(one.mate, neck=GRIP * one.pocket)
-    return replace(one, neck=GRIP * one.pocket, mate=mate)
+def _clamped(balloon: Balloon) -> Balloon:
+    """Return a balloon with a disc by which plates hold it, where it has no neck."""
+    if balloon.neck:
+        return balloon
+    mate = None if balloon.mate is None else replace(balloon.mate, neck=GRIP * balloon.pocket)
+    return replace(balloon, neck=GRIP * balloon.pocket, mate=mate)
 
 
 def _mapped(kind: Balloon, most_pressure: float) -> BalloonMap:
-    """The map of a balloon, to a lower pressure where wide pockets have no balance at that one."""
-    for share in SHARES:
+    """Return a balloon's map, to a lower pressure where a wide pocket has no equilibrium."""
+    for share in PRESSURE_SHARES:
         try:
             return balloon_map(kind, share * most_pressure)
         except DesignError:
-            if share == SHARES[-1]:
+            if share == PRESSURE_SHARES[-1]:
                 raise
     raise AssertionError
+
+
+# A stack in time: chambers that fill through their lines, in equilibrium at every instant.
+
+
+MOST_STEPS = 40
+HALVINGS = 20
+OVERSHOT = 0.5
+"""Share of a step's first slope that its last one may rise to, in the line search."""
+DIFFERENCE = 1e-3
+"""Step of the finite differences."""
+SCALE_PRESSURE = 0.01
+"""Pressure in kPa below which volumes are nearly linear in pressure, above in its logarithm."""
+LONGEST_STEP = 2.0
+SUCTION = 90.0
+"""kPa below the atmosphere to which a shut chamber may come before its fluid boils or leaks."""
+TOLERANCE = 1e-5
+LEAST_CONTENT = 20.0
+"""Tolerance as a share of a chamber's content; in ul, the least content it is taken of."""
+
+
+class _Trial(NamedTuple):
+    """A trial pose: ``x``, asinh(p / SCALE_PRESSURE) of the chambers; the excess of their volumes
+    in ul (``wrong``); and kPa by x (``rates``).
+    """
+
+    x: Array
+    pose: Pose
+    wrong: Array
+    rates: Array
+
+
+@dataclass
+class Motion:
+    """A moving stack: ``step`` it, then read ``pose``, ``time`` and ``sources``.
+
+    ``time`` is in s, ``sources`` the pressure in kPa at each chamber's valve or pump; ``line``
+    feeds each chamber. Quasi-static: film and fluid have no inertia. ``load`` are keyword arguments
+    of ``Stack.pose`` beside pressures. A gas that is pumped fills the line's dead volume and tube
+    as well.
+    """
+
+    stack: Stack
+    line: Line
+    load: dict[str, Any]
+    pose: Pose
+    time: float = 0.0
+    sources: tuple[float, ...] = ()
+
+    @property
+    def pressures(self) -> tuple[float, ...]:
+        """Pressures in the chambers, kPa."""
+        return self.pose.pressures
+
+    def step(
+        self,
+        dt: float,
+        pressures: Sequence[float] | None = None,
+        flows: Sequence[float] | None = None,
+    ) -> Pose:
+        """Return the pose ``dt`` s later, with pressures (kPa) at the valves or flows (ul/s, of a
+        gas at the atmosphere) of the pumps, one a chamber. Raises DesignError.
+        """
+        if not (np.isfinite(dt) and dt > 0):
+            raise DesignError(f"dt = {dt:g} s must be above 0 s")
+        if (pressures is None) == (flows is None):
+            raise DesignError("a step takes either pressures or flows, one a chamber")
+        values = np.asarray(pressures if flows is None else flows, dtype=float)
+        if values.shape != (self.stack.chambers,) or not np.isfinite(values).all():
+            raise DesignError(f"a step takes {self.stack.chambers} finite numbers, one a chamber")
+        before = self._contents(self.pose)
+        acts = max(0.0, min(dt, self.time + dt - self.line.delay))
+        if flows is None:
+            self.pose = self._fed_pose(before, acts, values)
+            self.sources = tuple(values.tolist())
+        else:
+            self.pose = self._filled_pose(before + acts * values)
+            self.sources = tuple(
+                self.line.source_pressure(float(q), p) if q > 0 else p
+                for q, p in zip(values, self.pose.pressures, strict=True)
+            )
+        self.time += dt
+        return self.pose
+
+    def _contents(self, pose: Pose) -> Array:
+        more = self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
+        pairs = zip(pose.volumes, pose.pressures, strict=True)
+        return np.array([self.line.content(volume + more, p) for volume, p in pairs])
+
+    def _fed_pose(self, before: Array, dt: float, sources: Array) -> Pose:
+        def missed(pose: Pose) -> Array:
+            pairs = zip(sources, pose.pressures, strict=True)
+            flow = np.array([self.line.flow(float(source), p) for source, p in pairs])
+            return np.asarray(self._contents(pose) - before - dt * flow)
+
+        return self._solved(missed, before)
+
+    def _filled_pose(self, contents: Array) -> Pose:
+        """Return the pose with these contents. A pump that stands still is shut: its chamber may
+        come to suction where a load bends it open.
+        """
+        return self._solved(
+            lambda pose: np.asarray(self._contents(pose) - contents), contents, SUCTION
+        )
+
+    def _solved(self, missed: Callable[[Pose], Array], scale: Array, suction: float = 0.0) -> Pose:
+        """Return the pose without residual content, at ``suction`` kPa below the atmosphere at
+        most. A chamber that would need less draws in the rest.
+
+        The residual, as a volume, is the gradient of one function of the pressures, whose minimum
+        is sought: volumes are slopes of a concave potential, and more pressure lets less in.
+        Newton's method with a line search in asinh(p / SCALE_PRESSURE), in which volumes are nearly
+        linear.
+        """
+        most = math.asinh(self.stack.most_pressure / SCALE_PRESSURE)
+        least = -math.asinh(suction / SCALE_PRESSURE)
+        close = TOLERANCE * np.maximum(np.abs(scale), LEAST_CONTENT)
+        start = np.maximum(np.arcsinh(np.asarray(self.pose.pressures) / SCALE_PRESSURE), least)
+        now = self._tried(start, missed, self.pose)
+        for _ in range(MOST_STEPS):
+            lacks = (now.x >= most) & (now.wrong < 0)
+            counts = ~((now.x <= least) & (now.wrong >= 0)) & ~lacks
+            if (np.abs(now.wrong) <= close)[counts].all():
+                if lacks.any():
+                    raise DesignError(
+                        f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask "
+                        "for less, or make the stack with a larger most_pressure"
+                    )
+                return now.pose
+            ahead = self._newton_step(missed, now, counts, least)
+            ahead *= min(1.0, LONGEST_STEP / max(float(np.abs(ahead).max()), 1e-12))
+            now = self._downhill(missed, now, ahead, (least, most))
+        raise DesignError(
+            "no equilibrium of the stack found at the end of this step; try a shorter one"
+        )
+
+    def _downhill(
+        self,
+        missed: Callable[[Pose], Array],
+        now: _Trial,
+        ahead: Array,
+        ends: tuple[float, float],
+    ) -> _Trial:
+        """Return the trial at the end of a step's descent, by a line search."""
+        steep = float(now.wrong @ (now.rates * ahead))
+        share = 1.0
+        for _ in range(HALVINGS):
+            x = np.clip(now.x + share * ahead, *ends)
+            try:
+                tried = self._tried(x, missed, now.pose)
+            except DesignError:
+                share /= 2
+                continue
+            still = (x > ends[0]) & (x < ends[1])
+            slope = float((tried.wrong * tried.rates * ahead)[still].sum())
+            if slope <= -OVERSHOT * steep:
+                return tried
+            share *= min(max(steep / (steep - slope), 0.1), 0.7)
+        return tried
+
+    def _tried(self, x: Array, missed: Callable[[Pose], Array], near: Pose) -> _Trial:
+        pressures = np.minimum(SCALE_PRESSURE * np.sinh(x), self.stack.most_pressure)
+        pose = self.stack.pose(tuple(pressures.tolist()), near=near, sucked=True, **self.load)
+        return _Trial(x, pose, missed(pose) / self._content_rate(pose), SCALE_PRESSURE * np.cosh(x))
+
+    def _content_rate(self, pose: Pose) -> Array:
+        """Return the content of each chamber by its volume."""
+        return np.array([self.line.content(1.0, p) for p in pose.pressures])
+
+    def _newton_step(
+        self,
+        missed: Callable[[Pose], Array],
+        now: _Trial,
+        counts: NDArray[np.bool_],
+        least: float,
+    ) -> Array:
+        """Return Newton's step by x of the active chambers; 0 of the others."""
+        columns = []
+        for chamber in np.flatnonzero(counts):
+            moved = now.x.copy()
+            moved[chamber] += DIFFERENCE if moved[chamber] < 1 else -DIFFERENCE
+            tried = self._tried(moved, missed, now.pose)
+            columns.append((tried.wrong - now.wrong)[counts] / (tried.x - now.x)[chamber])
+        which, slopes = np.flatnonzero(counts), np.array(columns).T
+        while True:
+            ahead = np.zeros_like(now.x)
+            ahead[which] = _symmetric_step(slopes, now.wrong[which], now.rates[which])
+            may = (now.x[which] > least) | (ahead[which] >= 0)
+            if may.all():
+                return ahead
+            # What has no less pressure to give stays: the others move alone.
+            which, slopes = which[may], slopes[np.ix_(may, may)]
+
+
+def _symmetric_step(slopes: Array, wrong: Array, rates: Array) -> Array:
+    """Return the step by x, its matrix made symmetric and positive definite by pressure."""
+    matrix = slopes / rates
+    values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
+    values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max(initial=0.0) + 1e-12)
+    return np.asarray(-(vectors @ ((vectors.T @ wrong) / values)) / rates)

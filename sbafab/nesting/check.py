@@ -1,4 +1,4 @@
-"""Whether parts lie as they must, told from their exact regions whatever an engine says."""
+"""Check of a nest from the exact regions, independent of the engines: spacing, border, counts."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.errors import OutputError
-from sbafab.geometry.copies import COPIED, Copies
-from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
-from sbafab.geometry.intersect import line_circle, meeting_points
+from sbafab.geometry.contour import COPIED, Copies
+from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, line_circle, meeting_points
 from sbafab.geometry.nearby import close_pairs, widened
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.nesting.records import Nest, Stock
 
 SLACK = 1e-6
-"""mm by which a distance may miss what is asked for: rounding."""
+"""mm by which a distance may fall short of the spacing: rounding."""
 
 NEAR = 1e-4
-"""mm by which the places of two pairs may differ of which one tells the gap of the other."""
+"""mm by which the relative places of two pairs may differ that share a bound of their gaps."""
 
 
 class Gap(NamedTuple):
@@ -31,7 +29,7 @@ class Gap(NamedTuple):
 
 
 def check_nest(nest: Nest) -> None:
-    """Raises OutputError with the place where a nest breaks what its stock asks for."""
+    """Check a nest against its stock. Raises OutputError with the place of a violation."""
     counts = Counter(placement.part for placement in nest.placements)
     for number, part in enumerate(nest.parts):
         if counts.pop(number, 0) != part.count:
@@ -40,7 +38,7 @@ def check_nest(nest: Nest) -> None:
             )
     sheets = {placement.sheet for placement in nest.placements}
     if counts or sheets != set(range(nest.sheets)) or nest.sheets > nest.stock.most:
-        raise OutputError(f"the {nest.material} nest has parts or sheets too many; nest again.")
+        raise OutputError(f"the {nest.material} nest has too many parts or sheets; nest again.")
     for sheet in range(nest.sheets):
         named = [
             (f"{nest.parts[placement.part].name} (no. {number})", nest.region(placement))
@@ -53,9 +51,9 @@ def check_nest(nest: Nest) -> None:
 
 
 def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: float = SLACK) -> None:
-    """Raises OutputError where named regions on a sheet enter its border or come too near.
+    """Check named regions on a sheet for its border and spacing. Raises OutputError.
 
-    ``slack`` mm may be missing: what the numbers of a file are rounded by.
+    ``slack`` mm may be missing: the rounding of the numbers in a file.
     """
     for name, region in regions:
         _check_border(name, region, stock, slack)
@@ -67,26 +65,26 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
     ]
     entries = [*regions, *pins]
     rounds = [_round(region) for _, region in entries]
-    known = _Gaps()
+    gaps = _Gaps()
     for i, j in close_pairs([region.bounds for _, region in entries], stock.spacing):
-        if min(i, j) >= len(regions) or _apart(rounds[i], rounds[j]) >= stock.spacing:
+        if min(i, j) >= len(regions) or _circle_gap(rounds[i], rounds[j]) >= stock.spacing:
             continue
         pair = entries[i][1], entries[j][1]
-        if known.least(*pair) >= stock.spacing - slack:
+        if gaps.least(*pair) >= stock.spacing - slack:
             continue
         gap = least_distance(*pair, stock.spacing)
-        known.add(*pair, min(gap.value, stock.spacing))
+        gaps.add(*pair, min(gap.value, stock.spacing))
         if gap.value < stock.spacing - slack:
-            (x, y), (one, other) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
+            (x, y), (first, second) = gap.place, (entries[min(i, j)][0], entries[max(i, j)][0])
             how = f"are {gap.value:.4f} mm apart" if gap.value > 0 else "overlap"
             raise OutputError(
-                f"{one} and {other} {how} at x {x:.3f}, y {y:.3f}, where {stock.spacing:g} mm is "
-                "asked for; nest again."
+                f"{first} and {second} {how} at x {x:.3f}, y {y:.3f}; the spacing is "
+                f"{stock.spacing:g} mm; nest again."
             )
 
 
 class _Gaps:
-    """Gaps between outlines, for pairs of copies that lie to each other as an earlier pair does."""
+    """Gaps between outlines, by pair of shapes and relative place, for copies of a pair."""
 
     def __init__(self) -> None:
         self._copies = Copies()
@@ -94,7 +92,7 @@ class _Gaps:
         self._known: dict[tuple[int, int, int, int], tuple[Point, float]] = {}
 
     def least(self, a: Region, b: Region) -> float:
-        """A distance in mm that the gap of two regions is surely no less than."""
+        """Return a lower bound of the gap of two regions, mm."""
         key, (x, y) = self._between(a, b)
         if key not in self._known:
             return 0.0
@@ -107,14 +105,14 @@ class _Gaps:
         self._known[key] = shift, gap
 
     def _between(self, a: Region, b: Region) -> tuple[tuple[int, int, int, int], Point]:
-        """The shapes of two regions and how one lies to the other, rounded and exact."""
+        """Return the shapes of two regions and their relative place, rounded and exact."""
         (x, y), (u, v) = a.contours[0].edges[0].start, b.contours[0].edges[0].start
-        one, other = self._shape(a), self._shape(b)
-        return (one, other, round((u - x) / NEAR), round((v - y) / NEAR)), (u - x, v - y)
+        shape_a, shape_b = self._shape(a), self._shape(b)
+        return (shape_a, shape_b, round((u - x) / NEAR), round((v - y) / NEAR)), (u - x, v - y)
 
     def _shape(self, region: Region) -> int:
         if id(region) not in self._shapes:
-            # What falls apart is a shape of its own.
+            # Regions of several pieces are no copies.
             alone = len(region.contours) == 1
             shape = id(self._copies.first(region.contours[0]) if alone else region)
             self._shapes[id(region)] = region, shape
@@ -122,39 +120,39 @@ class _Gaps:
 
 
 def _round(region: Region) -> tuple[Point, float]:
-    """Centre and radius of a circle that holds the region: of a disc its own."""
+    """Return centre and radius of a circle that holds the region: of a disc its own."""
     low_x, low_y, high_x, high_y = region.bounds
     centre = (low_x + high_x) / 2, (low_y + high_y) / 2
     return centre, max(edge.farthest_from(centre) for edge in region.edges)
 
 
-def _apart(a: tuple[Point, float], b: tuple[Point, float]) -> float:
-    """The gap between two circles: what they hold is no nearer."""
+def _circle_gap(a: tuple[Point, float], b: tuple[Point, float]) -> float:
+    """Return the gap between two circles, mm: regions in them are no nearer."""
     return math.dist(a[0], b[0]) - a[1] - b[1]
 
 
 def least_distance(a: Region, b: Region, beyond: float) -> Gap:
-    """The least distance between two regions, exact for lines and arcs; 0 where they overlap.
+    """Return the least distance between two regions, exact for lines and arcs; 0 if they overlap.
 
     Infinite if it is more than ``beyond`` mm.
     """
     best = Gap(math.inf, a.edges[0].start)
     reach = beyond
     for edge in a.index.touching(widened(b.bounds, beyond)):
-        for other in b.index.touching(widened(edge.bounds, reach)):
-            gap = edge_distance(edge, other)
+        for opposite in b.index.touching(widened(edge.bounds, reach)):
+            gap = edge_distance(edge, opposite)
             if gap.value < best.value and gap.value <= beyond:
                 best, reach = gap, gap.value
     if best.value > 0:
-        for one, holder in ((a, b), (b, a)):
-            for contour in one.outers:
+        for inner, holder in ((a, b), (b, a)):
+            for contour in inner.outers:
                 if holder.contains(contour.edges[0].start):
                     return Gap(0.0, contour.edges[0].start)
     return best
 
 
 def edge_distance(a: Edge, b: Edge) -> Gap:
-    """The least distance between two edges and the place on ``a``, or where they meet."""
+    """The least distance between two edges and the place on ``a``, or their meeting point."""
     touching = meeting_points(a, b)
     if touching:
         return Gap(0.0, touching[0])
@@ -164,7 +162,7 @@ def edge_distance(a: Edge, b: Edge) -> Gap:
 
 
 def _feet(a: Edge, b: Edge) -> Iterator[Point]:
-    """Points of ``a`` where its normal can be that of ``b``, too: on the line of centres."""
+    """Yield points of ``a`` where its normal can be that of ``b``, too: on the line of centres."""
     if isinstance(a, Line) and isinstance(b, Line):
         return
     if isinstance(b, Arc):
@@ -181,9 +179,9 @@ def _feet(a: Edge, b: Edge) -> Iterator[Point]:
 
 
 def _check_border(name: str, region: Region, stock: Stock, slack: float) -> None:
-    left, bottom, right, top = stock.usable
+    min_x, min_y, max_x, max_y = stock.usable
     low_x, low_y, high_x, high_y = region.bounds
-    over = max(left - low_x, bottom - low_y, high_x - right, high_y - top)
+    over = max(min_x - low_x, min_y - low_y, high_x - max_x, high_y - max_y)
     if over > slack:
         x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
         raise OutputError(

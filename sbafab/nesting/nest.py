@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple
+from typing import Any
 
 from sbafab.laminate.films import Material, in_order
-from sbafab.nesting.records import EngineName, Nest, NestPart, Stock
-from sbafab.nesting.refusals import no_usable_area, too_large, too_many
-
-ROUNDING = 5e-7
+from sbafab.nesting.engines import ROUNDING, bottom_left, strip
+from sbafab.nesting.records import (
+    TURNS,
+    EngineName,
+    Nest,
+    NestPart,
+    Placement,
+    Stock,
+    no_usable_area,
+    too_large,
+    too_many,
+)
 
 
 def nest(
@@ -18,10 +30,10 @@ def nest(
     engine: EngineName = "bottom-left",
     seconds: float = 20.0,
 ) -> tuple[Nest, ...]:
-    """One nest for each material that has parts, TPE first.
+    """Return one nest for each material that has parts, TPE first.
 
-    ``seconds`` is how long spyrrow looks for each sheet. Raises DesignError where a part does not
-    fit a sheet or more sheets are needed than may be used.
+    ``seconds`` is spyrrow's time for each sheet. Raises DesignError if a part does not fit a sheet
+    or more sheets are needed than allowed.
     """
     nests = []
     for material in materials_of(parts):
@@ -31,13 +43,13 @@ def nest(
 
 
 def refuse_unfit(parts: Sequence[NestPart], stocks: Mapping[Material, Stock]) -> None:
-    """Raises DesignError where no search is needed to see that the sheets are too small or few."""
+    """Raise DesignError if the sheets are too small or too few for any nest, without a search."""
     for material in materials_of(parts):
         _check_fit(material, of_material(parts, material), stocks[material])
 
 
 def materials_of(parts: Sequence[NestPart]) -> list[Material]:
-    """The materials that have parts, TPE first."""
+    """Return the materials that have parts, TPE first."""
     return in_order(part.material for part in parts if part.count > 0)
 
 
@@ -53,26 +65,20 @@ def _nest(
     seconds: float,
 ) -> Nest:
     _check_fit(material, parts, stock)
-    if engine == "spyrrow":
-        from sbafab.nesting.strip import strip
-
-        placements = strip(parts, stock, seconds)
-    else:
-        from sbafab.nesting.bottom_left import bottom_left
-
-        placements = bottom_left(parts, stock)
-    found = Nest(engine, material, stock, parts, placements)
-    if found.sheets > stock.most:
+    is_strip = engine == "spyrrow"
+    placements = strip(parts, stock, seconds) if is_strip else bottom_left(parts, stock)
+    result = Nest(engine, material, stock, parts, placements)
+    if result.sheets > stock.most:
         total = sum(part.count for part in parts)
-        raise too_many(material, total, f"{found.sheets} sheets", stock)
-    return found
+        raise too_many(material, total, f"{result.sheets} sheets", stock)
+    return result
 
 
 def _check_fit(material: Material, parts: Sequence[NestPart], stock: Stock) -> None:
-    left, bottom, right, top = stock.usable
-    if right - left <= 0 or top - bottom <= 0:
+    min_x, min_y, max_x, max_y = stock.usable
+    if max_x - min_x <= 0 or max_y - min_y <= 0:
         raise no_usable_area(material, stock)
-    across, along = right - left + ROUNDING, top - bottom + ROUNDING
+    across, along = max_x - min_x + ROUNDING, max_y - min_y + ROUNDING
     for part in parts:
         low_x, low_y, high_x, high_y = part.region.bounds
         width, height = high_x - low_x, high_y - low_y
@@ -87,7 +93,70 @@ def _check_fit(material: Material, parts: Sequence[NestPart], stock: Stock) -> N
 
 
 def _least_sheets(parts: Sequence[NestPart], stock: Stock) -> int:
-    """Sheets that the parts' bare areas fill: no nest can do with fewer."""
-    left, bottom, right, top = stock.usable
+    """Return the number of sheets that the parts' bare areas fill, a lower bound for any nest."""
+    min_x, min_y, max_x, max_y = stock.usable
     area = sum(part.count * part.region.area for part in parts)
-    return math.ceil(area / ((right - left) * (top - bottom)) - 1e-9)
+    return math.ceil(area / ((max_x - min_x) * (max_y - min_y)) - 1e-9)
+
+
+# Nests saved with the sheets, so that a second export has the same placements.
+
+
+def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
+    """Return the placements of all nests, for JSON, under a key of all their inputs."""
+    return {
+        "key": _key((nest.engine, nest.stock, nest.parts) for nest in nests),
+        "nests": {
+            nest.material: [[p.part, p.sheet, p.turn, *p.shift] for p in nest.placements]
+            for nest in nests
+        },
+    }
+
+
+def from_dict(
+    data: object, parts: Sequence[NestPart], stocks: Mapping[Material, Stock], engine: EngineName
+) -> tuple[Nest, ...] | None:
+    """Return the saved nests if they were made of these parts, stocks and engine; otherwise None.
+
+    The placements are not checked here, but in ``check_nest``.
+    """
+    requests = [
+        (material, stocks[material], of_material(parts, material))
+        for material in materials_of(parts)
+    ]
+    key = _key((engine, stock, chosen) for _, stock, chosen in requests)
+    if not isinstance(data, dict) or data.get("key") != key:
+        return None
+    try:
+        return tuple(
+            Nest(engine, material, stock, chosen, _placements(data["nests"][material], chosen))
+            for material, stock, chosen in requests
+        )
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def _key(nests: Iterable[tuple[EngineName, Stock, Sequence[NestPart]]]) -> str:
+    inputs = [
+        (
+            engine,
+            astuple(stock),
+            [(p.design, p.pattern, p.piece, p.material, p.region.key, p.count) for p in parts],
+        )
+        for engine, stock, parts in nests
+    ]
+    return hashlib.sha256(repr(inputs).encode()).hexdigest()
+
+
+def _placements(rows: object, parts: Sequence[NestPart]) -> tuple[Placement, ...]:
+    """The placements of saved rows. Raises TypeError or ValueError if they are not of all parts."""
+    if not isinstance(rows, list):
+        raise TypeError
+    placements = []
+    for part, sheet, turn, x, y in rows:
+        if not (type(part) is type(sheet) is int and sheet >= 0 and math.isfinite(x + y)):
+            raise ValueError
+        placements.append(Placement(part, sheet, TURNS[TURNS.index(turn)], (float(x), float(y))))
+    if Counter(place.part for place in placements) != dict(enumerate(part.count for part in parts)):
+        raise ValueError
+    return tuple(placements)

@@ -1,18 +1,20 @@
-"""What is nested on what: parts, film sheets, and the places a nest gives them.
+"""Records of nesting: parts, film sheets, the placements in a nest, and its errors.
 
 Lengths are mm, areas mm2. A sheet's lower left corner is its origin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from sbafab.errors import DesignError, TooLargeError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Material
+from sbafab.laminate.films import FIRST, Material
+from sbafab.laminate.laminate import Laminate
 
 EngineName = Literal["bottom-left", "spyrrow"]
 Turn = Literal[0, 1, 2, 3]
@@ -25,7 +27,7 @@ class NestPart:
     """One piece that is to be cut ``count`` times.
 
     ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
-    ``pattern`` say what it is a piece of, ``piece`` which (from 1) where the pattern falls apart.
+    ``pattern`` name its source, ``piece`` its number (from 1) where the pattern has several pieces.
     """
 
     design: str
@@ -45,9 +47,9 @@ class Stock:
     """Film to cut from, as it lies on the machine.
 
     A roll's ``length`` is the most that is unrolled for one sheet. Parts stay inside ``border``,
-    their paths ``spacing`` apart, and as far from ``pins``: centre x, y and diameter of what holds
-    the sheet down. ``most`` sheets may be used. Parts may be turned by ``turns``: a path that is
-    compensated for other kerfs along x and along y keeps its axes.
+    their paths ``spacing`` apart, and as far from ``pins``, which hold the sheet down: centre x, y
+    and diameter. ``most`` sheets may be used. Parts may be turned by ``turns``: a path that is
+    compensated for different kerfs along x and along y keeps its axes.
     """
 
     width: float
@@ -61,7 +63,7 @@ class Stock:
 
     @property
     def usable(self) -> Bounds:
-        """What the border leaves of a sheet."""
+        """The sheet without its border: least x, least y, largest x, largest y."""
         return self.border, self.border, self.width - self.border, self.length - self.border
 
 
@@ -80,7 +82,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Nest:
-    """Where every part of one material lies; ``placements`` in no order that matters."""
+    """The places of all parts of one material; ``placements`` have no order."""
 
     engine: EngineName
     material: Material
@@ -96,14 +98,14 @@ class Nest:
         return [placement for placement in self.placements if placement.sheet == sheet]
 
     def length(self, sheet: int) -> float:
-        """The sheet's length: a roll is cut off one border past the last part."""
+        """Return the sheet's length: a roll is cut off one border past the last part."""
         if not self.stock.roll:
             return self.stock.length
         tops = (self.region(placement).bounds[3] for placement in self.on_sheet(sheet))
         return max(tops) + self.stock.border
 
     def region(self, placement: Placement) -> Region:
-        """The part's path where the nest puts it: check, sheet and its picture ask for it."""
+        """Return the part's path at its place."""
         return self._regions[placement]
 
     @cached_property
@@ -115,9 +117,117 @@ class Nest:
 
 
 def placed(region: Region, turn: Turn, shift: Point) -> Region:
-    """A region turned by exact quarter turns about the origin and then moved."""
+    """Return a region turned by exact quarter turns about the origin and then moved."""
     (c, s), (dx, dy) = unit(90.0 * turn), shift
     for contour in region.contours:
-        # Once known, these are not counted again for every place.
+        # Computed here once instead of for every place.
         _ = contour.area, contour.length
     return region.mapped(lambda p: (p[0] * c - p[1] * s + dx, p[0] * s + p[1] * c + dy), 1.0, False)
+
+
+# The parts to cut for a laminate.
+
+
+def no_spares(needed: int) -> int:
+    """Return zero spares, whatever number is needed."""
+    return 0
+
+
+def parts_of(
+    laminate: Laminate,
+    paths: Mapping[str, Region],
+    copies: int,
+    spares: Callable[[int], int] = no_spares,
+) -> tuple[NestPart, ...]:
+    """Return every piece of every pattern, by pattern in stacking order.
+
+    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` returns
+    how many more of a pattern are cut than the ``copies`` need. Pieces of one pattern that differ
+    only in their place are one part, named after the first of them. None where the layers are
+    registered sheets: these are not nested.
+    """
+    if laminate.panel is not None:
+        return ()
+    parts: list[NestPart] = []
+    for pattern, layers in laminate.patterns.items():
+        needed = len(layers) * copies
+        layers_cut = needed + spares(needed)
+        by_form: dict[Region, list[int]] = {}
+        pieces = paths[pattern].pieces
+        for number, piece in enumerate(pieces):
+            low_x, low_y, _, _ = piece.bounds
+            by_form.setdefault(piece.moved(-low_x, -low_y), []).append(number)
+        for numbers in by_form.values():
+            parts.append(
+                NestPart(
+                    design=laminate.name,
+                    pattern=pattern,
+                    piece=numbers[0] + 1,
+                    material=layers[0].film.material,
+                    region=pieces[numbers[0]],
+                    count=len(numbers) * layers_cut,
+                )
+            )
+    return tuple(parts)
+
+
+# Errors that name the field of the design file.
+
+
+def field(material: Material) -> str:
+    """Return the section of a design file that describes this material's sheets."""
+    name = material.lower()
+    return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
+
+
+def no_usable_area(material: Material, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f"{where}.border of {stock.border:g} mm leaves no usable area on a sheet of "
+        f"{stock.width:g} x {stock.length:g} mm; it must be below "
+        f"{min(stock.width, stock.length) / 2:g} mm."
+    )
+
+
+def too_large(part: NestPart, stock: Stock) -> TooLargeError:
+    where = field(part.material)
+    low_x, low_y, high_x, high_y = part.region.bounds
+    min_x, min_y, max_x, max_y = stock.usable
+    return TooLargeError(
+        f"pattern {part.pattern} of {part.design} ({high_x - low_x:.1f} x {high_y - low_y:.1f} mm) "
+        f"does not fit the usable {max_x - min_x:.1f} x {max_y - min_y:.1f} mm of {where}; enlarge "
+        f"{where}.width or length, or lower its border of {stock.border:g} mm."
+    )
+
+
+def no_place(part: NestPart, stock: Stock) -> DesignError:
+    where = field(part.material)
+    return DesignError(
+        f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of the "
+        f"{len(stock.pins)} {where}.pins; lower {where}.spacing, move the pins, or enlarge the "
+        "sheet."
+    )
+
+
+def too_many(material: Material, parts: int, needed: str, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f"{parts} parts of {material} need {needed} of {stock.width:g} x {stock.length:g} mm, "
+        f"{where}.most allows {stock.most}; raise it, order fewer copies, or enlarge the sheets."
+    )
+
+
+def pins_unknown(material: Material, stock: Stock) -> DesignError:
+    where = field(material)
+    return DesignError(
+        f'engine "spyrrow" cannot keep clear of the {len(stock.pins)} {where}.pins; use '
+        '"bottom-left", or take the pins out.'
+    )
+
+
+def too_tight(part: NestPart) -> DesignError:
+    where = field(part.material)
+    return DesignError(
+        f"pattern {part.pattern} of {part.design} fits {where} too tightly for engine "
+        f'"spyrrow"; use "bottom-left", or lower {where}.border by 0.1 mm.'
+    )

@@ -1,7 +1,7 @@
-"""What bond and overhang a design would need to reach an asked yield, found by search.
+"""The bond and overhang with which a design reaches a yield, found by search.
 
-Every design tried is built and counted like the one asked about; the design advised is counted
-again with another seed, so that the advice does not rest on the draws it was chosen by.
+Every trial is built and counted like the design itself; the advised one is counted again with
+another seed, so that the advice does not rest on the draws it was chosen by.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Literal
 from sbafab.actuators import build
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.settings import limits
-from sbafab.progress import Progress, unheard
+from sbafab.output.checked import limits
+from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 
@@ -48,11 +48,11 @@ class Advice:
     @property
     def sentence(self) -> str:
         if self.share is None:
-            other = OTHERWISE.get(self.method, OTHERWISE["ears"])
+            remedy = OTHERWISE.get(self.method, OTHERWISE["ears"])
             return (
                 f"No bond and overhang up to {MOST_STEPS * STEP:g} mm above the rules' limits "
                 f"reach a yield of {self.target:.4g} with registration.method = "
-                f'"{self.method}": {other}.'
+                f'"{self.method}": {remedy}.'
             )
         low, high = self.share.interval
         return (
@@ -72,7 +72,7 @@ class Advice:
         }
 
 
-def advise(design: Design, target: float, tell: Progress = unheard) -> Advice:
+def advise(design: Design, target: float, tell: Progress = ignore_progress) -> Advice:
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``.
 
     First both grow by the same amount above the rules' limits until the target is reached; then
@@ -132,9 +132,9 @@ class _Trial:
         return simulate(laminate, limits(self.design), seed).whole
 
     def holds(self, bond: int, overhang: int) -> bool:
-        """Whether the design passes every rule but the one that asks for the yield."""
-        asked = replace(limits(self.design), target_yield=None)
-        return not has_failed(run_deck(build(self._changed(bond, overhang)), asked))
+        """True if the design passes every rule but the one that limits the yield."""
+        untargeted = replace(limits(self.design), target_yield=None)
+        return not has_failed(run_deck(build(self._changed(bond, overhang)), untargeted))
 
     def verdict(self, bond: int, overhang: int) -> Outcome:
         key = bond, overhang
@@ -151,15 +151,15 @@ class _Trial:
         return self.verdicts[key]
 
 
-def _least(verdict: Callable[[int], Outcome], known: int | None = None) -> int | None:
+def _least(verdict: Callable[[int], Outcome], sufficient: int | None = None) -> int | None:
     """The fewest steps that are not short, if they reach; ``known`` steps are known to reach.
 
     With more steps a design goes from short to reached, and may become impossible.
     """
     if verdict(0) == "reached":
         return 0
-    short, enough = 0, known if known is not None else 8
-    while known is None and enough <= MOST_STEPS and verdict(enough) == "short":
+    short, enough = 0, sufficient if sufficient is not None else 8
+    while sufficient is None and enough <= MOST_STEPS and verdict(enough) == "short":
         short, enough = enough, 2 * enough
     if enough > MOST_STEPS:
         return None

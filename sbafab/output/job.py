@@ -1,51 +1,142 @@
-"""Several designs cut together: a folder with each design's own, and film sheets for all."""
+"""The designs of one output folder, checked and planned: one, several, or an assembly's."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from sbafab.cutting.dxf_write import TRUE_ARCS, Curves
-from sbafab.design.records import NAME_PATTERN, Design
-from sbafab.errors import DesignError
-from sbafab.output.batch import plan_batch, refuse_other_film, write_batch
-from sbafab.output.checking import check
-from sbafab.output.planned import EVERYTHING, Checked, plan
-from sbafab.output.run import Run, swapped_in
-from sbafab.output.swap import JOB_SCHEMA
-from sbafab.progress import Progress, unheard
+from sbafab.assemblies.build import Assembled, assemble
+from sbafab.assemblies.checks import lowered_checks, run_checks
+from sbafab.assemblies.records import Assembly
+from sbafab.cutting.properties import CutSettings
+from sbafab.design.records import Design
+from sbafab.design.sections import NAME_PATTERN
+from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.nesting.check import check_nest
+from sbafab.nesting.nest import from_dict, nest
+from sbafab.nesting.records import Nest, NestPart
+from sbafab.output.artefacts import PLACES
+from sbafab.output.checked import Checked, DesignPlan, check, limits, stocks
+from sbafab.output.manifest import Schema
+from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.process import Progress, ignore_progress
+from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.finding import Finding
 
 RESERVED = {
     "sheets": "the job's folder of film sheets",
     "manifest.json": "the job's index",
 }
 """What lies in a job's folder beside those of its designs."""
+SHARED = ("films", "sheets", "laser")
+"""Sections that must be alike in all designs that are cut from the same film."""
+MOST_BYTES = 50_000_000
+"""Of saved places; more are not read but searched for again."""
 
 
-def generate_job(
-    designs: Sequence[Design],
-    name: str,
-    out: Path = Path("out"),
-    progress: Progress | None = None,
-    curves: Curves = TRUE_ARCS,
-) -> Run:
-    """Writes ``out/<name>/``: a folder for each design, and ``sheets/`` with the parts of all.
+@dataclass(frozen=True)
+class CheckedJob:
+    """The designs of one output folder with the findings in each.
 
-    Film sheets, kerf and machine are those of the first design, and must be alike in all.
-    Raises DesignError where they are not, or where two designs have one name. If a rule fails in
-    any design, nothing is written (``Run.kept``).
+    ``schema`` is that of the folder's manifest: of one design, of a job or of an assembly.
+    ``between``: the findings between the parts of an assembly, None for designs.
     """
-    tell = progress or unheard
-    _refuse_names([design.name for design in designs], name)
+
+    schema: Schema
+    name: str
+    designs: tuple[Checked, ...]
+    assembled: Assembled | None = None
+    between: tuple[Finding, ...] | None = None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of the designs, of several each with its name; then those between parts."""
+        if len(self.designs) == 1 and self.between is None:
+            return self.designs[0].findings
+        named = (
+            replace(finding, message=f"{checked.design.name}: {finding.message}")
+            for checked in self.designs
+            for finding in checked.findings
+        )
+        return (*named, *(self.between or ()))
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule or a check between parts failed that is not waived."""
+        return has_failed(self.findings)
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """Checks between parts that fail and that the assembly waives by name."""
+        failed = (finding.rule for finding in self.between or () if finding.by_user)
+        return tuple(dict.fromkeys(failed))
+
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits of the checks between parts that the assembly weakens."""
+        return () if self.assembled is None else lowered_checks(self.assembled.assembly.rules)
+
+
+def check_job(
+    source: Design | Assembly | Sequence[Design], name: str = "", progress: Progress | None = None
+) -> CheckedJob:
+    """Check a design, an assembly and what lies between its parts, or the designs of job ``name``.
+
+    Raises DesignError where one cannot be built, or where the film sheets, kerf or machine of
+    several are not equal.
+    """
+    if isinstance(source, Design):
+        return CheckedJob(SCHEMA, source.name, (check(source, progress),))
+    if isinstance(source, Assembly):
+        return _check_assembly(source, progress or ignore_progress)
+    _refuse_names([design.name for design in source], name)
+    refuse_other_film(source)
+    return CheckedJob(JOB_SCHEMA, name, tuple(check(design, progress) for design in source))
+
+
+def _check_assembly(assembly: Assembly, tell: Progress) -> CheckedJob:
+    assembled = assemble(assembly)
+    designs = [part.design for part in assembled.designs]
     refuse_other_film(designs)
-    checked = tuple(Checked(design, *check(design, tell)) for design in designs)
-    target = out / name
-    if any(one.failed for one in checked):
-        return Run(checked, target, kept=True)
-    planned = [plan(one, EVERYTHING, curves) for one in checked]
-    batch = plan_batch(JOB_SCHEMA, name, planned, target, tell)
-    return swapped_in(batch, target, lambda folder: write_batch(batch, folder, tell)[0], tell)
+    try:
+        checked = tuple(
+            Checked(part.design, part.laminate, run_deck(part.laminate, limits(part.design), tell))
+            for part in assembled.designs
+        )
+    except GeometryError as error:
+        raise DesignError(f"assembly {assembly.name} cannot be resolved: {error}") from None
+    tell("checks between parts", 0, 1)
+    return of_assembly(assembled, checked)
+
+
+def of_assembly(assembled: Assembled, designs: Sequence[Checked]) -> CheckedJob:
+    """Return the checked designs of an assembly with the findings between its parts."""
+    between = run_checks(assembled)
+    return CheckedJob(ASSEMBLY_SCHEMA, assembled.assembly.name, tuple(designs), assembled, between)
+
+
+def refuse_other_film(designs: Sequence[Design]) -> None:
+    """Raises DesignError where two designs are not cut from the same film by one machine."""
+    for design in designs:
+        if design.registration.method == "sheet":
+            raise DesignError(
+                f"{design.name} is made in registered sheets, which hold no parts of other "
+                "designs; make it by itself with sbafab generate, or use "
+                'registration.method = "ears"'
+            )
+    first, *rest = designs
+    for design in rest:
+        for section in SHARED:
+            if getattr(design, section) != getattr(first, section):
+                raise DesignError(
+                    f"{section} differs between {first.name} and {design.name}, which are to be "
+                    f"cut from the same film; make the section {section} equal in both"
+                )
 
 
 def _refuse_names(names: Sequence[str], name: str) -> None:
@@ -54,24 +145,107 @@ def _refuse_names(names: Sequence[str], name: str) -> None:
             f"--name {name!r} must be a folder's name of letters, digits, dots, dashes and "
             "underscores; for another place use -o"
         )
-    twice = next((own for own in names if names.count(own) > 1), None)
-    if twice is not None:
+    repeated = next((design for design in names if names.count(design) > 1), None)
+    if repeated is not None:
         raise DesignError(
-            f"two designs are named {twice}; give each a name of its own, or say --copies"
+            f"two designs are named {repeated}; give each a name of its own, or say --copies"
         )
-    folders = {own.lower(): own for own in reversed(names)}
+    folders = {design.lower(): design for design in reversed(names)}
     # Some systems hold names that differ in small and capital letters for one.
-    alike = next((own for own in names if folders[own.lower()] != own), None)
-    if alike is not None:
+    similar = next((design for design in names if folders[design.lower()] != design), None)
+    if similar is not None:
         raise DesignError(
-            f"two designs are named {folders[alike.lower()]} and {alike}, which is one folder on "
-            "some machines; give one of them another name"
+            f"two designs are named {folders[similar.lower()]} and {similar}, which is one folder "
+            "on some machines; give one of them another name"
         )
-    kept = next((own for own in names if own.lower() in RESERVED), None)
-    if kept is not None:
+    reserved = next((design for design in names if design.lower() in RESERVED), None)
+    if reserved is not None:
         raise DesignError(
-            f"a design is named {kept}, as {RESERVED[kept.lower()]} is; give it another name in "
-            "its design file"
+            f"a design is named {reserved}, as {RESERVED[reserved.lower()]} is; give it another "
+            "name in its design file"
         )
     if name.lower() in (*folders, *RESERVED):
         raise DesignError(f"the job is named {name} as one of its folders; choose another --name")
+
+
+# The plan of a folder: its designs' plans with places for all parts on the film sheets.
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A folder before it is written; ``settings`` are those of the film sheets."""
+
+    job: CheckedJob
+    designs: tuple[DesignPlan, ...]
+    settings: CutSettings
+    nests: tuple[Nest, ...]
+
+    @property
+    def is_cut(self) -> bool:
+        return bool(self.nests)
+
+
+def plan_job(
+    job: CheckedJob, designs: Sequence[DesignPlan], old_folder: Path, tell: Progress
+) -> Plan:
+    """Place the parts of planned designs on the film sheets of the first.
+
+    ``old_folder`` may hold the places of an earlier run. Raises DesignError where parts do not fit.
+    """
+    parts = [part for plan in designs for part in plan.parts]
+    nests = find_nests(parts, designs[0].checked.design, old_folder, tell)
+    settings = designs[0].settings if job.schema == SCHEMA else _shared_settings(job, designs)
+    return Plan(job, tuple(designs), settings, nests)
+
+
+def _shared_settings(job: CheckedJob, designs: Sequence[DesignPlan]) -> CutSettings:
+    """Return settings of shared sheets: one hash over all designs, waivers and limits of all."""
+    each = [plan.settings for plan in designs]
+    hashes = "".join(settings.design_sha256 for settings in each)
+    waived = [rule for settings in each for rule in settings.waived]
+    weakened = [limit for settings in each for limit in settings.lowered]
+    return replace(
+        each[0],
+        design=job.name,
+        design_sha256=hashlib.sha256(hashes.encode()).hexdigest(),
+        waived=tuple(dict.fromkeys([*waived, *job.waived])),
+        lowered=tuple(dict.fromkeys([*weakened, *job.lowered])),
+        warnings={name: text for settings in each for name, text in settings.warnings.items()},
+    )
+
+
+def find_nests(
+    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
+) -> tuple[Nest, ...]:
+    """Return places for the parts on the design's film sheets; none for no parts.
+
+    Places of an earlier run for the same parts and sheets are taken over. Raises DesignError where
+    parts do not fit.
+    """
+    if not parts:
+        return ()
+    tell("nesting", 0, 1)
+    saved = _saved(parts, design, old_folder / PLACES)
+    return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+
+
+def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
+    """Return the places of an earlier run; None where none are sound and for these parts."""
+    try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            return None
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        nests = from_dict(data, parts, stocks(design), design.sheets.engine)
+        if nests is None or not all(_is_possible(nested) for nested in nests):
+            return None
+        for nested in nests:
+            check_nest(nested)
+    except (OSError, ValueError, ArithmeticError, RecursionError, OutputError):
+        return None
+    return nests
+
+
+def _is_possible(nested: Nest) -> bool:
+    """Return True if the stock allows as many sheets and such turns."""
+    turns = nested.stock.turns
+    return nested.sheets <= nested.stock.most and all(p.turn in turns for p in nested.placements)

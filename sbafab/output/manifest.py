@@ -1,4 +1,8 @@
-"""``manifest.json`` and ``checks.json``: what a program reads of an output folder."""
+"""``manifest.json``: the records that it is written from and read with, and the hashes of files.
+
+A key with a default may be missing in a folder that is read. The claims of a manifest are held
+against the files by ``as_built``, which measures them there and asks nothing that wrote them.
+"""
 
 from __future__ import annotations
 
@@ -7,66 +11,299 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from sbafab.cutting.fixture import PATH as FIXTURE
-from sbafab.cutting.panel_projects import projects
+from sbafab.cutting.lightburn import projects
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.kits import citation
+from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
-from sbafab.geometry.beam import Kerf
-from sbafab.laminate.films import Film
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import SheetPanel
+from sbafab.geometry.offset import Kerf
+from sbafab.laminate.films import Film, Material
+from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role, SheetPanel
 from sbafab.meshing.files import MeshFile
-from sbafab.models.sizes import sizes
-from sbafab.output.manifest_records import (
-    BatchClaim,
-    BatchSchema,
-    BoreClaim,
-    DesignClaim,
-    FiducialClaim,
-    FilmClaim,
-    FilmUseClaim,
-    InletClaim,
-    InterfaceClaim,
-    JobManifest,
-    KerfClaim,
-    KitClaim,
-    LayerClaim,
-    Manifest,
-    MeshClaim,
-    PanelClaim,
-    PinClaim,
-    PlaceClaim,
-    RegistrationClaim,
-    SheetClaim,
-    SheetPartClaim,
-    SheetPinClaim,
-)
-from sbafab.output.planned import Planned
-from sbafab.output.settings import GENERATOR, kerf_widths, warnings
-from sbafab.output.shop import film_use
+from sbafab.models.formulas import sizes
+from sbafab.output.checked import DesignPlan, kerf_widths, warnings
 from sbafab.output.swap import SCHEMA
-from sbafab.pressing.together import Runs, design_runs
+from sbafab.pressing.cycles import Runs, design_runs
+from sbafab.version import GENERATOR
+
+MOST_SIZE = 10_000.0
+"""mm, of a film sheet."""
+Count = Annotated[int, Field(ge=1, le=10_000_000)]
+Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
+Thickness = Annotated[float, Field(gt=0, le=10)]
+BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
+Schema = Literal["sbafab/manifest@1"] | BatchSchema
+
+
+# The records.
+
+
+class _Claim(BaseModel):
+    model_config = ConfigDict(
+        extra="ignore", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
+    )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the keys of the file in the order of the fields, without unset ones."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
+
+class LayerClaim(_Claim):
+    index: int
+    name: str
+    material: Material
+    role: Role
+    balloon: int | None
+    thickness: Thickness
+    z: float
+    file: str | None
+    pattern: str
+    area: float
+    pieces: int
+    bores: tuple[str, ...]
+
+
+class InterfaceClaim(_Claim):
+    below: int
+    above: int
+    masks: tuple[int, ...]
+    kind: InterfaceKind
+    contact_area: float
+    bond_area: float
+
+
+class BoreClaim(_Claim):
+    chamber: str
+    x: float
+    y: float
+    diameter: float
+
+
+class InletClaim(_Claim):
+    chamber: str
+    x: float
+    y: float
+    width: float
+    tube_outer_diameter: float
+
+
+class PinClaim(_Claim):
+    name: str
+    x: float
+    y: float
+    diameter: float
+
+
+class RegistrationClaim(_Claim):
+    method: str
+    pins: tuple[PinClaim, ...]
+
+
+class KerfClaim(_Claim):
+    state: Literal["uncalibrated", "compensated"]
+    width: float | tuple[float, float] | None
+    """Full width in mm, or that along x and along y."""
+
+
+class _OfFilm(_Claim):
+    material: Material
+
+
+class _FilmNeed(_OfFilm):
+    product: str
+    thickness: Thickness
+    layers: int
+    area: float
+
+
+class FilmUseClaim(_OfFilm):
+    """Sheets of a film and their area in mm2; nothing where there are none."""
+
+    sheets: int = 0
+    sheet_area: float = 0.0
+    waste: float = 0.0
+    density: float = 0.0
+
+
+class FilmClaim(FilmUseClaim, _FilmNeed):
+    """A design's need of a film and the sheets it is cut from; keys in this order."""
+
+
+class SheetPinClaim(_Claim):
+    x: float
+    y: float
+    diameter: float
+
+
+class SheetPartClaim(_Claim):
+    design: str
+    pattern: str
+    count: Count
+
+
+class SheetClaim(_Claim):
+    """A film sheet; lengths in mm, areas in mm2."""
+
+    file: str
+    picture: str
+    project: str
+    material: Material
+    number: Count
+    width: Size
+    length: Size
+    border: Annotated[float, Field(ge=0, le=MOST_SIZE)]
+    spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)]
+    pins: Annotated[tuple[SheetPinClaim, ...], Field(max_length=100)]
+    engine: str
+    parts: tuple[SheetPartClaim, ...]
+    parts_area: float
+    density: float
+    label: str = ""
+    contours: Count
+    cut_length: float
+    travel: float = 0.0
+    unsorted_travel: float = 0.0
+    estimated_minutes: float = 0.0
+
+
+class MeshClaim(_Claim):
+    file: str
+    kind: str
+    chamber: str | None
+    fill_ul: float
+    volume_mm3: float
+    elements: int
+
+
+class PlaceClaim(_Claim):
+    x: float
+    y: float
+
+
+class BatchClaim(_Claim):
+    """Press cycles of several copies, and the place of each copy of a cycle on the base plate."""
+
+    at_once: Count
+    cycles: Annotated[tuple[Count, ...], Field(max_length=1000)]
+    places: Annotated[tuple[PlaceClaim, ...], Field(min_length=1, max_length=1000)]
+
+
+class KitClaim(_Claim):
+    name: str
+    version: str
+    sha256: str
+    departures: tuple[str, ...]
+
+
+class FiducialClaim(PlaceClaim):
+    diameter: float
+
+
+class PanelClaim(_Claim):
+    """Registered sheets, in the frame of the first copy; lengths in mm.
+
+    ``turned_over`` are the materials whose sheets are drawn as seen from below; ``projects`` the
+    first and second cut for LightBurn.
+    """
+
+    size: tuple[float, float]
+    places: tuple[PlaceClaim, ...]
+    batches: int
+    second_cut: str
+    fiducials: tuple[FiducialClaim, ...]
+    turned_over: str
+    projects: tuple[str, ...] = ()
+
+
+class Manifest(_Claim):
+    """``manifest.json`` of one design's folder."""
+
+    schema_name: Literal["sbafab/manifest@1"] = Field(alias="schema")
+    name: str
+    family: str
+    units: Literal["mm"]
+    design_sha256: str
+    generator: str
+    kit: KitClaim | None = None
+    registration: RegistrationClaim
+    kerf: dict[Material, KerfClaim]
+    curves: str | None = None
+    waived: tuple[str, ...]
+    lowered_limits: tuple[str, ...] = ()
+    sizes: dict[str, float]
+    notes: tuple[str, ...] = ()
+    copies: Annotated[int, Field(ge=1, le=1000)] = 1
+    batch: BatchClaim | None = None
+    films: tuple[FilmClaim, ...]
+    warnings: tuple[str, ...] = ()
+    layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
+    interfaces: tuple[InterfaceClaim, ...]
+    bores: tuple[BoreClaim, ...]
+    inlets: tuple[InletClaim, ...]
+    lumen: float | None
+    fixture: str | None = None
+    panel: PanelClaim | None = None
+    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
+    meshes: tuple[MeshClaim, ...] = ()
+    mesh_statistics: dict[str, Any] = Field(default_factory=dict)
+    files: dict[str, str]
+
+
+class DesignClaim(_Claim):
+    name: str
+    folder: str
+    copies: Annotated[int, Field(ge=1, le=1000)]
+    design_sha256: str
+    kit: KitClaim | None = None
+
+
+class JobManifest(_Claim):
+    """``manifest.json`` of several designs cut together."""
+
+    schema_name: BatchSchema = Field(alias="schema")
+    name: str
+    units: Literal["mm"]
+    designs_sha256: str
+    generator: str
+    waived: tuple[str, ...]
+    lowered_limits: tuple[str, ...] = ()
+    designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]
+    films: tuple[FilmUseClaim, ...]
+    sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]
+    files: dict[str, str]
+
+
+class AssemblyManifest(JobManifest):
+    """``manifest.json`` of an assembly: that of a job, with the parts and their places."""
+
+    family: str = ""
+    design_sha256: str
+    copies: int = 1
+    parts: Annotated[tuple[dict[str, Any], ...], Field(max_length=1000)]
+    meshes: tuple[dict[str, Any], ...] = ()
+
+
+# Manifests of plans.
 
 
 def as_json(value: object) -> str:
-    """Text of a JSON file: readable, and the same for the same value."""
+    """Return the text of a JSON file: readable, and equal for equal values."""
     return json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def manifest(
-    planned: Planned, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
+    plan: DesignPlan, sheets: Sequence[SheetFile], meshes: Sequence[MeshFile]
 ) -> dict[str, Any]:
-    """The index of an output folder, but for the hashes of its files."""
-    checked, is_cut = planned.checked, "cut" in planned.wanted
+    """Return the manifest of a design's folder, without the hashes of its files."""
+    checked, is_cut = plan.checked, "cut" in plan.wanted
     design, laminate = checked.design, checked.laminate
-    curves = said_of(planned.settings.curves) if is_cut else None
+    curves = said_of(plan.settings.curves) if is_cut else None
     optional: dict[str, Any] = {}
     if curves is not None:
         optional["curves"] = curves
@@ -74,9 +311,9 @@ def manifest(
     if runs.copies > 1:
         optional["batch"] = _batch(runs)
     if is_cut and laminate.panel is not None:
-        optional["panel"] = _panel(laminate, laminate.panel, planned.settings)
-    if planned.conforming is not None:
-        optional["mesh_statistics"] = planned.conforming.statistics
+        optional["panel"] = _panel(laminate, laminate.panel, plan.settings)
+    if plan.conforming is not None:
+        optional["mesh_statistics"] = plan.conforming.statistics
     return Manifest(
         schema=SCHEMA,
         name=laminate.name,
@@ -100,7 +337,7 @@ def manifest(
         copies=design.order.quantity,
         films=_films(laminate, sheets),
         warnings=tuple(dict.fromkeys(warnings(design).values())),
-        layers=tuple(_layer(planned, layer) for layer in laminate.layers),
+        layers=tuple(_layer(plan, layer) for layer in laminate.layers),
         interfaces=tuple(_interface(interface) for interface in laminate.interfaces),
         bores=tuple(
             BoreClaim(chamber=bore.chamber, **_place(bore.centre), diameter=bore.diameter)
@@ -134,7 +371,7 @@ def job_manifest(
     designs: Sequence[Design],
     sheets: Sequence[SheetFile],
 ) -> dict[str, Any]:
-    """The index of the folder of several designs, but for the hashes of its files.
+    """Return the manifest of the folder of several designs, without the hashes of its files.
 
     ``settings`` are those of the shared ``sheets``.
     """
@@ -157,7 +394,7 @@ def job_manifest(
             for design in designs
         ),
         films=tuple(
-            FilmUseClaim(material=material, **use) for material, use in film_use(sheets).items()
+            FilmUseClaim(material=material, **use) for material, use in _film_use(sheets).items()
         ),
         sheets=tuple(_sheet(sheet) for sheet in sheets),
         files={},
@@ -169,7 +406,7 @@ def kerf_claim(width: Kerf | None) -> KerfClaim:
 
 
 def _batch(runs: Runs) -> BatchClaim:
-    """How several copies are pressed, and where each lies on the base plate."""
+    """Return press cycles and places of several copies."""
     places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
 
@@ -197,7 +434,7 @@ def _place(point: tuple[float, float]) -> dict[str, float]:
 
 
 def _sheet(sheet: SheetFile) -> SheetClaim:
-    """A film sheet as the manifest lists it; lengths mm, areas mm2."""
+    """Return a film sheet as the manifest lists it; lengths mm, areas mm2."""
     stock = sheet.nest.stock
     return SheetClaim(
         file=sheet.path,
@@ -226,8 +463,29 @@ def _sheet(sheet: SheetFile) -> SheetClaim:
     )
 
 
+def _film_use(sheets: Sequence[SheetFile]) -> dict[Material, dict[str, Any]]:
+    """Return number and area of sheets, share of the parts and waste in mm2, by material."""
+    used: dict[Material, dict[str, float]] = {}
+    for sheet in sheets:
+        entry = used.setdefault(sheet.material, {"sheets": 0, "sheet_area": 0.0, "parts_area": 0.0})
+        entry["sheets"] += 1
+        entry["sheet_area"] += sheet.width * sheet.length
+        entry["parts_area"] += sheet.parts_area
+    return {material: _shares(entry) for material, entry in used.items()}
+
+
+def _shares(entry: Mapping[str, float]) -> dict[str, float]:
+    area, parts = entry["sheet_area"], entry["parts_area"]
+    return {
+        "sheets": entry["sheets"],
+        "sheet_area": round(area, 3),
+        "waste": round(area - parts, 3),
+        "density": round(parts / area, 4),
+    }
+
+
 def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, ...]:
-    use = film_use(sheets)
+    use = _film_use(sheets)
     layers: dict[Film, list[Layer]] = {}
     for layer in laminate.layers:
         layers.setdefault(layer.film, []).append(layer)
@@ -236,17 +494,17 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, 
             material=film.material,
             product=film.product,
             thickness=film.thickness,
-            layers=len(own),
-            area=round(sum(layer.profile.area for layer in own), 6),
+            layers=len(stack),
+            area=round(sum(layer.profile.area for layer in stack), 6),
             **use.get(film.material, {}),
         )
-        for film, own in layers.items()
+        for film, stack in layers.items()
     )
 
 
-def _layer(planned: Planned, layer: Layer) -> LayerClaim:
-    kerf = planned.settings.kerf_width(layer.film.material)
-    bores = planned.checked.laminate.bores
+def _layer(plan: DesignPlan, layer: Layer) -> LayerClaim:
+    kerf = plan.settings.kerf_width(layer.film.material)
+    bores = plan.checked.laminate.bores
     return LayerClaim(
         index=layer.index,
         name=layer.name,
@@ -255,7 +513,7 @@ def _layer(planned: Planned, layer: Layer) -> LayerClaim:
         balloon=layer.balloon,
         thickness=layer.film.thickness,
         z=layer.z,
-        file=layer_path(layer.name, kerf) if "cut" in planned.wanted else None,
+        file=layer_path(layer.name, kerf) if "cut" in plan.wanted else None,
         pattern=layer.pattern,
         area=round(layer.profile.area, 6),
         pieces=len(layer.profile.pieces),
@@ -279,27 +537,27 @@ def _interface(interface: Interface) -> InterfaceClaim:
 
 
 def file_hashes(folder: Path) -> dict[str, str]:
-    """sha256 of every file of a folder, by relative path."""
+    """Return the sha256 of every file of a folder, by relative path."""
     return {name: file_hash(folder / name) for name in file_names(folder)}
 
 
 def file_names(folder: Path) -> list[str]:
-    """The relative paths of all files of a folder."""
+    """Return the relative paths of all files of a folder."""
     paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return [path.relative_to(folder).as_posix() for path in paths]
 
 
 def file_hash(path: Path) -> str:
-    """sha256 of what a file holds."""
+    """Return the sha256 of a file's contents."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def identity(design: Design, waived: Sequence[str]) -> dict[str, Any]:
-    """What a manifest says of the design and version that its files are of."""
+    """Return the manifest's keys that identify the design and version of its files."""
     sha256 = design_sha256(design)
     return {"design_sha256": sha256, "generator": GENERATOR, "waived": list(waived)}
 
 
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Whether files of the old run still belong to the new one's design and version."""
+    """True if files of the old run belong to the new one's design and version."""
     return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))

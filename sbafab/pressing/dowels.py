@@ -1,4 +1,4 @@
-"""Dowel pins as they are sold, and how deep they sit in the base plate.
+"""Dowel pins as they are sold, their seats in the base plate, and its holes.
 
 A pin stands on the shoulder of its hole: loose or tight, it can neither fall through nor be driven
 too deep, and its height over the plate is its length less the hole's depth. A narrower hole leads
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.errors import DesignError
-from sbafab.laminate.base_plate import MAKINGS, PlateMachine
+from sbafab.laminate.base_plate import HOLE_PROCESSES, PlateMachine
 from sbafab.laminate.laminate import Pin
 
 Standard = Literal["ISO 8734", "ISO 2338"]
@@ -70,20 +70,22 @@ PLATES = (6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 """Thicknesses in which plate is sold, mm."""
 SEAT = 1.5
 LEAST_SEAT = 2.0
-"""A pin stands straight with this many diameters of it, and this many mm, in the plate: ours."""
+"""Least length of a pin in the plate, in diameters and in mm, that keeps it straight: ours."""
 LENGTH_TOLERANCES = ((10.0, 0.25), (50.0, 0.5), (math.inf, 0.75))
-"""By how much a pin may be shorter or longer than its length, up to each length, mm: ISO 2338 and
-8734 (from memory: neither was opened; DIN 7, which came before, gives 0 to +0.3, +0.5 and +0.8)."""
+"""Tolerance +- of a pin's length, up to each length, mm: ISO 2338 and 8734 (from memory: neither
+was opened; DIN 7, which came before, gives 0 to +0.3, +0.5 and +0.8).
+"""
 DEPTH_TOLERANCES = ((6.0, 0.05), (30.0, 0.1), (math.inf, 0.15))
-"""The same of the depth of a hole's shoulder, up to each depth, mm: ISO 2768-1, fine."""
+"""Tolerance +- of the depth of a hole's shoulder, up to each depth, mm: ISO 2768-1, fine."""
 STEP = 0.05
 """Depths of shoulders are multiples of this, mm."""
 FLOOR = 1.0
-"""What is left of the plate under a shoulder, mm at least: ours."""
+"""Least thickness of the plate under a shoulder, mm: ours."""
 PUSH_OUT = 0.6
 """Diameter of the hole through which a pin is pushed out, in diameters of the pin: its end, which
-the chamfer narrows to 0.85 or more, rests on what is left."""
-SAME = 1e-6
+the chamfer narrows to 0.85 or more, rests on the shoulder round it.
+"""
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -120,17 +122,17 @@ class PinHole:
 
 
 def chamfer(diameter: float) -> float:
-    """By how much a pin stands over a stack, mm: the chamfer alone holds no film."""
+    """Return the least height of a pin over its stack, mm: the chamfer alone holds no film."""
     return CHAMFERS.get(round(diameter, 6), round(diameter / 5, 3))
 
 
 def length_tolerance(length: float) -> float:
-    """Return by how much a pin may be shorter or longer than its length, mm."""
+    """Return the tolerance +- of a pin's length, mm."""
     return next(most for limit, most in LENGTH_TOLERANCES if length <= limit)
 
 
 def depth_tolerance(depth: float) -> float:
-    """Return by how much a shoulder may lie higher or lower than its depth, mm."""
+    """Return the tolerance +- of a shoulder's depth, mm."""
     return next(most for limit, most in DEPTH_TOLERANCES if depth <= limit)
 
 
@@ -140,21 +142,22 @@ def push_out(diameter: float) -> float:
 
 
 def is_sold(diameter: float, standard: Standard) -> bool:
-    """Whether the standard has pins of this diameter."""
-    return any(abs(diameter - known) < SAME for known in RANGES[standard])
+    """Return True if the standard has pins of this diameter."""
+    return any(abs(diameter - sold) < ROUNDING for sold in RANGES[standard])
 
 
 def lengths_sold(
-    diameter: float, standard: Standard, own: Sequence[float] = ()
+    diameter: float, standard: Standard, stock: Sequence[float] = ()
 ) -> tuple[float, ...]:
-    """Lengths in mm, shortest first: ``own`` if given, else the standard's for the diameter.
+    """Return lengths in mm, shortest first: ``stock`` if given, else the standard's for the
+    diameter.
 
     A diameter that the standard does not have gets the whole series.
     """
-    if own:
-        return tuple(sorted(own))
+    if stock:
+        return tuple(sorted(stock))
     low, high = next(
-        (span for known, span in RANGES[standard].items() if abs(known - diameter) < SAME),
+        (span for sold, span in RANGES[standard].items() if abs(sold - diameter) < ROUNDING),
         (SERIES[0], SERIES[-1]),
     )
     return tuple(float(length) for length in SERIES if low <= length <= high)
@@ -167,7 +170,7 @@ def least_seat(diameter: float) -> float:
 def settings_by_step(
     steps: Sequence[tuple[float, Sequence[Pin]]],
     standard: Standard,
-    own: Sequence[float] = (),
+    stock: Sequence[float] = (),
     plate: float | None = None,
 ) -> list[tuple[PinSetting, ...]]:
     """Return the pins of every step, given the height of its stack's top over the plate in mm, all
@@ -187,7 +190,7 @@ def settings_by_step(
             first.setdefault(pin.diameter, pin.name)
     choices = {
         diameter: _choices(
-            first[diameter], diameter, heights, lengths_sold(diameter, standard, own)
+            first[diameter], diameter, heights, lengths_sold(diameter, standard, stock)
         )
         for diameter, heights in tops.items()
     }
@@ -199,7 +202,7 @@ def settings_by_step(
 
 
 class _Choice(NamedTuple):
-    """A depth of holes, their pins' length by height of stack, and the most that one stands out."""
+    """Depth of holes, pin lengths by height of stack, and the largest height over a stack."""
 
     depth: float
     lengths: Mapping[float, float]
@@ -221,16 +224,16 @@ def _setting(pin: Pin, height: float, choice: _Choice) -> PinSetting:
 def _choices(
     pin: str, diameter: float, tops: Sequence[float], sold: Sequence[float]
 ) -> list[_Choice]:
-    """Depths with which some pin stands no higher than it must over one of the stacks."""
+    """Return depths with which some pin stands no higher than it must over a stack."""
     needs = {top: top + chamfer(diameter) for top in tops}
     seat = least_seat(diameter)
     depths = {
-        _down(length - length_tolerance(length) - depth_tolerance(length) - need)
+        _rounded_down(length - length_tolerance(length) - depth_tolerance(length) - need)
         for need in needs.values()
         for length in sold
     }
-    found = []
-    for depth in sorted(depth for depth in depths if depth >= seat - SAME):
+    choices = []
+    for depth in sorted(depth for depth in depths if depth >= seat - ROUNDING):
         lengths = {
             top: length
             for top, need in needs.items()
@@ -239,59 +242,59 @@ def _choices(
         }
         if len(lengths) == len(needs):
             out = max(length - depth - top for top, length in lengths.items())
-            found.append(_Choice(depth, lengths, round(out, 6)))
-    if not found:
+            choices.append(_Choice(depth, lengths, round(out, 6)))
+    if not choices:
         highest = max(needs.values())
         raise DesignError(
             f"the pin {pin} (diameter {diameter:g}) must be at least "
-            f"{_needed(seat, highest):.3f} mm long for a stack {max(tops):.3f} mm high, the "
+            f"{_needed_length(seat, highest):.3f} mm long for a stack {max(tops):.3f} mm high, the "
             "tolerances of pin and hole counted, and "
             f"the longest there is has {sold[-1]:g}; give a longer one in registration.pin_lengths"
         )
-    return found
+    return choices
 
 
-def _down(depth: float) -> float:
-    """The multiple of ``STEP`` at or below a depth, so that pins never stand lower for it."""
-    return round(math.floor(depth / STEP + SAME) * STEP, 6)
+def _rounded_down(depth: float) -> float:
+    """Return a multiple of ``STEP`` at or below a depth: pins never stand lower for it."""
+    return round(math.floor(depth / STEP + ROUNDING) * STEP, 6)
 
 
 def _shortest(sold: Sequence[float], depth: float, need: float) -> float | None:
-    """The shortest pin that surely stands ``need`` mm over the plate; None where none does."""
+    """Return the shortest pin that surely stands ``need`` mm over the plate, or None."""
     off = depth_tolerance(depth)
-    return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - SAME), None)
+    return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - ROUNDING), None)
 
 
-def _needed(seat: float, need: float) -> float:
+def _needed_length(seat: float, need: float) -> float:
     least = seat + depth_tolerance(seat) + need
     return next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)
 
 
-def _thickness(choices: Mapping[float, Sequence[_Choice]], asked: float | None) -> float:
-    """The plate's thickness in mm: as asked, or the thinnest sold that takes every pin's seat."""
+def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | None) -> float:
+    """Return the plate's thickness in mm: as set, or the thinnest that takes every seat."""
     least = max((every[0].depth for every in choices.values()), default=0.0) + FLOOR
     if not choices:
         least = 0.0
-    if asked is None:
-        sold = (plate for plate in PLATES if plate >= least - SAME)
+    if thickness is None:
+        sold = (plate for plate in PLATES if plate >= least - ROUNDING)
         return next(sold, float(math.ceil(least)))
-    if asked < least - SAME:
+    if thickness < least - ROUNDING:
         raise DesignError(
-            f"press.plate_thickness = {asked:g} is thinner than the {least:g} mm that a pin's hole "
-            f"takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
+            f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's "
+            f"hole takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
             "pins in registration.pin_lengths"
         )
-    return asked
+    return thickness
 
 
 def _best(choices: Sequence[_Choice], plate: float) -> _Choice:
-    """Of the depths that the plate takes the one with which the pins stand out least."""
-    fitting = [choice for choice in choices if choice.depth + FLOOR <= plate + SAME]
+    """Return the depth, of those that the plate takes, with which the pins stand out least."""
+    fitting = [choice for choice in choices if choice.depth + FLOOR <= plate + ROUNDING]
     return min(fitting, key=lambda choice: (choice.out, choice.depth))
 
 
 def shortest_in(
-    setting: PinSetting, top: float, standard: Standard, own: Sequence[float] = ()
+    setting: PinSetting, top: float, standard: Standard, stock: Sequence[float] = ()
 ) -> PinSetting:
     """Return the shortest pin that stands over a lower stack in the hole of a setting.
 
@@ -300,8 +303,8 @@ def shortest_in(
     depth, least = setting.seat_mm, top + chamfer(setting.diameter_mm)
     length = next(
         length
-        for length in (*lengths_sold(setting.diameter_mm, standard, own), setting.length_mm)
-        if length - length_tolerance(length) - depth - depth_tolerance(depth) >= least - SAME
+        for length in (*lengths_sold(setting.diameter_mm, standard, stock), setting.length_mm)
+        if length - length_tolerance(length) - depth - depth_tolerance(depth) >= least - ROUNDING
     )
     return replace(
         setting,
@@ -333,7 +336,7 @@ def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
 def hole_notes(
     pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: PlateMachine
 ) -> tuple[str, ...]:
-    """Return what a shop must know of the plate's holes, a line each, in letters a plotter has.
+    """Return the notes on the plate's holes for a workshop, a line each, in letters a plotter has.
 
     ``pins`` are all of a laminate; those that no step uses need no shoulder. The only pin of a
     plate needs no more than a reamed hole, wherever it is.
@@ -342,7 +345,7 @@ def hole_notes(
         (pin.diameter, replace(holes[pin.name], pin="") if pin.name in holes else None)
         for pin in sorted(pins, key=lambda pin: pin.diameter)
     )
-    making = MAKINGS[machine]
+    making = HOLE_PROCESSES[machine]
     fit = "lapped to its pins m6" if making.is_lapped and len(pins) > 1 else "H7"
     lines = [
         f"D{diameter:g} {fit}, from above {hole.depth:g} +-{hole.tolerance:g} deep, flat; "
@@ -356,9 +359,9 @@ def hole_notes(
     return tuple(lines)
 
 
-def plate_thickness(asked: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:
-    """Return the base plate's thickness in mm: as asked, or the thinnest sold under every seat."""
-    if asked is not None:
-        return asked
+def plate_thickness(thickness: float | None, settings: Sequence[Sequence[PinSetting]]) -> float:
+    """Return the base plate's thickness in mm: as set, or the thinnest under every seat."""
+    if thickness is not None:
+        return thickness
     deepest = max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0)
-    return next((p for p in PLATES if p >= deepest - SAME), float(math.ceil(deepest)))
+    return next((p for p in PLATES if p >= deepest - ROUNDING), float(math.ceil(deepest)))

@@ -1,15 +1,17 @@
-"""The heat-press schedule: which layers are pressed together, in what order (paper Sec. 2).
-
-Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
+"""The heat-press schedule: steps, their layers, pins, pressures and minutes, how the plate warms,
+the tacking of registered sheets, and the warnings for the technician.
 """
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple
 
+from sbafab.errors import DesignError
 from sbafab.laminate.assembly import (
     AssemblyStep,
     BondState,
@@ -20,9 +22,9 @@ from sbafab.laminate.assembly import (
     stack_count,
 )
 from sbafab.laminate.base_plate import PlateMachine
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
+from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing import build_up, sheets
+from sbafab.pressing import build_up
 from sbafab.pressing.build_up import (
     BASE_PLATE,
     LAMINATE,
@@ -30,21 +32,175 @@ from sbafab.pressing.build_up import (
     RELEASE,
     UNDERLAY,
     BuildUpPart,
-    Footprint,
     Pad,
+    StackShape,
 )
-from sbafab.pressing.cautions import refuse_temperature, warnings
 from sbafab.pressing.dowels import (
     PinHole,
     PinSetting,
     Standard,
+    is_sold,
     pin_holes,
     plate_thickness,
     settings_by_step,
     shortest_in,
 )
-from sbafab.pressing.heating import Heating, HeatPoint, films_without_minutes, heating
-from sbafab.pressing.words import listed, named
+
+
+def joined_words(words: Sequence[str]) -> str:
+    """Return words as a list: one, two and three."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def layers_in_words(layers: Sequence[int]) -> str:
+    """Return layer indices in words; never 2-3, which a spreadsheet takes for a date."""
+    runs: list[list[int]] = []
+    for index in layers:
+        if runs and index == runs[-1][1] + 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    if not runs:
+        return "none"
+    words = [
+        word
+        for first, last in runs
+        for word in (
+            [f"{first} to {last}"] if last > first + 1 else map(str, range(first, last + 1))
+        )
+    ]
+    return f"layer{'s' if len(layers) > 1 else ''} {joined_words(words)}"
+
+
+# Warming of a cold plate between hot platens: a time-temperature line, first order.
+#
+# The paper states minutes at 135 C (Sec. 2); it does not say when its clock starts, nor what lay
+# between platens and films. Ours: the plate goes in cold, its edge follows T(t) = platen - (platen
+# - start) exp(-t / tau), and the clock starts when the edge reads 5 C less than the platens, or
+# the melting point where that is higher. tau is the bench's own, measured once.
+
+
+ROOM = 20.0
+"""Temperature of plate and films when the press closes, C: ours."""
+CLOCK_SHORTFALL = 5.0
+"""Largest shortfall of the plate's edge behind the platens when the clock starts, C: ours."""
+PATIENCE = 5.0
+"""Time constants after which a first-order plate is within 1 C of its final temperature: ours."""
+MELTING, START, END = "melting point", "clock starts", "clock ends"
+
+
+@dataclass(frozen=True)
+class HeatPoint:
+    """A point of the line: ``edge_c`` of the plate's edge, ``after_constants`` and
+    ``after_minutes`` from closing the press; None where it is not known.
+    """
+
+    point: str
+    edge_c: float | None
+    after_constants: float | None
+    after_minutes: float | None
+
+
+@dataclass(frozen=True)
+class Heating:
+    """Parameters of the time-temperature line. ``melting_c`` is the highest melting point of the
+    structural films, ``time_constant_minutes`` the bench's; None where they are not known.
+    """
+
+    start_c: float
+    platen_c: float
+    melting_c: float | None
+    clock_c: float
+    time_constant_minutes: float | None
+    basis: str
+
+    def constants_to(self, edge_c: float) -> float:
+        """Return the time constants in which the edge of the plate comes to ``edge_c``."""
+        if edge_c <= self.start_c:
+            return 0.0
+        return math.log((self.platen_c - self.start_c) / (self.platen_c - edge_c))
+
+    def edge_after(self, minutes: float) -> float | None:
+        """Return the temperature of the plate's edge so many minutes after the press closed."""
+        tau = self.time_constant_minutes
+        if tau is None:
+            return None
+        return self.platen_c - (self.platen_c - self.start_c) * math.exp(-minutes / tau)
+
+    def line(self, minutes: float | None) -> tuple[HeatPoint, ...]:
+        """Return melting point, start and end of the clock of a step of so many minutes."""
+        points = []
+        if self.melting_c is not None:
+            points.append(self._point(MELTING, self.melting_c))
+        start = self._point(START, self.clock_c)
+        end = None
+        if minutes is not None and start.after_minutes is not None:
+            end = start.after_minutes + minutes
+        edge = None if end is None else self.edge_after(end)
+        after = None if end is None else round(end, 2)
+        return (
+            *points,
+            start,
+            HeatPoint(END, None if edge is None else round(edge, 1), None, after),
+        )
+
+    def _point(self, name: str, edge_c: float) -> HeatPoint:
+        constants = self.constants_to(edge_c)
+        tau = self.time_constant_minutes
+        after = None if tau is None else round(constants * tau, 2)
+        return HeatPoint(name, edge_c, round(constants, 3), after)
+
+
+def heating(laminate: Laminate, press: PressSettings) -> Heating:
+    """Return the warming of the plate; the press must be hotter than its films melt."""
+    films = {layer.film for layer in laminate.layers if not layer.is_mask}
+    melting = [film.softens_above for film in films if film.softens_above is not None]
+    is_known = bool(melting) and not any(
+        film.softens_above is None and not film.stays_solid for film in films
+    )
+    hottest = max(melting) if is_known else None
+    clock = max(press.temperature_c - CLOCK_SHORTFALL, hottest or 0.0)
+    return Heating(
+        start_c=ROOM,
+        platen_c=press.temperature_c,
+        melting_c=hottest,
+        clock_c=clock,
+        time_constant_minutes=press.time_constant,
+        basis=f"estimate, ours: first order from {ROOM:g} C, tau "
+        + (
+            "not measured (press.time_constant)"
+            if press.time_constant is None
+            else f"{press.time_constant:g} min as measured"
+        )
+        + "; the paper states its minutes at 135 C and not when its clock starts",
+    )
+
+
+def unstated_minutes(films: list[Film], press: PressSettings) -> str:
+    """Return the warning that no minutes are stated for these films; empty for none."""
+    if not films:
+        return ""
+    names = [f'"{film.said}"' for film in films]
+    stated = joined_words(
+        [f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for]
+    )
+    return (
+        f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
+        f"{joined_words(names)}; try the bond on a sample at {press.temperature_c:g} C, set "
+        "press.temperature_c, press.pressure_kpa and the press minutes to what held, and name the "
+        "film in press.minutes_for"
+    )
+
+
+def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
+    """Return the structural films of a laminate for which no minutes are stated."""
+    return unstated((layer.film for layer in laminate.layers), press.minutes_for)
+
+
+# The steps: layers pressed together, in their order (paper Sec. 2).
+#
+# Temperatures are C, pressures kPa, forces N, times minutes, lengths mm.
+
 
 TITLES: dict[StepName, str] = {
     "flash_bottom": "Bottom balloon, upper two layers",
@@ -60,7 +216,7 @@ TITLES_OF_SEVERAL = {
     "tack_bottom": "Bottom balloons, their bases tacked on",
     "bond_bottom": "Bottom balloons, each with its base",
 }
-"""Where stacks are pressed beside each other."""
+"""Titles for stacks that are pressed beside each other."""
 
 SNIP = (
     "Snip off the ears along the outline, and the tails of the inlet strips at the tab's end; the "
@@ -74,7 +230,7 @@ HANDLING_MINUTES = 60.0
 
 @dataclass(frozen=True)
 class PressSettings:
-    """What the press is set to; the defaults are the paper's (Sec. 2)."""
+    """Settings of the press; the defaults are the paper's (Sec. 2)."""
 
     temperature_c: float = 135.0
     pressure_kpa: float = 110.0
@@ -106,7 +262,7 @@ class PressSettings:
         return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
 
     def minutes(self, step: StepName) -> float:
-        """How long the press stays closed in a step; tacking is a flash bond."""
+        """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
         return {
             "flash_bottom": self.flash_bottom,
             "tack_bottom": self.flash_bottom,
@@ -168,10 +324,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All steps, the time they take, and what the technician should know beforehand.
+    """All steps, their time, and the warnings for the technician.
 
     The two totals are None where the minutes of a step are; warming up is not in them.
-    ``hands_minutes`` are what the estimate has beside those in the press.
+    ``hands_minutes`` are the estimate's minutes beside those in the press.
     """
 
     steps: tuple[Step, ...]
@@ -181,25 +337,25 @@ class Schedule:
     warnings: tuple[str, ...]
     heating: Heating
     hands_minutes: float
-    tacking: sheets.Tacking | None = None
+    tacking: Tacking | None = None
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
-    """The press steps of a laminate, bottom balloon first.
+    """Return the press steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
     paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
-    that would not bond the films or that one of them or the pad does not stand, and where pad, pins
+    that would not bond the films or is too high for one of them or the pad, and where pad, pins
     or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
     once, one number for each size of cycle, the largest first: they share the force.
     """
     refuse_temperature(laminate, press)
     parts = assembly(laminate)
-    under, *others = (
+    under, *smaller = (
         [build_up.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
     )
-    stacks = [*under, *chain.from_iterable(others)]
+    stacks = [*under, *chain.from_iterable(smaller)]
     pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
     pins = pins_by_step(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
@@ -214,20 +370,20 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
                 pad,
                 plate,
                 stack,
-                own,
-                _under(laminate, part, press),
+                step_pins,
+                _underlay(laminate, part, press),
                 warming,
                 press.minutes(part.name) if has_minutes else None,
             ),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
-        for part, stack, own in zip(parts, under, pins, strict=True)
+        for part, stack, step_pins in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
     tacking = None
     if laminate.panel is not None:
         low = tack_pins(laminate, press)
-        tacking = sheets.tacking(laminate, press.tack, press.temperature_c, plate, low)
+        tacking = tacking_of(laminate, press.tack, press.temperature_c, plate, low)
     hands = HANDLING_MINUTES + (0.0 if tacking is None else tacking.total_minutes)
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     return Schedule(
@@ -253,7 +409,10 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
         heights = [max(heights)] * len(heights)
     return settings_by_step(
         [
-            (round(height + _under(laminate, part, press) + press.release_thickness, 6), part.pins)
+            (
+                round(height + _underlay(laminate, part, press) + press.release_thickness, 6),
+                part.pins,
+            )
             for height, part in zip(heights, parts, strict=True)
         ],
         press.pin_standard,
@@ -264,7 +423,7 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
 
 def tack_pins(laminate: Laminate, press: PressSettings) -> tuple[PinSetting, ...]:
     """Return the corner pins for tacks of registered sheets: shorter ones in the same holes."""
-    top = sheets.tack_stack(laminate) + press.release_thickness
+    top = tack_stack(laminate) + press.release_thickness
     return tuple(
         shortest_in(setting, top, press.pin_standard, press.pin_lengths)
         for setting in pins_by_step(laminate, press)[0]
@@ -277,12 +436,12 @@ def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
     return pin_holes([*pins_by_step(laminate, press), *tacks])
 
 
-def _under(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
-    """Thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
+def _underlay(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
+    """Return the thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
 
-def _tacked(tacking: sheets.Tacking | None) -> str:
+def _tacked(tacking: Tacking | None) -> str:
     if tacking is None:
         return ""
     return (
@@ -292,13 +451,13 @@ def _tacked(tacking: sheets.Tacking | None) -> str:
 
 
 class _Setting(NamedTuple):
-    """Thickness of pad, plate and underlay, mm, what one step's stack and pins are like, how the
-    plate warms and how long it is pressed.
+    """Set-up of one step: thickness of pad, plate and underlay, mm, its stack and pins, the warming
+    of the plate, and the minutes.
     """
 
     pad: float
     plate: float
-    under: Footprint
+    under: StackShape
     pins: tuple[PinSetting, ...]
     underlay: float
     heating: Heating
@@ -306,14 +465,16 @@ class _Setting(NamedTuple):
 
 
 def _step(
-    laminate: Laminate, part: AssemblyStep, press: PressSettings, own: _Setting, after: str
+    laminate: Laminate, part: AssemblyStep, press: PressSettings, setting: _Setting, after: str
 ) -> Step:
     count = stack_count(laminate, part.layers)
-    found = build_up.pressures(press.pressure_kpa, press.platen, press.pad, own.pad, own.under)
+    estimate = build_up.pressures(
+        press.pressure_kpa, press.platen, press.pad, setting.pad, setting.under
+    )
     title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
     words = _instructions(part, count) + after
     if laminate.panel is not None:
-        title, words = sheets.title(part), sheets.instructions(part)
+        title, words = title_of_sheets(part), instructions(part)
     return Step(
         step=part.number,
         title=title,
@@ -325,23 +486,25 @@ def _step(
         pressure_kpa=press.pressure_kpa,
         force_n=round(press.force_n, 1),
         platen_mm=press.platen,
-        minutes=own.minutes,
-        film_kpa=found.film,
-        edge_kpa=found.edge,
-        bond_kpa=found.bond,
-        plate_kpa=found.plate,
-        pressure_basis=build_up.said(press.pressure_kpa, press.pad, own.pad, own.under, found)
-        + _round_pins(press, own),
-        build_up=tuple(_items(press, own, _size(laminate, part))),
-        pin_settings=own.pins,
+        minutes=setting.minutes,
+        film_kpa=estimate.film,
+        edge_kpa=estimate.edge,
+        bond_kpa=estimate.bond,
+        plate_kpa=estimate.plate,
+        pressure_basis=build_up.pressure_basis(
+            press.pressure_kpa, press.pad, setting.pad, setting.under, estimate
+        )
+        + _round_pins(press, setting),
+        build_up=tuple(_items(press, setting, _size(laminate, part))),
+        pin_settings=setting.pins,
         instructions=words,
-        time_temperature=own.heating.line(own.minutes),
+        time_temperature=setting.heating.line(setting.minutes),
     )
 
 
 def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
-    """Extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears included,
-    or of the registered sheets that they are part of.
+    """Return the extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears
+    included, or of the registered sheets that they are part of.
     """
     profiles = [layer.profile for layer in distinct_layers(laminate, part.layers)]
     if laminate.panel is not None:
@@ -350,33 +513,35 @@ def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
     return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
 
-def _round_pins(press: PressSettings, own: _Setting) -> str:
-    beneath = own.under.height + press.release_thickness + own.underlay
-    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in own.pins), default=0.0)
+def _round_pins(press: PressSettings, setting: _Setting) -> str:
+    beneath = setting.under.height + press.release_thickness + setting.underlay
+    out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in setting.pins), default=0.0)
     if not out:
         return ""
     free = build_up.unpressed(press.pressure_kpa, press.pad, out)
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(press: PressSettings, own: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
-    """From the lower platen up; ``size`` in mm is that of the films."""
+def _items(
+    press: PressSettings, setting: _Setting, size: tuple[float, float]
+) -> Iterator[BuildUpPart]:
+    """Yield the build-up from the lower platen up; ``size`` in mm is that of the films."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
     pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
-    yield BuildUpPart(BASE_PLATE, press.plate_material, own.plate, press.platen)
-    if own.underlay:
-        yield BuildUpPart(UNDERLAY, "plain paper, printed", own.underlay, press.platen)
+    yield BuildUpPart(BASE_PLATE, press.plate_material, setting.plate, press.platen)
+    if setting.underlay:
+        yield BuildUpPart(UNDERLAY, "plain paper, printed", setting.underlay, press.platen)
     yield release
-    yield BuildUpPart(LAMINATE, "films of this step", round(own.under.height, 6), size)
+    yield BuildUpPart(LAMINATE, "films of this step", round(setting.under.height, 6), size)
     yield release
-    yield BuildUpPart(PAD, pad, own.pad, press.platen)
+    yield BuildUpPart(PAD, pad, setting.pad, press.platen)
 
 
 def _instructions(part: AssemblyStep, count: int) -> str:
-    """What to do in a step that makes ``count`` stacks beside each other."""
+    """Return the instructions of a step that makes ``count`` stacks beside each other."""
     pins = [pin.name for pin in part.pins]
-    stacks = ", then ".join(named(stack) for stack in part.stacks if stack)
-    on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {listed(pins)}"
+    stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
+    on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {joined_words(pins)}"
     if not part.adds:
         return f"Lay {stacks} down again, with no pin. Press to the full bond and let it cool flat."
     if part.bond == "full":
@@ -387,5 +552,251 @@ def _instructions(part: AssemblyStep, count: int) -> str:
         )
     by = on_pins if pins else "by hand"
     after = "Press to the flash bond" + (" and draw the pins." if pins else ".")
-    own = "a stack" if count == 1 else f"{count} stacks"
-    return f"Lay {stacks} on each other {by}, lowest first, as {own} of their own. {after}"
+    nouns = "a stack" if count == 1 else f"{count} stacks"
+    return f"Lay {stacks} on each other {by}, lowest first, as {nouns} of their own. {after}"
+
+
+# Refusals, and warnings for the technician.
+
+
+PINS_OUT = (
+    "untested: with ears each full bond comes after a flash bond on the pins, and is pressed "
+    "without them; that the flash bond keeps the layers in register was not tried on a bench"
+)
+PINS_IN = (
+    "untested: the ears' pins stay in through the full bonds, where molten TPE can grip them; put "
+    "a release sleeve on each or coat it with a release agent, and try it on a sample first"
+)
+
+HOTTEST_TRIED = 150.0
+PRESSURES_TRIED = (70.0, 200.0)
+
+
+def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        melts = not film.is_mask and film.softens_above is not None
+        if melts and press.temperature_c <= (film.softens_above or 0.0):
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} does not bond {film.product}, "
+                f"which melts at {film.softens_above:g} C; raise it (the paper presses at 135 C)"
+            )
+        if film.material == "PTFE" and press.temperature_c >= film.limit:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} reaches the limit of the masks, "
+                f"{film.limit:g} C for {film.product}; lower it, for hotter PTFE gives off toxic "
+                "fumes"
+            )
+        if film.material not in FIRST and press.temperature_c >= film.limit:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
+                f"{film.material}, {film.limit:g} C for {film.product}; lower it"
+            )
+    limit = press.carrier_limit
+    if laminate.panel is not None and limit is not None and press.temperature_c >= limit:
+        raise DesignError(
+            f"press.temperature_c = {press.temperature_c:g} reaches panel.carrier_limit_c = "
+            f"{limit:g}, what the transfer film stands that is pressed with the masks; take another"
+        )
+    for interface in laminate.interfaces:
+        below, above = interface.below, interface.above
+        if below.film.stays_solid and above.film.stays_solid:
+            roles = " or the ".join(dict.fromkeys((below.role, above.role)))
+            raise DesignError(
+                f"layers {below.index} and {above.index} are of {below.film.material} and "
+                f"{above.film.material}, which both stay solid in the press and do not bond; give "
+                f"the {roles} another film in [layup]"
+            )
+    if press.temperature_c > build_up.PAD_LIMIT_C:
+        raise DesignError(
+            f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
+            f"{press.pad.material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
+        )
+
+
+def warnings(
+    laminate: Laminate,
+    press: PressSettings,
+    parts: Sequence[AssemblyStep],
+    steps: Sequence[Step],
+) -> Iterator[str]:
+    if laminate.panel is not None:
+        yield UNTRIED
+        if press.carrier_limit is None:
+            yield (
+                "nobody stated what temperature the transfer film of the masks stands; it is "
+                f"pressed at {press.temperature_c:g} C (panel.carrier_limit_c)"
+            )
+    yield from _unknown_films(laminate, press)
+    if press.temperature_c > HOTTEST_TRIED:
+        yield (
+            f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
+            "which already over-melted more than 135 C does"
+        )
+    low, high = PRESSURES_TRIED
+    if not low <= press.pressure_kpa <= high:
+        yield (
+            f"{press.pressure_kpa:g} kPa lies outside {low:g} to {high:g} kPa; 110 kPa is "
+            "validated, and earlier work pressed at 70 kPa"
+        )
+    if laminate.balloons > press.validated_balloons:
+        yield (
+            f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
+            "heat must pass the whole laminate, so try the bond on a sample first"
+        )
+    uneven = [step for step in steps if not low <= step.film_kpa <= high]
+    if uneven and low <= press.pressure_kpa <= high:
+        worst = max(uneven, key=lambda step: abs(step.film_kpa - press.pressure_kpa))
+        yield (
+            f"step {worst.step}: the films get about {worst.film_kpa:.0f} kPa (estimate), outside "
+            f"{low:g} to {high:g} kPa; take a thicker or softer pad (press.pad_thickness, "
+            "press.pad_hardness)"
+        )
+    if laminate.registration == "ears" and laminate.pins:
+        yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
+    pad = next(item.thickness_mm for item in steps[0].build_up if item.part == build_up.PAD)
+    if (pile := build_up.pad_sheets(pad)) > 1:
+        yield (
+            f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
+            "slide aside: hold it in a frame, and see whether the press opens so far"
+        )
+    unsold = {
+        pin.diameter for pin in laminate.pins if not is_sold(pin.diameter, press.pin_standard)
+    }
+    if unsold and not press.pin_lengths:
+        yield (
+            f"{press.pin_standard} has no dowel pin of diameter "
+            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}: change the "
+            "diameter, or make the pins and give their lengths in registration.pin_lengths"
+        )
+    for step, part in zip(steps, parts, strict=True):
+        if step.bond == "flash" and (layers := _unpinned(laminate, part)):
+            which = layers_in_words(layers) if len(layers) < 4 else _by_role(laminate, layers)
+            yield f"step {step.step}: no pin holds {which}; align by hand"
+
+
+def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
+    """Yield warnings of films without stated minutes or melting point."""
+    if words := unstated_minutes(films_without_minutes(laminate, press), press):
+        yield words
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        if not film.is_mask and film.softens_above is None and not film.stays_solid:
+            yield (
+                f"no melting point of {film.product} is known, so nobody has checked that "
+                f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
+            )
+
+
+def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
+    """Return the layers that join in a step, or in a bonded stack, without a pin."""
+    pinned = {
+        layer.pattern
+        for layer in distinct_layers(laminate, part.layers)
+        if not set(part.pins).isdisjoint(laminate.pins_holding(layer))
+    }
+    bodies: list[tuple[int, ...]] = [(index,) for index in part.adds]
+    bodies += [stack for stack in part.stacks if set(stack).isdisjoint(part.adds)]
+    loose = [b for b in bodies if pinned.isdisjoint(laminate.layer(i).pattern for i in b)]
+    return sorted(index for body in loose for index in body)
+
+
+def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
+    counts = Counter(laminate.layer(index).role for index in layers)
+    return joined_words([f"the {count} {role}s" for role, count in counts.items()])
+
+
+# Registered sheets and their tacking; no bench has tried it.
+
+
+UNTRIED = (
+    "no bench has tried registered sheets; the times are the paper's for single parts, so try one "
+    "copy of two balloons first"
+)
+CUT_FREE = (
+    "Draw the pins. Lay the second cut by the fiducials and cut the bridges: the actuators come "
+    "out, and the sheets round them come off."
+)
+
+
+def title_of_sheets(part: AssemblyStep) -> str:
+    """Return the title of a step in which whole sheets are pressed."""
+    return "All sheets but the cap's" if part.bond == "flash" else "The whole stack of sheets"
+
+
+def instructions(part: AssemblyStep) -> str:
+    """Return the instructions for the sheets in a step."""
+    if part.bond == "full":
+        return (
+            f"Lay the sheet of layer {part.adds[-1]} on its pins over the stack. Press to the full "
+            f"bond and let the stack cool flat. {CUT_FREE}"
+        )
+    return (
+        f"Stack the sheets of layers {part.layers[0]} to {part.layers[-1]} on the corner pins, "
+        "lowest first, every film with its masks tacked on. Press to the flash bond; the stack "
+        "stays on its pins."
+    )
+
+
+TOUCH = 40.0
+"""Temperature of a plate that can be touched, C."""
+STEEL = 3.8e6
+"""Heat capacity of a base plate, J/(m3 K): 7,850 kg/m3 of steel with 490 J/(kg K)."""
+CONTACT, AIR = 500.0, 10.0
+"""W/(m2 K): from a platen into a plate that lies dry on it, and from each face of a plate into
+still air. Handbook orders, ours: neither was measured in a press."""
+
+
+@dataclass(frozen=True)
+class Tacking:
+    """Tacking of masks to their films: so many sheets, each by itself, on a plate that goes in
+    cold and is cooled again. Minutes are those of one sheet; ``pins`` are the corner pins' then.
+    """
+
+    sheets: int
+    warm_minutes: float
+    press_minutes: float
+    cool_minutes: float
+    stack_mm: float
+    pins: tuple[PinSetting, ...]
+    basis: str
+
+    @property
+    def each_minutes(self) -> float:
+        """Minutes of one sheet, from cold to cold."""
+        return self.warm_minutes + self.press_minutes + self.cool_minutes
+
+    @property
+    def total_minutes(self) -> float:
+        """Minutes of all sheets, one after the other on one plate."""
+        return self.sheets * self.each_minutes
+
+
+def tack_stack(laminate: Laminate) -> float:
+    """Return the largest height in mm of a film with its mask, the transfer film left out."""
+    masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
+    films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
+    return round(max(films) + max(masks), 6)
+
+
+def tacking_of(
+    laminate: Laminate, minutes: float, platen_c: float, plate: float, pins: tuple[PinSetting, ...]
+) -> Tacking:
+    """Return the tacking of the masks of registered sheets, on a base plate ``plate`` mm thick.
+
+    First order: a plate that heat reaches through one face, and leaves through both.
+    """
+    heat = STEEL * plate / 1000
+    warm = heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60
+    cool = heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60
+    return Tacking(
+        sheets=sum(layer.is_mask for layer in laminate.layers),
+        warm_minutes=round(warm, 1),
+        press_minutes=minutes,
+        cool_minutes=round(cool, 1),
+        stack_mm=tack_stack(laminate),
+        pins=pins,
+        basis=(
+            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to "
+            f"{CLOCK_SHORTFALL:g} C short of the platen with {CONTACT:g} W/(m2 K), and in still "
+            f"air down to {TOUCH:g} C with {AIR:g} W/(m2 K) from each face; not measured"
+        ),
+    )

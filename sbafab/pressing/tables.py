@@ -1,4 +1,4 @@
-"""The schedule as ``press.json`` and ``press.csv`` hold it."""
+"""The schedule as ``press.json`` and ``press.csv``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.heating import HeatPoint
-from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.words import named
+from sbafab.pressing.schedule import HeatPoint, Schedule, layers_in_words
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"
@@ -39,7 +37,7 @@ COLUMNS = (
 
 
 def press_json(plan: Schedule) -> dict[str, Any]:
-    """The schedule as ``press.json`` holds it."""
+    """Return the content of ``press.json``."""
     return {
         "schema": PRESS_SCHEMA,
         "steps": [_plain(asdict(step)) for step in plan.steps],
@@ -54,14 +52,14 @@ def press_json(plan: Schedule) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Tuples as lists, as JSON has them, at every depth."""
+    """Return a value with tuples as lists, as in JSON, at every depth."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, tuple | list) else value
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, tuple | list) else value
 
 
 def press_csv(plan: Schedule) -> str:
-    """The steps as a table, one row each, with units in the column names."""
+    """Return the steps as a table, one row each, with units in the column names."""
     rows: list[Sequence[object]] = [COLUMNS]
     for step in plan.steps:
         rows.append(
@@ -69,8 +67,8 @@ def press_csv(plan: Schedule) -> str:
                 step.step,
                 step.title,
                 step.bond,
-                named(step.layers),
-                named(step.adds),
+                layers_in_words(step.layers),
+                layers_in_words(step.adds),
                 ", ".join(step.pins),
                 f"{step.temperature_c:g}",
                 f"{step.pressure_kpa:g}",
@@ -92,7 +90,7 @@ def press_csv(plan: Schedule) -> str:
 
 
 def heat_words(point: HeatPoint) -> str:
-    """Return one point of the time-temperature line as the table has it."""
+    """Return one point of the time-temperature line as in the table."""
     edge = "" if point.edge_c is None else f", {point.edge_c:g} C"
     after = "" if point.after_constants is None else f", after {point.after_constants:g} tau"
     minutes = "" if point.after_minutes is None else f", {point.after_minutes:g} min"
@@ -100,7 +98,7 @@ def heat_words(point: HeatPoint) -> str:
 
 
 def pin_words(pin: PinSetting) -> str:
-    """One pin as the table and the page name it."""
+    """Return one pin as in the table and on the page."""
     return (
         f"{pin.pin}: {pin.diameter_mm:g} x {pin.length_mm:g} mm, {pin.seat_mm:g} in the plate, "
         f"stands {pin.stands_mm:g} +- {pin.tolerance_mm:g}"

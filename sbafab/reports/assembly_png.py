@@ -8,11 +8,8 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.colours import RGB, colours
-from sbafab.assemblies.shapes import placed_surface
-from sbafab.reports.canvas import INK
-from sbafab.reports.depth import Buffer, seen, view_of
-from sbafab.reports.length_bar import draw_length_bar
+from sbafab.assemblies.shapes import RGB, colours, placed_surface
+from sbafab.reports.canvas import INK, Buffer, draw_length_bar, rasterize, view_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,13 +38,13 @@ def assembly_png(
 def assembly_pngs(
     assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
 ) -> tuple[bytes, bytes]:
-    """The same, and once more without caption and legend, for a page that says those itself."""
+    """Return that picture, and one without caption and legend for a page that has its own."""
     surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
     # What lies inside a tube shows through nothing: no part is transparent.
     size = width * ENLARGED, height * ENLARGED
     box = MARGIN * size[0], MARGIN * size[1], (1 - MARGIN) * size[0], (1 - MARGIN - FOOT) * size[1]
     view = view_of(surfaces, ELEVATION, AZIMUTH, box)
-    buffer = seen(surfaces, view, *size, _unit(LAMP))
+    buffer = rasterize(surfaces, view, *size, _unit(LAMP))
     paints = colours(assembled)
     picture = _coloured(buffer, [paints[placed.name] for placed in assembled.parts])
     picture = picture.reduce(ENLARGED)
@@ -95,25 +92,25 @@ def _coloured(buffer: Buffer, paints: Sequence[RGB]) -> Image:
 def _edges(buffer: Buffer) -> NDArray[np.bool_]:
     import numpy as np
 
-    found = np.zeros(buffer.body.shape, dtype=bool)
+    edges = np.zeros(buffer.body.shape, dtype=bool)
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
     for axis in (0, 1):
-        other = np.diff(buffer.body, axis=axis) != 0
+        border = np.diff(buffer.body, axis=axis) != 0
         step = np.abs(np.diff(depth, axis=axis)) > STEP_MM
-        edge = other | step
-        found[tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))] |= edge
-    return found
+        edge = border | step
+        edges[tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))] |= edge
+    return edges
 
 
 def _legend(assembled: Assembled, paints: Mapping[str, RGB]) -> list[tuple[RGB, str]]:
     """A line a colour: the parts that have it, and what they are."""
     lines: dict[tuple[RGB, str], list[str]] = {}
     for placed in assembled.parts:
-        what = placed.part.kind if placed.made is None else placed.made.design.name
-        lines.setdefault((paints[placed.name], what), []).append(placed.name)
+        kind = placed.part.kind if placed.made is None else placed.made.design.name
+        lines.setdefault((paints[placed.name], kind), []).append(placed.name)
     return [
-        (colour, ", ".join(names) if [what] == names else f"{', '.join(names)} ({what})")
-        for (colour, what), names in lines.items()
+        (colour, ", ".join(names) if [kind] == names else f"{', '.join(names)} ({kind})")
+        for (colour, kind), names in lines.items()
     ]
 
 
@@ -126,16 +123,16 @@ def _write(
     size = max(10, round(height / 46))
     font = ImageFont.load_default(size)
     draw = ImageDraw.Draw(picture)
-    left = round(0.03 * width)
-    x, y = left, height - 2 * size
+    margin = round(0.03 * width)
+    x, y = margin, height - 2 * size
     for colour, words in legend:
         needed = round(3.4 * size + draw.textlength(words, font=font))
-        if x + needed > width - left:
-            x, y = left, y - round(1.5 * size)
+        if x + needed > width - margin:
+            x, y = margin, y - round(1.5 * size)
         draw.rectangle((x, y, x + 1.5 * size, y + size), fill=colour, outline=INK)
         draw.text((x + 2 * size, y - 0.1 * size), words, fill=INK, font=font)
         x += needed
     y -= round(2 * size)
-    draw.text((left, y), caption, fill=INK, font=font)
+    draw.text((margin, y), caption, fill=INK, font=font)
     y += round(0.6 * size)
-    draw_length_bar(draw, width - left, y, width / 4, pixels_per_mm, font)
+    draw_length_bar(draw, width - margin, y, width / 4, pixels_per_mm, font)

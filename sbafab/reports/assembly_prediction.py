@@ -1,38 +1,236 @@
-"""What an assembly does inflated: reach, load, grip in its lumen, and what its parts then touch."""
+"""Prediction of an inflated assembly: reach, load, grip in its lumen, contacts between parts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
-from sbafab.design.form import Discs, Slots
-from sbafab.models.choice import REACHED, WIDEST
-from sbafab.models.counterparts import (
-    BALLOON,
-    FLAT_HEIGHT_OF_FILMS,
-    counterpart,
-    counterparts_of_pose,
-)
+from sbafab.design.records import Discs, Slots
+from sbafab.models.figures import REACHED, WIDEST
 from sbafab.models.lens import fullest, rate
+from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart, counterparts_of_pose
 from sbafab.models.stack import Stack, stack
-from sbafab.reports.bent_arms import BentTouch, Clearance, bent_arms
-from sbafab.reports.inflated_parts import (
+from sbafab.reports.inflated import (
     TOUCHING,
     as_it_is,
+    box_gap,
     carried,
     lifted,
-    shared,
+    shared_volume,
     solids,
 )
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sbafab.reports.inflated_parts import Solids
+    from sbafab.models.stack import Pose
+    from sbafab.reports.inflated import Solids
+
+# Contacts and clearances of an arm that some of its chambers bend.
+#
+# Each chamber alone and each two side by side are pressed, the others empty, while every other
+# actuator stands inflated; what stands on the arm goes along with its tip.
+
+
+FARTHEST = 10.0
+"""mm up to which clearances are looked for."""
+SLIGHTEST = 0.1
+"""kPa, the least at which an arm is looked at."""
+HALVINGS = 5
+FOOT = 3
+"""Levels from below that may rest on what the arm stands on."""
+
+
+class Clearance(NamedTuple):
+    """Mm that are left between a bent arm, with what stands on it, and another part."""
+
+    other: str
+    chambers: str
+    gap: float
+
+
+class BentTouch(NamedTuple):
+    """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
+
+    It meets it from about ``from_kpa`` on, bent by ``bend`` degrees.
+    """
+
+    part: str
+    other: str
+    chambers: str
+    volume: float
+    from_kpa: float
+    bend: float
+
+
+class _Around(NamedTuple):
+    """An arm and what is round it: ``carried`` are solids on its top, when it is flat."""
+
+    placed: PlacedSba
+    arm_stack: Stack
+    lift: NDArray[np.float64]
+    carried: Solids
+    surrounding: dict[str, Solids]
+
+
+def bent_arms(
+    assembled: Assembled,
+    placed: PlacedSba,
+    stacks: Mapping[str, Stack],
+    rises: Mapping[str, NDArray[np.float64]],
+    pressure: float,
+    pause: Callable[[], None] = lambda: None,
+) -> Iterator[Clearance | BentTouch]:
+    """Yield for each other part the least clearance, or each way of bending in which the arm meets
+    it.
+
+    ``rises`` is by what each actuator lifts what stands on it. No clearance is given for what the
+    arm stands on and for parts that stay farther away than ``FARTHEST``.
+    """
+    arm_stack = stacks[placed.name]
+    if arm_stack.chambers < 2:
+        return
+    around = _around(assembled, placed, stacks, rises, pressure)
+    nearest: dict[str, Clearance] = {}
+    met = set()
+    for pressed in _ways(arm_stack.chambers):
+        pause()
+        names = " and ".join(placed.made.laminate.chambers[i].name for i in pressed)
+        arm = _moved(around, _bent(arm_stack, pressed, pressure))
+        for part, theirs in around.surrounding.items():
+            volume = shared_volume(arm.beyond(part, placed), theirs)
+            if volume > TOUCHING:
+                met.add(part)
+                first = _first(around, part, pressed, pressure)
+                yield BentTouch(
+                    placed.name, part, names, volume, first.pressures[pressed[0]], first.bend
+                )
+                continue
+            if part == placed.part.on:
+                continue
+            gap = _gap(arm.beyond(part, placed), theirs)
+            if gap < min(FARTHEST, nearest[part].gap if part in nearest else FARTHEST):
+                nearest[part] = Clearance(part, names, gap)
+    yield from (clearance for part, clearance in nearest.items() if part not in met)
+
+
+def _ways(chambers: int) -> list[tuple[int, ...]]:
+    """Return the sets of chambers that are pressed: each alone, and each two side by side."""
+    alone: list[tuple[int, ...]] = [(i,) for i in range(chambers)]
+    return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
+
+
+def _bent(arm_stack: Stack, pressed: Sequence[int], pressure: float) -> Pose:
+    return arm_stack.pose(
+        tuple(pressure if i in pressed else 0.0 for i in range(arm_stack.chambers))
+    )
+
+
+def _around(
+    assembled: Assembled,
+    placed: PlacedSba,
+    stacks: Mapping[str, Stack],
+    rises: Mapping[str, NDArray[np.float64]],
+    pressure: float,
+) -> _Around:
+    moving = carried(assembled, placed.name)
+    lift = lifted(assembled, placed, rises)
+    on_top: Solids = []
+    surrounding = {}
+    for part in assembled.parts:
+        if part.name == placed.name or part.part.kind == "line":
+            continue
+        raised = lifted(assembled, part, rises)
+        if part.name in moving:
+            raised = raised - rises[placed.name]
+        if isinstance(part, PlacedSba) and part.name in stacks:
+            part_stack = stacks[part.name]
+            part_solids = solids(
+                part, part_stack, part_stack.pose((pressure,) * part_stack.chambers), raised
+            )
+        else:
+            part_solids = as_it_is(part, raised)
+        if part.name in moving:
+            on_top += part_solids
+        else:
+            surrounding[part.name] = part_solids
+    return _Around(placed, stacks[placed.name], lift, on_top, surrounding)
+
+
+class _Arm(NamedTuple):
+    """A bent arm's solids with those that stand on it; ``foot`` are those of its lowest levels."""
+
+    foot: Solids
+    rest: Solids
+
+    def beyond(self, part: str, placed: PlacedPart) -> Solids:
+        """Return the solids that may meet another part: its foot may rest on what the arm stands
+        on.
+        """
+        return self.rest if part == placed.part.on else self.foot + self.rest
+
+
+def _moved(around: _Around, pose: Pose) -> _Arm:
+    """The bent arm and what stands on it."""
+    places = around.placed.upright(pose.frames[0]) + around.lift
+    levels = (places[1:] + places[:-1]) / 2
+    arm = _Arm([], [])
+    for solid in solids(around.placed, around.arm_stack, pose, around.lift):
+        middle = np.array(solid.bounding_box()).reshape(2, 3).mean(0)
+        level = int(np.linalg.norm(levels - middle, axis=1).argmin())
+        (arm.foot if level < FOOT else arm.rest).append(solid)
+    if not around.carried:
+        return arm
+    # From the flat arm's top to the bent one's, in the arm's own frame, then in the assembly's.
+    tip = np.eye(4)
+    tip[:3, :3] = pose.frames[1][-1]
+    tip[:3, 3] = pose.tip - tip[:3, :3] @ np.array([0.0, 0.0, around.arm_stack.flat_height])
+    frame = _frame(around.placed)
+    frame[:3, 3] += around.lift
+    rows = np.ascontiguousarray((frame @ tip @ np.linalg.inv(frame))[:3])
+    return arm._replace(rest=arm.rest + [solid.transform(rows) for solid in around.carried])
+
+
+def _frame(placed: PlacedPart) -> NDArray[np.float64]:
+    """Matrix (4, 4) of a part's own frame in the assembly's."""
+    corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+    frame = np.eye(4)
+    frame[:3, 3] = corners[0]
+    frame[:3, :3] = (corners[1:] - corners[0]).T
+    return frame
+
+
+def _gap(arm: Solids, theirs: Solids) -> float:
+    """Mm between the nearest two, at most ``FARTHEST``."""
+    least = FARTHEST
+    pairs = ((box_gap(a, b), a, b) for a in arm for b in theirs)
+    for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
+        if boxes >= least:
+            break
+        least = min(least, float(a.min_gap(b, least)))
+    return least
+
+
+def _first(around: _Around, part: str, pressed: Sequence[int], pressure: float) -> Pose:
+    """Return approximately the first pose in which the arm meets another part, on the way to a
+    pressure.
+    """
+    low, high = min(SLIGHTEST, pressure / 2), pressure
+    pose = _bent(around.arm_stack, pressed, high)
+    for _ in range(HALVINGS):
+        middle = math.sqrt(low * high)
+        tried = _bent(around.arm_stack, pressed, middle)
+        arm = _moved(around, tried).beyond(part, around.placed)
+        if shared_volume(arm, around.surrounding[part]) > TOUCHING:
+            high, pose = middle, tried
+        else:
+            low = middle
+    return pose
+
 
 GRAVITY = 9.80665
 MARBLE_G = 1.2
@@ -90,12 +288,12 @@ class AssemblyPrediction(NamedTuple):
 
     def met(self) -> list[str]:
         """Sentences on what inflated parts meet, and what would mend it."""
-        said = [
+        sentences = [
             f"{touch.part} and {touch.other} meet when inflated: they share "
             f"{touch.volume:.2f} mm3; move them apart, or give less pressure"
             for touch in self.touches
         ]
-        said += [
+        sentences += [
             f"press {bent.chambers} of {bent.part} to less than {bent.from_kpa:.2g} kPa, or move "
             f"{bent.other}: from there on, bent by {bent.bend:.0f} degrees, they meet, and at "
             f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3 "
@@ -104,8 +302,8 @@ class AssemblyPrediction(NamedTuple):
         ]
         if not self.touches:
             how = "standing straight" if self.bent_touches else "straight or bent"
-            said.append(f"no inflated part meets another one, {how}")
-        return said
+            sentences.append(f"no inflated part meets another one, {how}")
+        return sentences
 
 
 class Grip(NamedTuple):
@@ -126,7 +324,7 @@ class Grip(NamedTuple):
 
     @property
     def why_none(self) -> str:
-        """Why nothing is told of its hold in the lumen."""
+        """The reason why no hold in the lumen is given."""
         if self.lumen is None:
             return "no lumen is given: set deploy.lumen_diameter"
         if self.deflated >= self.lumen:
@@ -147,7 +345,7 @@ def predict_assembly(
     load_g: float = MARBLE_G,
     pause: Callable[[], None] = lambda: None,
 ) -> AssemblyPrediction:
-    """What the parts do at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
+    """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
 
     ``pause`` is called between parts of the work, which takes seconds; what it raises ends it.
     Raises DesignError for pressures that the models do not reach.
@@ -157,26 +355,29 @@ def predict_assembly(
     left_out: list[str] = []
     bent: list[BentTouch] = []
     stacks = _stacks(assembled)
-    rises = {name: _rise(assembled[name], one, pressure_kpa) for name, one in stacks.items()}
+    rises = {
+        name: _rise(assembled[name], part_stack, pressure_kpa)
+        for name, part_stack in stacks.items()
+    }
     for placed in assembled.parts:
         if not isinstance(placed, PlacedSba):
             continue
         pause()
         pockets = placed.made.design.form.pockets
         if isinstance(pockets, Slots):
-            held = grip(assembled, placed)
-            assert held is not None
-            figures += _held(held, placed.made.design.form.stacks, pressure_kpa, load_g)
-            if held.push is None:
-                left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {held.why_none}")
+            hold = grip(assembled, placed)
+            assert hold is not None
+            figures += _grip_figures(hold, placed.made.design.form.stacks, pressure_kpa, load_g)
+            if hold.push is None:
+                left_out.append(f"{placed.name}, {', '.join(IN_THE_LUMEN)}: {hold.why_none}")
         elif isinstance(pockets, Discs):
             figures += _arm(placed, stacks[placed.name], pressure_kpa, load_g)
             touches += _touches(assembled, placed, stacks, rises, pressure_kpa)
             pause()
             for bend in bent_arms(assembled, placed, stacks, rises, pressure_kpa, pause):
                 if isinstance(bend, Clearance):
-                    what = f"clearance to {bend.other}, bent by {bend.chambers}"
-                    figures.append(AssemblyFigure(placed.name, what, bend.gap, "mm", ELASTIC))
+                    clearance = f"clearance to {bend.other}, bent by {bend.chambers}"
+                    figures.append(AssemblyFigure(placed.name, clearance, bend.gap, "mm", ELASTIC))
                 else:
                     bent.append(bend)
         else:
@@ -194,29 +395,29 @@ def predict_assembly(
     )
 
 
-def as_json(found: AssemblyPrediction) -> dict[str, object]:
-    """The same for programs."""
+def as_json(prediction: AssemblyPrediction) -> dict[str, object]:
+    """Return the prediction as a record for programs."""
     return {
-        **found._asdict(),
-        "figures": [figure._asdict() for figure in found.figures],
-        "touches": [touch._asdict() for touch in found.touches],
-        "bent_touches": [touch._asdict() for touch in found.bent_touches],
+        **prediction._asdict(),
+        "figures": [figure._asdict() for figure in prediction.figures],
+        "touches": [touch._asdict() for touch in prediction.touches],
+        "bent_touches": [touch._asdict() for touch in prediction.bent_touches],
     }
 
 
 def _arm(
-    placed: PlacedSba, found: Stack, pressure: float, load_g: float
+    placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     """Height, reach, bend and load of an actuator with round pockets."""
-    for figure in _figures_of_arm(placed, found, pressure, load_g):
+    for figure in _figures_of_arm(placed, arm_stack, pressure, load_g):
         beside = counterpart(placed.made.design.form, *_as_predicted(figure.name, pressure))
         yield figure._replace(measured=beside.sentence() if beside else "")
 
 
 def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
-    """The figure of a design's own prediction that says the same, and its model."""
+    """Return the name and the model of the same figure in a design's own prediction."""
     at = f"at {pressure:g} kPa"
-    known = {
+    figures = {
         "height, flat": ("deflated height", FLAT_HEIGHT_OF_FILMS),
         "height, inflated": (f"free height {at}", BALLOON),
         "push at 75 % of its stroke": (f"blocked force {at}, at 75 % of full stroke", ELASTIC),
@@ -224,36 +425,36 @@ def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
         "reach of the tip aside": (f"tip aside {at} in one chamber, the others empty", ELASTIC),
     }
     # A sag is a load over a stiffness.
-    return known.get(name, (f"lateral tip stiffness {at}, pressure held", ELASTIC))
+    return figures.get(name, (f"lateral tip stiffness {at}, pressure held", ELASTIC))
 
 
 def _figures_of_arm(
-    placed: PlacedSba, found: Stack, pressure: float, load_g: float
+    placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     name, weight = placed.name, load_g * 1e-3 * GRAVITY
-    every = (pressure,) * found.chambers
-    free = found.pose(every)
-    flat = found.flat_height
+    every = (pressure,) * arm_stack.chambers
+    free = arm_stack.pose(every)
+    flat = arm_stack.flat_height
     yield AssemblyFigure(name, "height, flat", flat, "mm", ELASTIC, "about 1 (Sec. 6)")
     yield AssemblyFigure(name, "height, inflated", free.height, "mm", ELASTIC, "about 20 (Sec. 5)")
-    three_quarters = found.pose(every, plate=flat + 0.75 * (free.height - flat))
+    three_quarters = arm_stack.pose(every, plate=flat + 0.75 * (free.height - flat))
     yield AssemblyFigure(name, "push at 75 % of its stroke", three_quarters.force, "N", ELASTIC)
-    if found.chambers > 1:
-        one = found.pose((pressure, *(0.0,) * (found.chambers - 1)))
-        yield AssemblyFigure(name, "bend by one chamber", one.bend, "deg", ELASTIC)
-        aside = float(np.hypot(*one.tip[:2]))
+    if arm_stack.chambers > 1:
+        single = arm_stack.pose((pressure, *(0.0,) * (arm_stack.chambers - 1)))
+        yield AssemblyFigure(name, "bend by one chamber", single.bend, "deg", ELASTIC)
+        aside = float(np.hypot(*single.tip[:2]))
         yield AssemblyFigure(name, "reach of the tip aside", aside, "mm", ELASTIC)
     if weight > 0:
-        hung = found.pose(every, tip_load=(weight, 0.0, 0.0), near=free)
+        hung = arm_stack.pose(every, tip_load=(weight, 0.0, 0.0), near=free)
         sag = float(np.linalg.norm(hung.tip - free.tip))
-        said = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
+        paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
         yield AssemblyFigure(
-            name, f"sag of the tip, {load_g:g} g across it", sag, "mm", ELASTIC, said
+            name, f"sag of the tip, {load_g:g} g across it", sag, "mm", ELASTIC, paper
         )
 
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
-    """How a radial actuator holds in the assembly's lumen; None for one of another form."""
+    """Return hold of a radial actuator in the assembly's lumen; None for one of another form."""
     form, laminate = placed.made.design.form, placed.made.laminate
     pockets = form.pockets
     if not isinstance(pockets, Slots):
@@ -264,57 +465,61 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     rise, widest = fullest(pockets.width, pockets.run).stroke, 2 * pockets.width / math.pi
     free, most = (deflated + 2 * balloons * high for high in (rise, widest))
     lumen = assembled.assembly.deploy.lumen_diameter
-    found = Grip(placed.name, deflated, free, most, lumen)
+    free_grip = Grip(placed.name, deflated, free, most, lumen)
     if lumen is None:
-        return found
+        return free_grip
     room = (lumen - deflated) / 2 / balloons
     if not 0 < room <= rise:
-        return found
+        return free_grip
     # 1 kPa mm2 is 1 mN.
     push = float(rate(room, pockets.width, pockets.run)) / 1000
-    return found._replace(room=room, push=push)
+    return free_grip._replace(room=room, push=push)
 
 
-def _held(found: Grip, stacks: int, pressure: float, load_g: float) -> Iterator[AssemblyFigure]:
+def _grip_figures(
+    hold: Grip, stacks: int, pressure: float, load_g: float
+) -> Iterator[AssemblyFigure]:
     """Diameter of a radial actuator, and how hard its stacks hold in the assembly's lumen."""
-    name, paper = found.part, "about 28 (Sec. 2.1)"
-    said = (
-        ("diameter, deflated", found.deflated, "films", "15.33 (Sec. 2.1)"),
-        ("diameter, inflated free", found.free, REACHED, paper),
-        ("diameter, inflated at most", found.most, WIDEST, paper),
+    name, paper = hold.part, "about 28 (Sec. 2.1)"
+    diameters = (
+        ("diameter, deflated", hold.deflated, "films", "15.33 (Sec. 2.1)"),
+        ("diameter, inflated free", hold.free, REACHED, paper),
+        ("diameter, inflated at most", hold.most, WIDEST, paper),
     )
-    for what, value, model, paper in said:
-        yield AssemblyFigure(name, what, value, "mm", model, paper)
-    if found.room is None or found.push is None:
+    for diameter, value, model, paper in diameters:
+        yield AssemblyFigure(name, diameter, value, "mm", model, paper)
+    if hold.room is None or hold.push is None:
         return
-    force = pressure * found.push
+    force = pressure * hold.push
     height, push, friction = IN_THE_LUMEN
-    lumen = f"{height} of {found.lumen:g} mm"
-    yield AssemblyFigure(name, lumen, found.room, "mm", STATIC)
+    lumen = f"{height} of {hold.lumen:g} mm"
+    yield AssemblyFigure(name, lumen, hold.room, "mm", STATIC)
     yield AssemblyFigure(name, push, force, "N", LENS, "holds (Sec. 5)")
     if load_g > 0:
         needed = load_g * 1e-3 * GRAVITY / (stacks * force)
-        hold = f"{friction} that holds {load_g:g} g along the lumen"
-        yield AssemblyFigure(name, hold, needed, "", STATIC)
+        needed_friction = f"{friction} that holds {load_g:g} g along the lumen"
+        yield AssemblyFigure(name, needed_friction, needed, "", STATIC)
 
 
 def _stacks(assembled: Assembled) -> dict[str, Stack]:
-    """The stacks of all actuators with round pockets, by part; alike ones are one."""
-    known: dict[int, Stack] = {}
-    found = {}
+    """Return the stacks of all actuators with round pockets, by part; parts of one design share
+    one.
+    """
+    by_design: dict[int, Stack] = {}
+    by_part = {}
     for placed in assembled.parts:
         if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs):
             key = id(placed.made)
-            if key not in known:
-                known[key] = stack(placed.made.design, placed.made.laminate)
-            found[placed.name] = known[key]
-    return found
+            if key not in by_design:
+                by_design[key] = stack(placed.made.design, placed.made.laminate)
+            by_part[placed.name] = by_design[key]
+    return by_part
 
 
-def _rise(placed: PlacedPart, found: Stack, pressure: float) -> NDArray[np.float64]:
-    """By what (3,) in mm an actuator lifts what stands on its top."""
-    free = found.pose((pressure,) * found.chambers)
-    ends = np.array([[0.0, 0.0, found.flat_height], [0.0, 0.0, free.height]])
+def _rise(placed: PlacedPart, part_stack: Stack, pressure: float) -> NDArray[np.float64]:
+    """Return by what (3,) in mm an actuator lifts what stands on its top."""
+    free = part_stack.pose((pressure,) * part_stack.chambers)
+    ends = np.array([[0.0, 0.0, part_stack.flat_height], [0.0, 0.0, free.height]])
     low, high = placed.upright(ends)
     lift: NDArray[np.float64] = high - low
     return lift
@@ -329,23 +534,29 @@ def _touches(
 ) -> Iterator[Touch]:
     """Other parts that an actuator meets when all stand up straight."""
     names = [part.name for part in assembled.parts]
-    own = _upright(placed, stacks[placed.name], pressure, lifted(assembled, placed, rises))
+    solid_parts = _upright(placed, stacks[placed.name], pressure, lifted(assembled, placed, rises))
     moved = carried(assembled, placed.name)
-    for other in assembled.parts:
+    for neighbour in assembled.parts:
         # What stands on it moves along, and what it stands on it touches as it does flat.
-        if other.name in moved or other.name == placed.part.on or other.part.kind == "line":
+        if (
+            neighbour.name in moved
+            or neighbour.name == placed.part.on
+            or neighbour.part.kind == "line"
+        ):
             continue
-        lift = lifted(assembled, other, rises)
-        if isinstance(other, PlacedSba) and other.name in stacks:
-            if names.index(other.name) < names.index(placed.name):
+        lift = lifted(assembled, neighbour, rises)
+        if isinstance(neighbour, PlacedSba) and neighbour.name in stacks:
+            if names.index(neighbour.name) < names.index(placed.name):
                 continue  # each pair once
-            theirs = _upright(other, stacks[other.name], pressure, lift)
+            theirs = _upright(neighbour, stacks[neighbour.name], pressure, lift)
         else:
-            theirs = as_it_is(other, lift)
-        volume = shared(own, theirs)
+            theirs = as_it_is(neighbour, lift)
+        volume = shared_volume(solid_parts, theirs)
         if volume > TOUCHING:
-            yield Touch(placed.name, other.name, volume)
+            yield Touch(placed.name, neighbour.name, volume)
 
 
-def _upright(placed: PlacedSba, found: Stack, pressure: float, lift: NDArray[np.float64]) -> Solids:
-    return solids(placed, found, found.pose((pressure,) * found.chambers), lift)
+def _upright(
+    placed: PlacedSba, part_stack: Stack, pressure: float, lift: NDArray[np.float64]
+) -> Solids:
+    return solids(placed, part_stack, part_stack.pose((pressure,) * part_stack.chambers), lift)

@@ -1,15 +1,21 @@
-"""A canvas of few flat colours, painted enlarged and reduced at the end (Pillow)."""
+"""Raster pictures: a canvas of flat colours, a depth buffer for surfaces, a length bar (Pillow)."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sbafab.geometry.edges import Point
+from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw as Draw
+    from PIL.ImageFont import FreeTypeFont, ImageFont
 
 Tone = Literal["film", "bond", "cut film", "cut bond", "shade", "line"]
 Colour = tuple[int, int, int]
@@ -76,10 +82,10 @@ class Canvas:
         picture = self._backdrop(footprint).convert("RGB")
         # What nothing is painted on is backdrop.
         whole = self._enlarged
-        left, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
+        x0, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
         last = -(-bottom // whole)
         for row in range(top // whole, last, STRIP):
-            strip = left // whole, row, -(-right // whole), min(row + STRIP, last)
+            strip = x0 // whole, row, -(-right // whole), min(row + STRIP, last)
             picture.paste(self._reduced(strip, picture.crop(strip)), strip[:2])
         self._write(picture, caption, films)
         out = BytesIO()
@@ -87,12 +93,14 @@ class Canvas:
         return out.getvalue()
 
     def _reduced(self, box: tuple[int, int, int, int], behind: Image) -> Image:
-        """What is painted within the ``box`` of the picture, over what lies ``behind`` it there."""
+        """Return what is painted within the ``box`` of the picture, over what lies ``behind`` it
+        there.
+        """
         from PIL import ImageChops
 
         whole = self._enlarged
-        left, top, right, bottom = box
-        inside = self._image.crop((whole * left, whole * top, whole * right, whole * bottom))
+        x0, top, right, bottom = box
+        inside = self._image.crop((whole * x0, whole * top, whole * right, whole * bottom))
         painted = inside.convert("RGB").reduce(whole)
         empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
         # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
@@ -130,8 +138,8 @@ class Canvas:
                 lines.append(word)
         for above, line in enumerate(reversed(lines)):
             draw.text((x, y - (1.7 + 1.3 * above) * size), line, fill=INK, font=font)
-        for tone, said in KEY:
-            words = films if tone == "film" else said
+        for tone, meaning in KEY:
+            words = films if tone == "film" else meaning
             draw.rectangle((x, y, x + 1.6 * size, y + size), fill=COLOURS[tone], outline=INK)
             draw.text((x + 2.1 * size, y - 0.1 * size), words, fill=INK, font=font)
             x += round(3.6 * size + draw.textlength(words, font=font))
@@ -150,7 +158,7 @@ def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
 
 
 def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Point]:
-    """Where a ray to the right first meets the ring, and the index of the vertex after it."""
+    """Return first point at which a ray to the right meets the ring, and the vertex after it."""
     best: tuple[float, int] | None = None
     for i, (x1, y1) in enumerate(ring):
         x0, y0 = ring[i - 1]
@@ -161,3 +169,230 @@ def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Poi
             best = meets, i
     assert best is not None, "a hole lies inside its outer ring"
     return best[1], (best[0], y)
+
+
+# Triangulated surfaces on a picture, nearest first: a depth buffer filled by sample points.
+
+
+DENSITY = 1.45
+"""Samples a pixel along a triangle's side: more than the root of 2, so that none is missed."""
+MOST = 4_000_000
+"""Samples that are held at once."""
+AMBIENT = 0.58
+
+
+class View(NamedTuple):
+    """A parallel projection: mm to pixels, the three axes as rows (right, up, toward the eye)."""
+
+    axes: NDArray[np.float64]
+    scale: float
+    centre: tuple[float, float]
+
+    def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (n, 3) as pixels right and down, and mm toward the eye."""
+        import numpy as np
+
+        right, up, toward = (points @ self.axes.T).T
+        x = self.centre[0] + self.scale * right
+        y = self.centre[1] - self.scale * up
+        return np.column_stack([x, y, toward])
+
+
+class Buffer(NamedTuple):
+    """For each pixel the depth, the number of the surface seen (-1: none), its face and light."""
+
+    depth: NDArray[np.float64]
+    body: NDArray[np.int16]
+    face: NDArray[np.int32]
+    light: NDArray[np.float64]
+
+
+def view_of(
+    surfaces: Sequence[Surface], elevation: float, azimuth: float, box: Sequence[float]
+) -> View:
+    """The view from so many degrees over the bench and round it from x, filling a box.
+
+    The ``box`` is left, top, right, bottom in pixels.
+    """
+    import numpy as np
+
+    e, a = math.radians(elevation), math.radians(azimuth)
+    toward = [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)]
+    right = [-math.sin(a), math.cos(a), 0.0]
+    axes = np.array([right, np.cross(toward, right), toward])
+    points = np.concatenate([surface.points for surface in surfaces]) @ axes.T
+    (low_x, low_y, _), (high_x, high_y, _) = points.min(axis=0), points.max(axis=0)
+    x0, y0, x1, y1 = box
+    scale = min((x1 - x0) / (high_x - low_x), (y1 - y0) / (high_y - low_y))
+    centre = (
+        (x0 + x1) / 2 - scale * (low_x + high_x) / 2,
+        (y0 + y1) / 2 + scale * (low_y + high_y) / 2,
+    )
+    return View(axes, scale, centre)
+
+
+def rasterize(
+    surfaces: Sequence[Surface],
+    view: View,
+    width: int,
+    height: int,
+    lamp: Sequence[float],
+    normals: Sequence[NDArray[np.float64]] | None = None,
+) -> Buffer:
+    """Return the depth buffer of the surfaces; ``lamp`` is the direction to the light, in the view.
+
+    Faces are lit one by one, or smoothly where ``normals`` (n, 3) of the points are given.
+    """
+    import numpy as np
+
+    size = width * height
+    buffer = Buffer(
+        np.full(size, -np.inf),
+        np.full(size, -1, dtype=np.int16),
+        np.zeros(size, dtype=np.int32),
+        np.zeros(size, dtype=np.float64),
+    )
+    for body, surface in enumerate(surfaces):
+        smooth = None if normals is None else lit(normals[body] @ view.axes.T, np.array(lamp))
+        _paint(buffer, body, surface, view, (width, height), np.array(lamp), smooth)
+    return Buffer(
+        buffer.depth.reshape(height, width),
+        buffer.body.reshape(height, width),
+        buffer.face.reshape(height, width),
+        buffer.light.reshape(height, width),
+    )
+
+
+def _paint(
+    buffer: Buffer,
+    body: int,
+    surface: Surface,
+    view: View,
+    size: tuple[int, int],
+    lamp: NDArray[np.float64],
+    smooth: NDArray[np.float64] | None,
+) -> None:
+    import numpy as np
+
+    corners = view.flat(surface.points)[surface.faces]
+    # Pixels count downward: what faces the eye runs clockwise there.
+    a, b, c = (corners[:, i, :2] for i in range(3))
+    twice = (c - a)[:, 0] * (b - a)[:, 1] - (c - a)[:, 1] * (b - a)[:, 0]
+    front = np.flatnonzero(twice > 1e-12)
+    corners, twice = corners[front], twice[front]
+    if smooth is None:
+        light = np.repeat(_light(corners, view.scale, lamp)[:, None], 3, axis=1)
+    else:
+        light = smooth[surface.faces[front]]
+    corners, light, long = _longest_first(corners, light)
+    along = np.ceil(DENSITY * long).astype(np.int64) + 2
+    across = np.ceil(DENSITY * twice / np.maximum(long, 1e-9)).astype(np.int64) + 2
+    # Triangles of like size are sampled together.
+    grids = np.column_stack([_power_of_two(along), _power_of_two(across)])
+    for n, m in np.unique(grids, axis=0):
+        samples = np.flatnonzero((grids == (n, m)).all(axis=1))
+        for part in np.array_split(samples, max(1, len(samples) * n * m // MOST)):
+            seen_as = _Triangles(body, front[part], corners[part], light[part])
+            _sample(buffer, seen_as, (int(n), int(m)), size)
+
+
+def _light(
+    corners: NDArray[np.float64], scale: float, lamp: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the light of a triangle, from its normal in the view (right, up, toward)."""
+    import numpy as np
+
+    true = corners * np.array([1 / scale, -1 / scale, 1.0])
+    normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return lit(normal, lamp)
+
+
+def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the light of what faces along normals (n, 3) in the view: from AMBIENT to 1."""
+    import numpy as np
+
+    light: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normals @ lamp, 0, 1)
+    return light
+
+
+def _longest_first(
+    corners: NDArray[np.float64], light: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Corners and their light turned so that the longest side comes first; its length in pixels."""
+    import numpy as np
+
+    sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
+    lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
+    first = lengths.argmax(axis=1)
+    order = (first[:, None] + np.arange(3)) % 3
+    turned = np.take_along_axis(corners, order[:, :, None], axis=1)
+    return turned, np.take_along_axis(light, order, axis=1), lengths.max(axis=1)
+
+
+def _power_of_two(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    import numpy as np
+
+    return 2 ** np.ceil(np.log2(counts)).astype(np.int64)
+
+
+class _Triangles(NamedTuple):
+    """Triangles of one surface: their numbers in it, corners (n, 3, 3) in the view, and light."""
+
+    body: int
+    face: NDArray[np.int64]
+    corners: NDArray[np.float64]
+    light: NDArray[np.float64]
+
+
+def _sample(
+    buffer: Buffer, corners: _Triangles, grid: tuple[int, int], size: tuple[int, int]
+) -> None:
+    """Points of each triangle: along its first side, and from there towards its third corner."""
+    import numpy as np
+
+    s = np.linspace(0, 1, grid[0])[None, :, None, None]
+    t = np.linspace(0, 1, grid[1])[None, None, :, None]
+    a, b, c = (corners.corners[:, i][:, None, None, :] for i in range(3))
+    points = (1 - t) * (a + s * (b - a)) + t * c
+    number = np.repeat(np.arange(len(corners.face)), grid[0] * grid[1])
+    x, y, depth = points.reshape(-1, 3).T
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    inside = (column >= 0) & (column < size[0]) & (row >= 0) & (row < size[1])
+    place = row[inside] * size[0] + column[inside]
+    depth, number = depth[inside], number[inside]
+    np.maximum.at(buffer.depth, place, depth)
+    won = depth == buffer.depth[place]
+    place, number = place[won], number[won]
+    at = np.flatnonzero(inside)[won] % (grid[0] * grid[1])
+    p, q = s.ravel()[at // grid[1]], t.ravel()[at % grid[1]]
+    shares = np.stack([(1 - q) * (1 - p), (1 - q) * p, q], axis=-1)
+    buffer.light[place] = (corners.light[number] * shares).sum(axis=1)
+    buffer.face[place] = corners.face[number]
+    buffer.body[place] = corners.body
+
+
+# A bar of round length under a picture that is true to scale.
+
+
+BAR_INK = (34, 34, 34)
+BARS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+
+
+def draw_length_bar(
+    draw: Draw,
+    right: float,
+    y: float,
+    widest: float,
+    pixels_per_mm: float,
+    font: FreeTypeFont | ImageFont,
+) -> None:
+    """A bar that ends at ``right``, no longer than ``widest`` pixels, its length in mm above it."""
+    bar = max(step for step in BARS if step * pixels_per_mm <= widest or step == BARS[0])
+    start = right - bar * pixels_per_mm
+    words = f"{bar:g} mm"
+    draw.line((start, y, right, y), fill=BAR_INK, width=3)
+    for tick in (start, right):
+        draw.line((tick, y - 6, tick, y + 6), fill=BAR_INK, width=3)
+    _, _, width, height = draw.textbbox((0, 0), words, font=font)
+    draw.text(((start + right - width) / 2, y - height - 8), words, fill=BAR_INK, font=font)

@@ -1,4 +1,4 @@
-"""What an engineering drawing in SVG is made of: text, lines, arrows, dimensions, leaders.
+"""Engineering drawings in SVG: text, lines, arrows and leaders, and the dimensions of a profile.
 
 Every function returns SVG elements. Coordinates are millimetres on the page, y down.
 """
@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
-from sbafab.geometry.edges import Point
-from sbafab.geometry.svg import number
-from sbafab.laminate.films import Film
-from sbafab.laminate.inks import MASKS, Ink, ink
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.region import Region, coord, section
+from sbafab.laminate.films import MASKS, Film, Ink, ink
+from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.markup import escape
 
 Anchor = Literal["start", "middle", "end"]
@@ -29,7 +31,7 @@ FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:
     """A whole SVG file, ``width`` x ``height`` mm, on white."""
-    w, h = number(width), number(height)
+    w, h = coord(width), coord(height)
     drawn = "\n".join(elements)
     return "\n".join(
         [
@@ -47,7 +49,7 @@ def document(width: float, height: float, title: str, elements: Iterable[str]) -
 
 
 def film_fill(film: Film) -> str:
-    """What a film is filled with: masks are hatched, so that a grey print still tells them."""
+    """Return the fill of a film: masks are hatched, so that a grey print still tells them."""
     return f"url(#{_hatch_id(film.shade % len(MASKS))})" if film.is_mask else ink(film).fill
 
 
@@ -57,16 +59,18 @@ def _hatch_id(shade: int) -> str:
 
 def _definitions(drawn: str) -> str:
     """The hatch of PTFE, and those of the further masks that are drawn."""
-    hatches = {_hatch_id(shade): own for shade, own in enumerate(MASKS)}
-    used = [_hatch(n, own) for n, own in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn]
+    hatches = {_hatch_id(shade): colours for shade, colours in enumerate(MASKS)}
+    used = [
+        _hatch(n, colours) for n, colours in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn
+    ]
     return f"<defs>{''.join(used)}</defs>"
 
 
-def _hatch(name: str, own: Ink) -> str:
+def _hatch(name: str, colours: Ink) -> str:
     return (
         f'<pattern id="{name}" patternUnits="userSpaceOnUse" width="1.2" height="1.2" '
-        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{own.fill}"/>'
-        f'<rect width="0.16" height="1.2" fill="{own.line}" fill-opacity="0.55"/></pattern>'
+        f'patternTransform="rotate(45)"><rect width="1.2" height="1.2" fill="{colours.fill}"/>'
+        f'<rect width="0.16" height="1.2" fill="{colours.line}" fill-opacity="0.55"/></pattern>'
     )
 
 
@@ -81,8 +85,8 @@ def text(
     turned: bool = False,
 ) -> str:
     """One line of text on its baseline; ``turned`` reads upward."""
-    x, y = map(number, at)
-    extra = f' font-size="{number(size)}"' if size != TEXT else ""
+    x, y = map(coord, at)
+    extra = f' font-size="{coord(size)}"' if size != TEXT else ""
     extra += f' text-anchor="{anchor}"' if anchor != "start" else ""
     extra += ' font-weight="bold"' if bold else ""
     extra += f' fill="{colour}"' if colour != DARK else ""
@@ -97,16 +101,16 @@ def text_width(words: str, size: float = TEXT) -> float:
 
 
 def line(points: Sequence[Point], *, colour: str = DARK, width: float = THIN) -> str:
-    path = "M" + "L".join(f"{number(x)} {number(y)}" for x, y in points)
-    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{number(width)}"/>'
+    path = "M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in points)
+    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{coord(width)}"/>'
 
 
 def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: float = THIN) -> str:
     """A rectangle between two corners."""
     return (
-        f'<rect x="{number(low[0])}" y="{number(low[1])}" width="{number(high[0] - low[0])}" '
-        f'height="{number(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
-        f'stroke-width="{number(width)}"/>'
+        f'<rect x="{coord(low[0])}" y="{coord(low[1])}" width="{coord(high[0] - low[0])}" '
+        f'height="{coord(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
+        f'stroke-width="{coord(width)}"/>'
     )
 
 
@@ -116,7 +120,7 @@ def arrow(tip: Point, toward: Point) -> str:
     bx, by = x - ARROW * u, y - ARROW * v
     half = ARROW * 0.18
     corners = [tip, (bx - half * v, by + half * u), (bx + half * v, by - half * u)]
-    data = "M" + "L".join(f"{number(px)} {number(py)}" for px, py in corners) + "Z"
+    data = "M" + "L".join(f"{coord(px)} {coord(py)}" for px, py in corners) + "Z"
     return f'<path d="{data}"/>'
 
 
@@ -155,7 +159,7 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
 def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> list[str]:
     """A leader line from a feature by an elbow to a label; a dot or an arrow on the feature."""
     end = (
-        f'<circle cx="{number(feature[0])}" cy="{number(feature[1])}" r="0.45" fill="{DARK}"/>'
+        f'<circle cx="{coord(feature[0])}" cy="{coord(feature[1])}" r="0.45" fill="{DARK}"/>'
         if dot
         else arrow(feature, _unit(elbow, feature))
     )
@@ -171,15 +175,15 @@ def across(a: Point, b: Point) -> list[str]:
     return [line(tails, colour=GREY), arrow(a, (u, v)), arrow(b, (-u, -v))]
 
 
-def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Positions as near as may be to the wanted ones (sorted), at least ``gap`` apart.
 
     They stay between ``low`` and ``high`` where there is room for all of them.
     """
-    if not wanted:
+    if not targets:
         return []
     groups: list[list[float]] = []
-    for place in wanted:
+    for place in targets:
         groups.append([place, 1])
         while len(groups) > 1 and _overlap(groups[-2], groups[-1], gap):
             centre, count = groups.pop()
@@ -208,3 +212,206 @@ def _unit(a: Point, b: Point) -> Point:
 
 def _shifted(p: Point, unit: Point, distance: float) -> Point:
     return p[0] + unit[0] * distance, p[1] + unit[1] * distance
+
+
+# Dimensions of a profile, measured on the profile itself.
+
+
+SAME = 1e-4
+MOST_RADII = 3
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A circle or arc to point at, and the words for all of its kind.
+
+    ``centre`` and ``radius`` are mm, like ``toward``, the point of an arc to point at; a
+    ``phantom`` is not an edge of the profile.
+    """
+
+    words: str
+    centre: Point
+    radius: float
+    toward: Point | None = None
+    phantom: bool = False
+
+
+@dataclass(frozen=True)
+class WidthDimension:
+    """A width to draw across, from ``start`` to ``end`` in mm, and its words."""
+
+    words: str
+    start: Point
+    end: Point
+
+
+Dimension = Circle | WidthDimension
+
+
+def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
+    """All that a drawing of a layer gives the size of, beside its overall width and height."""
+    profile = layer.profile
+    around = circumscribed(profile)
+    widths = inlet_width(laminate, layer), piece_width(profile)
+    return [
+        *circles(laminate, layer),
+        *radii(profile),
+        *([around] if around is not None else []),
+        *(width for width in widths if width is not None),
+    ]
+
+
+def balloons(laminate: Laminate) -> str:
+    """Return number of balloons in words: 15 balloons, or 3 stacks of 1 balloon side by side."""
+    high = f"{laminate.balloons} balloon{'s' if laminate.balloons > 1 else ''}"
+    stacks = sum(len(chamber.centres) for chamber in laminate.chambers)
+    on_sheet = any(layer.role == "sheet" for layer in laminate.layers)
+    return f"{stacks} stacks of {high}" if on_sheet and stacks > 1 else high
+
+
+def length(value: float) -> str:
+    """Millimetres as drawings give them: 6.50."""
+    return f"{value:.2f}"
+
+
+def circles(laminate: Laminate, layer: Layer) -> list[Circle]:
+    """The full circles of a profile, equal ones together, named after what they are.
+
+    Not the outline of a single disc: its overall width says it.
+    """
+    groups: dict[tuple[str, float], list[Contour]] = {}
+    for contour in layer.profile.contours:
+        if contour.circle is not None and not is_disc(layer.profile, contour):
+            name = _circle_name(laminate, layer, contour)
+            groups.setdefault((name, round(contour.circle[1], 4)), []).append(contour)
+    callouts = []
+    for (name, radius), contours in groups.items():
+        centre = max((c.circle[0] for c in contours if c.circle), key=lambda p: (p[0], p[1]))
+        words = f"{name} ⌀{length(2 * radius)}".strip()
+        callouts.append(Circle(_counted(len(contours), words), centre, radius))
+    return callouts
+
+
+def is_disc(profile: Region, outer: Contour) -> bool:
+    """Return True if a contour is the round outline of a profile of one piece."""
+    return outer.circle is not None and profile.outers == (outer,)
+
+
+def _circle_name(laminate: Laminate, layer: Layer, contour: Contour) -> str:
+    assert contour.circle is not None
+    centre = contour.circle[0]
+    if not contour.is_hole:
+        return ""
+    if any(math.dist(centre, bore.centre) < SAME for bore in laminate.bores):
+        return "neck ring" if layer.role == "separator-mask" else "bore"
+    if laminate.lumen and math.hypot(*centre) < SAME:
+        return "lumen"
+    is_pinned = any(math.dist(centre, pin.centre) < SAME for pin in laminate.pins)
+    tooling = "tail" if layer.role == "chamber-mask" else "ear"
+    return tooling if is_pinned else ""
+
+
+def radii(profile: Region) -> list[Circle]:
+    """The arcs of edges that are not full circles, equal radii together, largest first."""
+    groups: dict[float, list[Arc]] = {}
+    for contour in profile.contours:
+        if contour.circle is None:
+            for edge in contour.edges:
+                if isinstance(edge, Arc):
+                    groups.setdefault(round(edge.radius, 3), []).append(edge)
+    callouts = []
+    for radius in sorted(groups, reverse=True)[:MOST_RADII]:
+        arcs = groups[radius]
+        pointed = max(arcs, key=lambda arc: round(arc.at(0.5)[0] + arc.at(0.5)[1], 6))
+        words = _counted(len(_distinct(arc.centre for arc in arcs)), f"R{length(radius)}")
+        callouts.append(Circle(words, pointed.centre, pointed.radius, pointed.at(0.5)))
+    return callouts
+
+
+def circumscribed(profile: Region) -> Circle | None:
+    """The circle about the axis that a lobed profile fits, inlet tabs and strips aside."""
+    axis = (0.0, 0.0)
+    reaches: dict[Point, float] = {}
+    for contour in profile.outers:
+        for edge in contour.edges:
+            if isinstance(edge, Arc) and edge.ccw and math.dist(edge.centre, axis) > SAME:
+                centre = _rounded(edge.centre)
+                reaches[centre] = math.dist(edge.centre, axis) + edge.radius
+    if len(reaches) < 2 or max(reaches.values()) - min(reaches.values()) > SAME:
+        return None
+    radius = max(reaches.values())
+    return Circle(f"fits ⌀{length(2 * radius)}", axis, radius, phantom=True)
+
+
+def piece_width(profile: Region) -> WidthDimension | None:
+    """The width of one of several equal pieces that are not discs (oblong chambers)."""
+    boxes = [outer.bounds for outer in profile.outers]
+    sizes = {(round(b[2] - b[0], 4), round(b[3] - b[1], 4)) for b in boxes}
+    if len(boxes) < 2 or len(sizes) != 1 or profile.outers[0].circle is not None:
+        return None
+    low_x, low_y, high_x, high_y = max(boxes)
+    y = low_y + 0.3 * (high_y - low_y)
+    words = _counted(len(boxes), f"{length(high_x - low_x)} wide")
+    return WidthDimension(words, (low_x, y), (high_x, y))
+
+
+def inlet_width(laminate: Laminate, layer: Layer) -> WidthDimension | None:
+    """The width of the inlet strip or tab, if any, at the inlet farthest right."""
+    if layer.role == "separator-mask":
+        return None
+    spans = [(inlet, span) for inlet in laminate.inlets if (span := _across(layer, inlet))]
+    if not spans:
+        return None
+    inlet, (start, end) = max(spans, key=lambda item: (item[0].mouth[0], item[0].mouth[1]))
+    name = "strip" if layer.is_mask else "tab"
+    (x, y), (u, v) = _station(inlet), inlet.direction
+    ends = sorted(((x - s * v, y + s * u) for s in (start, end)), key=lambda p: (p[1], p[0]))
+    words = _counted(len(spans), f"{name} {length(end - start)} wide")
+    return WidthDimension(words, ends[0], ends[1])
+
+
+def _across(layer: Layer, inlet: Inlet) -> tuple[float, float] | None:
+    u, v = inlet.direction
+    for start, end in section(layer.profile, _station(inlet), (-v, u)):
+        if start < 0 < end:
+            return start, end
+    return None
+
+
+def _station(inlet: Inlet) -> Point:
+    """On the tab, clear of the fillets at its root."""
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+    back = min(0.3 * inlet.length, 1.0)
+    return x - back * u, y - back * v
+
+
+def layer_numbers(indices: Sequence[int]) -> str:
+    """Layer numbers with even steps shortened: ``3, 7, 11 ... 59``; ``2 to 5`` for neighbours."""
+    runs: list[list[int]] = []
+    for index in indices:
+        run = runs[-1] if runs else []
+        if len(run) == 1 or (len(run) > 1 and index - run[-1] == run[1] - run[0]):
+            run.append(index)
+        else:
+            runs.append([index])
+    return ", ".join(map(_run_words, runs))
+
+
+def _run_words(run: list[int]) -> str:
+    if len(run) < 4:
+        return ", ".join(map(str, run))
+    if run[1] - run[0] == 1:
+        return f"{run[0]} to {run[-1]}"
+    return f"{run[0]}, {run[1]}, {run[2]} … {run[-1]}"
+
+
+def _counted(count: int, words: str) -> str:
+    return words if count == 1 else f"{count}{TIMES} {words}"
+
+
+def _distinct(points: Iterable[Point]) -> set[Point]:
+    return {_rounded(p) for p in points}
+
+
+def _rounded(p: Point) -> Point:
+    return round(p[0], 3) + 0.0, round(p[1], 3) + 0.0

@@ -1,4 +1,4 @@
-"""An inflated actuator as surfaces: films between the plates of a pose of the elastic stack.
+"""Inflated actuators as surfaces, from poses of the elastic stack; parts of an assembly as solids.
 
 Each balloon is two films turned round its chamber's axis on the plane midway between two plates,
 and set up to the plates, which may lean; its meridian is that of the balloon between plates as far
@@ -8,27 +8,32 @@ apart as these (``models.balloon``). What is bonded round the pockets follows th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
+from sbafab.assemblies.shapes import placed_surface
+from sbafab.design.records import Slots
 from sbafab.errors import DesignError
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.section import section
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, section, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.formulas import inflated_diameter
 
 if TYPE_CHECKING:
+    import manifold3d
     from numpy.typing import NDArray
 
     from sbafab.models.stack import Pose, Stack
 
     Array = NDArray[np.float64]
+
+    Solids = list[manifold3d.Manifold]
 
 FINE, COARSE = 56, 28
 """Facets of a balloon round its axis."""
@@ -74,11 +79,11 @@ def inflated(
     webs = _webs(laminate, stack, levels, meridians)
     parts = [InflatedPart("web", webs, _normals(webs), None)]
     for number, chamber in enumerate(laminate.chambers):
-        found = [
+        balloons = [
             _balloon(level, stack.axes[number], meridians[i][number], around)
             for i, level in enumerate(levels)
         ]
-        surface = _joined(found)
+        surface = _joined(balloons)
         parts.append(InflatedPart(chamber.name, surface, _normals(surface), number))
     return parts
 
@@ -103,13 +108,13 @@ class _Level:
         self.normals = axes[i][:, 2], axes[i + 1][:, 2]
         self.origin = (self.low + self.high) / 2
         # The rotation nearest to the mean of both.
-        left, _, right = np.linalg.svd(axes[i] + axes[i + 1])
-        self.axes = left @ right
+        u, _, v = np.linalg.svd(axes[i] + axes[i + 1])
+        self.axes = u @ v
 
     def points(self, x: Array, y: Array, z: Array) -> Array:
         """Places in space of points in this frame."""
-        found: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
-        return found
+        places: Array = self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T
+        return places
 
     def heights(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Heights of the lower and the upper plate over points of the plane."""
@@ -132,22 +137,22 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
         for kind, gaps in zip(stack.levels, pose.gaps, strict=True)
     ]
     distinct = sorted({key for row in keys for key in row})
-    known: dict[tuple[int, int, int], FilmMeridian] = {}
+    by_key: dict[tuple[int, int, int], FilmMeridian] = {}
     for kind in sorted({key[0] for key in distinct}):
-        own = [key for key in distinct if key[0] == kind]
-        p, gap = (np.array([key[place] for key in own]) / SAME for place in (1, 2))
-        known.update(zip(own, _films(stack.maps[kind].balloon, p, gap), strict=True))
-    return [[known[key] for key in row] for row in keys]
+        kind_keys = [key for key in distinct if key[0] == kind]
+        p, gap = (np.array([key[place] for key in kind_keys]) / SAME for place in (1, 2))
+        by_key.update(zip(kind_keys, _films(stack.maps[kind].balloon, p, gap), strict=True))
+    return [[by_key[key] for key in row] for row in keys]
 
 
 def _films(balloon: Balloon, p: Array, gap: Array) -> list[FilmMeridian]:
-    found = inflate(balloon, p, gap, tied=True)
-    part = slice(balloon.held, balloon.edge + 1)
-    shares = np.clip(found.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
-    drawn = balloon.pocket - found.r[:, balloon.edge]
+    shapes = inflate(balloon, p, gap, tied=True)
+    part = slice(balloon.neck_edge, balloon.edge + 1)
+    shares = np.clip(shapes.z[:, part] / (gap[:, None] / 2), 0.0, 1.0)
+    drawn = balloon.pocket - shapes.r[:, balloon.edge]
     return [
         FilmMeridian(r, share, float(inward), balloon.pocket)
-        for r, share, inward in zip(found.r[:, part], shares, drawn, strict=True)
+        for r, share, inward in zip(shapes.r[:, part], shares, drawn, strict=True)
     ]
 
 
@@ -155,9 +160,9 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     """Both films of a balloon and its necks, closed."""
     turn = np.arange(around) * (math.tau / around)
     rings = np.linspace(0, len(film.radii) - 1, min(len(film.radii), around // 2 + 1))
-    kept_rings = np.rint(rings).astype(int)
-    radii = np.concatenate([[0.0], film.radii[kept_rings]])
-    shares = np.concatenate([film.shares[:1], film.shares[kept_rings]])
+    ring_numbers = np.rint(rings).astype(int)
+    radii = np.concatenate([[0.0], film.radii[ring_numbers]])
+    shares = np.concatenate([film.shares[:1], film.shares[ring_numbers]])
     x = axis[0] + radii[:, None] * np.cos(turn)
     y = axis[1] + radii[:, None] * np.sin(turn)
     below, above = level.heights(x, y)
@@ -165,8 +170,8 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     sides = []
     for height, middle, sign in ((above, at_axis[1][0], 1), (below, at_axis[0][0], -1)):
         # Where plates lean so far that they meet the films keep a little height.
-        kept = sign * np.maximum(sign * height, FLATTEST * abs(middle))
-        sides.append(level.points(x, y, shares[:, None] * kept))
+        clipped = sign * np.maximum(sign * height, FLATTEST * abs(middle))
+        sides.append(level.points(x, y, shares[:, None] * clipped))
     rows = len(radii)
     # Down over the upper film, round the rim, which both films share, and back under the lower one.
     points = np.concatenate([sides[0], sides[1][-2::-1]]).reshape(-1, 3)
@@ -189,24 +194,24 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
 def _webs(
     laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[FilmMeridian]]
 ) -> Surface:
-    """What is bonded round the pockets of every level, as a plate of two films."""
-    known: dict[Region, Surface] = {}
-    found = []
-    for i, (level, own) in enumerate(zip(levels, films, strict=True)):
+    """Return the bonded web round the pockets of every level, as a plate of two films."""
+    by_region: dict[Region, Surface] = {}
+    webs = []
+    for i, (level, level_films) in enumerate(zip(levels, films, strict=True)):
         region = _web(laminate, stack, i)
         thick = laminate.tpe_layers[0].film.thickness * 2
-        if region not in known:
-            known[region] = fuse([Slab(region, -thick / 2, thick / 2)], SAGITTA)
-        flat = known[region]
+        if region not in by_region:
+            by_region[region] = fuse([Slab(region, -thick / 2, thick / 2)], SAGITTA)
+        flat = by_region[region]
         x, y, z = flat.points.T
         moved = np.zeros((len(x), 2))
-        for axis, film in zip(stack.axes, own, strict=True):
+        for axis, film in zip(stack.axes, level_films, strict=True):
             off = np.column_stack([x, y]) - axis
             away = np.hypot(*off.T)
             fade = np.exp(-np.maximum(away - film.pocket, 0.0) / REACH)
             moved -= film.drawn * fade[:, None] * off / np.maximum(away, 1e-9)[:, None]
-        found.append(Surface(level.points(x + moved[:, 0], y + moved[:, 1], z), flat.faces))
-    return _joined(found)
+        webs.append(Surface(level.points(x + moved[:, 0], y + moved[:, 1], z), flat.faces))
+    return _joined(webs)
 
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
@@ -247,11 +252,11 @@ def _normals(surface: Surface) -> Array:
     """Unit normals (n, 3) of the points: means of their faces, by area."""
     a, b, c = (surface.points[surface.faces[:, i]] for i in range(3))
     of_faces = np.cross(b - a, c - a)
-    found = np.zeros_like(surface.points)
+    normals = np.zeros_like(surface.points)
     for corner in range(3):
-        np.add.at(found, surface.faces[:, corner], of_faces)
-    found /= np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30)
-    return found
+        np.add.at(normals, surface.faces[:, corner], of_faces)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return normals
 
 
 def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose:
@@ -259,8 +264,8 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
 
     Raises DesignError for volumes that the stack's highest pressure does not reach.
     """
-    wanted = np.asarray(volumes_ul, dtype=float)
-    if wanted.shape != (stack.chambers,) or not (np.isfinite(wanted) & (wanted >= 0)).all():
+    volumes = np.asarray(volumes_ul, dtype=float)
+    if volumes.shape != (stack.chambers,) or not (np.isfinite(volumes) & (volumes >= 0)).all():
         raise DesignError(
             f"volumes must be {stack.chambers} numbers of ul, 0 or more, one a chamber"
         )
@@ -268,8 +273,8 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
     pose = stack.pose(tuple(p))
     try:
         for _ in range(rounds):
-            miss = wanted - pose.volumes
-            if (np.abs(miss) <= 1e-3 * np.maximum(wanted, 1.0)).all():
+            miss = volumes - pose.volumes
+            if (np.abs(miss) <= 1e-3 * np.maximum(volumes, 1.0)).all():
                 return pose
             slopes = np.empty((stack.chambers, stack.chambers))
             for number in range(stack.chambers):
@@ -283,14 +288,164 @@ def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose
             )
             pose = stack.pose(tuple(p), near=pose)
     except DesignError as error:
-        raise _out_of_reach(wanted, pose) from error
-    raise _out_of_reach(wanted, pose)
+        raise _out_of_reach(volumes, pose) from error
+    raise _out_of_reach(volumes, pose)
 
 
-def _out_of_reach(wanted: Array, pose: Pose) -> DesignError:
-    asked, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (wanted, pose.volumes))
-    nearer = ", or volumes that lie nearer together" if np.ptp(wanted) > 0 else ""
+def _out_of_reach(volumes: Array, pose: Pose) -> DesignError:
+    target, nearest = (", ".join(f"{v:.4g}" for v in some) for some in (volumes, pose.volumes))
+    nearer = ", or volumes that lie nearer together" if np.ptp(volumes) > 0 else ""
     return DesignError(
-        f"no pressures give the volumes {asked} ul: the search ended at {nearest} ul; give less"
+        f"no pressures give the volumes {target} ul: the search ended at {nearest} ul; give less"
         f"{nearer}"
     )
+
+
+# Inflated parts of an assembly as solids, where they stand.
+
+
+TOUCHING = 0.05
+"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
+
+
+def shared_volume(first: Solids, second: Solids) -> float:
+    """Return the volume that lies in both, mm3."""
+    return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
+
+
+def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
+    """Return the distance between the boxes of two solids, mm; 0 or less where they meet."""
+    box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
+    return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
+
+
+def lifted(
+    assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return by what (3,) in mm a part is lifted by the actuators under it."""
+    lift = np.zeros(3)
+    while placed.part.on is not None:
+        if placed.part.at == "top":
+            lift = lift + rises.get(placed.part.on, 0.0)
+        placed = assembled[placed.part.on]
+    return lift
+
+
+def carried(assembled: Assembled, name: str) -> set[str]:
+    """Return a part and all that hangs on it."""
+    names = {name}
+    for part in assembled.parts:
+        if part.part.on in names:
+            names.add(part.name)
+    return names
+
+
+def solids(placed: PlacedSba, stack: Stack, pose: Pose, lift: NDArray[np.float64]) -> Solids:
+    """An inflated actuator's balloons and webs in a pose, in place."""
+    pieces = []
+    for part in inflated(placed.made.laminate, stack, pose, COARSE):
+        points = placed.upright(part.surface.points) + lift
+        pieces += manifold(replace(part.surface, points=points)).decompose()
+    return pieces
+
+
+def manifold(surface: Surface) -> manifold3d.Manifold:
+    import manifold3d
+
+    faces = np.ascontiguousarray(surface.faces.astype(np.uint64))
+    return manifold3d.Manifold(manifold3d.Mesh64(np.ascontiguousarray(surface.points), faces))
+
+
+def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
+    """A part that no elastic stack inflates, its pockets filled; one round a tube is the cylinder
+    that it becomes, free.
+    """
+    widest = None
+    if placed.made is not None:
+        widest = inflated_diameter(placed.made.design.form, placed.made.laminate)
+    if widest is None:
+        surface = placed_surface(placed, filled=True)
+        return [manifold(replace(surface, points=surface.points + lift))]
+    import manifold3d
+
+    assert placed.made is not None
+    _, low, _, high = placed.made.laminate.layers[0].profile.turned(placed.turn).bounds
+    round_it = manifold3d.Manifold.cylinder(high - low, widest / 2).translate((0.0, 0.0, low))
+    rows = np.column_stack([np.array(placed.pose.rows), np.array(placed.pose.shift) + lift])
+    return [round_it.transform(rows)]
+
+
+# The balloons of an inflated radial actuator as a surface, to be looked at.
+
+
+ACROSS, ALONG, HALVINGS = 13, 17, 50
+
+
+def gripping(placed: PlacedSba, height: float) -> Surface:
+    """Balloons ``height`` mm high each on the tangents of their tube, in the part's own frame.
+
+    Across, a film is an arc that keeps its pocket's width (the lens of ``models.lens``); towards
+    the pocket's round ends the lens shrinks with its chord.
+    """
+    pockets = placed.made.design.form.pockets
+    assert isinstance(pockets, Slots)
+    laminate, radius = placed.made.laminate, placed.radius or 0.0
+    lens = _lens(pockets, height)
+    points: list[NDArray[np.float64]] = []
+    faces: list[NDArray[np.int_]] = []
+    for chamber in laminate.chambers:
+        for middle in dict.fromkeys(chamber.centres):
+            ((x, y, _),) = placed.turned(np.array([[*middle, 0.0]]))
+            angle = x / radius if radius else 0.0
+            for level in range(laminate.balloons):
+                out = radius + laminate.thickness + (level + 0.5) * height + lens.points[:, 2]
+                aside, along = lens.points[:, 0], lens.points[:, 1] + y
+                faces.append(lens.faces + sum(map(len, points)))
+                points.append(
+                    np.column_stack(
+                        [
+                            out * math.cos(angle) - aside * math.sin(angle),
+                            out * math.sin(angle) + aside * math.cos(angle),
+                            along,
+                        ]
+                    )
+                )
+    return Surface(np.concatenate(points), np.concatenate(faces))
+
+
+def _lens(pockets: Slots, height: float) -> Surface:
+    """One balloon about its middle: x across, y along, z up; both films, their rims apart."""
+    half = _half_angle(pockets.width, height)
+    bow = pockets.width / (2 * half)
+    long = pockets.run + pockets.width
+    t = np.linspace(-1.0, 1.0, ALONG)
+    # Denser towards the ends, which are round.
+    y = long / 2 * np.sin(t * math.pi / 2)
+    beyond = np.maximum(np.abs(y) - pockets.run / 2, 0.0) / (pockets.width / 2)
+    share = np.sqrt(np.maximum(1.0 - beyond**2, 0.0))
+    u = np.linspace(-half, half, ACROSS)
+    sheets = []
+    for side in (1, -1):
+        x = bow * np.sin(u) * share[:, None]
+        z = side * bow * (np.cos(u) - math.cos(half)) * share[:, None]
+        sheets.append(np.stack([x, np.broadcast_to(y[:, None], x.shape), z], -1).reshape(-1, 3))
+    i, j = np.meshgrid(np.arange(ALONG - 1), np.arange(ACROSS - 1), indexing="ij")
+    a = (i * ACROSS + j).ravel()
+    b, c, d = a + 1, a + ACROSS, a + ACROSS + 1
+    upper = np.concatenate([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
+    lower = upper[:, ::-1] + ALONG * ACROSS
+    return Surface(np.concatenate(sheets), np.concatenate([upper, lower]))
+
+
+def _half_angle(width: float, height: float) -> float:
+    """Half the angle of an arc of length ``width`` that rises half of ``height``, up to a circle's
+    quarter: height = width (1 - cos a) / a.
+    """
+    low, high = 1e-6, math.pi / 2
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        if width * (1 - math.cos(middle)) / middle < height:
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,23 +1,26 @@
-"""Pictures of an inflated actuator: PNG, animated GIF or WebP, and GLB for viewers."""
+"""Pictures of an inflated or flat actuator: PNG, animated GIF or WebP, and GLB for viewers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from sbafab.errors import DesignError
-from sbafab.models.counterparts import counterparts_of_pose
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.surface import Surface
+from sbafab.models.paper import counterparts_of_pose
+from sbafab.reports.canvas import AMBIENT, Buffer, View, rasterize
 from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
-from sbafab.reports.render import RGB, LitBody, rendered
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
     from PIL.Image import Image
 
-    from sbafab.laminate.laminate import Laminate
     from sbafab.models.stack import Pose, Stack
 
 Movement = Literal["inflate", "circle"]
@@ -39,8 +42,8 @@ GROUND = -0.06
 
 
 @dataclass(frozen=True)
-class PictureWish:
-    """What a picture is to show.
+class PictureRequest:
+    """The request for a picture.
 
     ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, those not named 0; with "" for the
     name, of all. ``elevation`` and ``azimuth`` in degrees are where the eye stands; ``width`` and
@@ -58,7 +61,7 @@ class PictureWish:
     frames: int = FRAMES
 
 
-def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
+def pose_of(laminate: Laminate, stack: Stack, wish: PictureRequest) -> Pose:
     """The pose that a wish names. Raises DesignError for a chamber that is not there."""
     if wish.volumes_ul is not None:
         volumes = _by_chamber(laminate, wish.volumes_ul)
@@ -75,20 +78,20 @@ def pose_of(laminate: Laminate, stack: Stack, wish: PictureWish) -> Pose:
     return stack.pose(_by_chamber(laminate, wish.pressures_kpa))
 
 
-def _by_chamber(laminate: Laminate, asked: Mapping[str, float]) -> tuple[float, ...]:
+def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float, ...]:
     names = [chamber.name for chamber in laminate.chambers]
-    unknown = [name for name in asked if name and name not in names]
+    unknown = [name for name in values if name and name not in names]
     if unknown:
         raise DesignError(f"chamber {unknown[0]} is not there; the chambers are {', '.join(names)}")
-    return tuple(float(asked.get(name, asked.get("", 0.0))) for name in names)
+    return tuple(float(values.get(name, values.get("", 0.0))) for name in names)
 
 
 def write_picture(
     laminate: Laminate,
     stack: Stack,
-    wish: PictureWish,
+    wish: PictureRequest,
     path: Path,
-    told: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
     """Writes ``path``, as what its ending says, and returns the pose shown.
 
@@ -104,11 +107,11 @@ def write_picture(
         path.write_bytes(picture_png(laminate, stack, pose, wish))
     else:
         poses = list(_poses(stack, pose, wish))
-        path.write_bytes(animation(laminate, stack, poses, wish, ending, told))
+        path.write_bytes(animation(laminate, stack, poses, wish, ending, progress))
     return pose
 
 
-def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureWish) -> bytes:
+def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureRequest) -> bytes:
     """One pose, with a caption, as PNG."""
     parts = inflated(laminate, stack, pose)
     (image,) = _images([(pose, parts)], laminate, wish)
@@ -121,15 +124,15 @@ def animation(
     laminate: Laminate,
     stack: Stack,
     poses: Sequence[Pose],
-    wish: PictureWish,
+    wish: PictureRequest,
     ending: str = ".gif",
-    told: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> bytes:
     """Poses one after the other, for ever, as GIF or WebP."""
     from PIL import Image
 
     shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
-    images = _images(shown, laminate, wish, told)
+    images = _images(shown, laminate, wish, progress)
     out = BytesIO()
     if ending == ".webp":
         images[0].save(
@@ -163,10 +166,10 @@ def animation(
     return out.getvalue()
 
 
-def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
+def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
     """Poses of a moving picture, which ends where it began."""
     turns = [number / wish.frames * math.tau for number in range(wish.frames)]
-    found: list[Pose] = []
+    poses: list[Pose] = []
     if wish.motion == "circle":
         if stack.chambers < 3:
             raise DesignError("pressure goes round three chambers or more; use motion inflate")
@@ -178,8 +181,8 @@ def _poses(stack: Stack, last: Pose, wish: PictureWish) -> list[Pose]:
             tuple(p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures) for turn in turns
         ]
     for step in steps:
-        found.append(stack.pose(step, near=found[-1] if found else None))
-    return found
+        poses.append(stack.pose(step, near=poses[-1] if poses else None))
+    return poses
 
 
 def _swell(cosine: float) -> float:
@@ -191,11 +194,11 @@ def _swell(cosine: float) -> float:
 def _images(
     shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
     laminate: Laminate,
-    wish: PictureWish,
-    told: Callable[[int, int], None] | None = None,
+    wish: PictureRequest,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[Image]:
     """All poses seen from one place at one scale."""
-    from sbafab.reports.depth import view_of
+    from sbafab.reports.canvas import view_of
 
     width, height = wish.width, wish.height
     box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
@@ -208,8 +211,8 @@ def _images(
         image = rendered(bodies, view, width, height, GROUND)
         _write(image, _caption(laminate, pose, moving=len(shown) > 1), view.scale)
         images.append(image)
-        if told is not None:
-            told(len(images), len(shown))
+        if progress is not None:
+            progress(len(images), len(shown))
     return images
 
 
@@ -224,24 +227,24 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
 
 
 def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
-    """What is shown; above it what the paper measured beside a bend or height by the model."""
+    """Return the caption, above it the paper's measured bend or height beside the model's."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
     if any(note.startswith("drawn outline") for note in laminate.notes):
         model += ", drawn pockets as discs"
     if moving:
         return (f"{laminate.name}, {model}",)
-    what = "bend" if pose.bend > 0.5 else "height"
-    bent = f", bent {pose.bend:.0f} degrees" if what == "bend" else f", {pose.height:.1f} mm high"
-    said = f"{laminate.name} at {pressures} kPa{bent} ({model})"
-    beside = counterparts_of_pose(len(pose.pressures)).get(what)
-    return (beside.short, said) if beside else (said,)
+    figure = "bend" if pose.bend > 0.5 else "height"
+    bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"
+    caption = f"{laminate.name} at {pressures} kPa{bent} ({model})"
+    beside = counterparts_of_pose(len(pose.pressures)).get(figure)
+    return (beside.short, caption) if beside else (caption,)
 
 
 def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
     from PIL import ImageDraw, ImageFont
 
-    from sbafab.reports.length_bar import INK, draw_length_bar
+    from sbafab.reports.canvas import BAR_INK, draw_length_bar
 
     width, height = image.size
     size = max(11, round(height / 40))
@@ -249,15 +252,169 @@ def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
     draw = ImageDraw.Draw(image)
     for row, text in enumerate(reversed(caption)):
         at = round(0.03 * width), height - round((1.9 + 1.3 * row) * size)
-        draw.text(at, text, fill=INK, font=font)
+        draw.text(at, text, fill=BAR_INK, font=font)
     draw_length_bar(draw, 0.97 * width, height - size, width / 5, pixels_per_mm, font)
 
 
 def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
-    from sbafab.assemblies.colours import linear
-    from sbafab.meshing.write_glb import Node, write_scene
+    from sbafab.assemblies.shapes import linear
+    from sbafab.meshing.formats.glb import Node, write_scene
 
     most = max(pose.pressures)
     write_scene(
         [Node(p.name, p.surface, "TPE", linear(_colour(p, pose, most))) for p in parts], path
     )
+
+
+# Pictures of an actuator that no model inflates: flat, as PNG and as GLB for viewers.
+
+
+WHY = "no model inflates pockets that are not nearly round, or stand round a tube"
+
+
+def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) -> None:
+    """Writes ``path``, as what its ending says: the solid before inflation, so named in a PNG.
+
+    Raises DesignError for the ending of a moving picture, and for one that is none of ENDINGS.
+    """
+    ending = path.suffix.lower()
+    if ending in MOVING:
+        raise DesignError(
+            f"{path.name} would show {laminate.name} move, but {WHY}: a .png or .glb shows it "
+            "flat, and sbafab simulate inflates it"
+        )
+    if ending == ".png":
+        from sbafab.reports.solid_png import solid_png
+
+        captioned = replace(laminate, notes=(WHY,))
+        path.write_bytes(solid_png(captioned, width, height))
+    elif ending == ".glb":
+        from sbafab.meshing.formats.glb import write_glb
+        from sbafab.meshing.solid import solid
+
+        write_glb(solid(laminate), path, laminate.bonded_materials)
+    else:
+        raise DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")
+
+
+# Smooth surfaces as a picture: lit, with shade in crevices and on the ground, anti-aliased.
+
+
+RGB = tuple[int, int, int]
+LAMP = (-0.42, 0.62, 0.66)
+"""Direction to the light: right, up, toward the eye."""
+ENLARGED = 2
+CREVICES = ((0.35, 0.5), (1.2, 0.35))
+"""Radius in mm within which nearer surfaces shade a place, and by how much at most."""
+EDGE_MM = 0.5
+"""Jump in depth that is drawn as an edge."""
+EDGE = 0.72
+GLOSS, SHARPNESS = 0.22, 14.0
+SHADOW, SOFT_MM = 0.34, 0.9
+PAPER = (255, 255, 255)
+
+
+class LitBody(NamedTuple):
+    """A surface with unit normals (n, 3) of its points, and its colour on the screen."""
+
+    surface: Surface
+    normals: NDArray[np.float64]
+    colour: RGB
+
+
+def rendered(
+    bodies: Sequence[LitBody], view: View, width: int, height: int, ground: float
+) -> Image:
+    """The bodies before white paper, over a plane z = ``ground`` mm that takes their shadow.
+
+    ``view`` is of the picture ``width`` by ``height`` pixels.
+    """
+    import numpy as np
+    from PIL import Image
+
+    x, y = view.centre
+    large = View(view.axes, view.scale * ENLARGED, (ENLARGED * x, ENLARGED * y))
+    size = width * ENLARGED, height * ENLARGED
+    lamp = np.array(LAMP) / np.linalg.norm(LAMP)
+    surfaces = [body.surface for body in bodies]
+    buffer = rasterize(surfaces, large, *size, lamp, [body.normals for body in bodies])
+    palette = np.array([*(body.colour for body in bodies), PAPER], dtype=float)
+    is_paper = buffer.body < 0
+    share = (buffer.light - AMBIENT) / (1 - AMBIENT)
+    level = 0.62 + 0.42 * share
+    level *= 1 - _crevices(buffer, large.scale)
+    level[_edges(buffer)] *= EDGE
+    rgb = palette[buffer.body] * np.where(is_paper, 1.0, level)[:, :, None]
+    gloss = GLOSS * np.clip(share, 0, 1) ** SHARPNESS
+    rgb += np.where(is_paper, 0.0, gloss)[:, :, None] * (255 - rgb)
+    shadow = _shadow(surfaces, large, size, ground)
+    rgb *= np.where(is_paper, 1 - SHADOW * shadow, 1.0)[:, :, None]
+    image = Image.fromarray(np.clip(np.rint(rgb), 0, 255).astype(np.uint8), "RGB")
+    return image.reduce(ENLARGED)
+
+
+def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
+    """By what part places are darkened that lie behind what is round them."""
+    import numpy as np
+
+    far = float(buffer.depth[buffer.body >= 0].min()) if (buffer.body >= 0).any() else 0.0
+    depth = np.where(buffer.body < 0, far, buffer.depth)
+    dark = np.zeros_like(depth)
+    for radius, most in CREVICES:
+        behind = _blurred(depth, radius * scale) - depth
+        dark += most * np.clip(behind / radius, 0, 1)
+    return np.clip(dark, 0, 0.75)
+
+
+def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
+    """Means over squares about so many pixels wide, twice, for a soft edge."""
+    import numpy as np
+
+    half = max(1, round(pixels / 2))
+    for _ in range(2):
+        for axis in (0, 1):
+            ends = [(half + 1, half) if i == axis else (0, 0) for i in (0, 1)]
+            total = np.cumsum(np.pad(values, ends, mode="edge"), axis=axis)
+            width = 2 * half + 1
+            upper = np.take(total, range(width, total.shape[axis]), axis=axis)
+            lower = np.take(total, range(total.shape[axis] - width), axis=axis)
+            values = (upper - lower) / width
+    return values
+
+
+def _edges(buffer: Buffer) -> NDArray[np.bool_]:
+    """Pixels at which one body ends against another, or steps back far."""
+    import numpy as np
+
+    depth = np.where(buffer.body < 0, -1e9, buffer.depth)
+    edges = np.zeros(depth.shape, dtype=bool)
+    for axis in (0, 1):
+        before = tuple(slice(0, -1) if i == axis else slice(None) for i in (0, 1))
+        edges[before] |= np.abs(np.diff(depth, axis=axis)) > EDGE_MM
+    return edges & (buffer.body >= 0)
+
+
+def _shadow(
+    surfaces: Sequence[Surface], view: View, size: tuple[int, int], ground: float
+) -> NDArray[np.float64]:
+    """Return the share of the light above that does not reach the ground, by pixel: 0 to 1."""
+    import numpy as np
+
+    points = np.concatenate([surface.points for surface in surfaces])
+    # Light comes from above, a little from the left of the picture, wherever the eye is.
+    slant = 0.25 * view.axes[0] * np.array([1.0, 1.0, 0.0])
+    rise = points[:, 2] - ground
+    fallen = points + rise[:, None] * slant
+    fallen[:, 2] = ground
+    x, y, _ = view.flat(fallen).T
+    inside = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1]) & (rise >= -1e-6)
+    cell = max(1, round(view.scale * 0.25))
+    shape = size[1] // cell + 1, size[0] // cell + 1
+    hit = np.zeros(shape)
+    near = np.exp(-rise[inside] / 12.0)
+    np.maximum.at(hit, ((y[inside] // cell).astype(int), (x[inside] // cell).astype(int)), near)
+    # Points are sparse where triangles are large: the blur closes what lies between.
+    soft = _blurred(hit, SOFT_MM * view.scale / cell) * 2.2
+    soft = _blurred(np.clip(soft, 0, 1), SOFT_MM * view.scale / cell)
+    full = np.repeat(np.repeat(soft, cell, axis=0), cell, axis=1)[: size[1], : size[0]]
+    return _blurred(np.clip(full, 0, 1), cell)

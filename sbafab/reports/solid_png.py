@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Line, Point
-from sbafab.geometry.region import Region
+from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.region import Region, polygon
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.canvas import Canvas, Tone, keyhole
-from sbafab.reports.cutaway import RemovedSector, cutaway
 
 ELEVATION = math.radians(36.0)
 TURN = math.radians(62.0)
@@ -90,10 +90,10 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
             shapes[prism.name] = _shape(prism, cut, camera)
         _paint(prism, shapes[prism.name], camera, canvas)
     base = next(iter(shapes.values()))
-    what = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
+    content = f"{laminate.balloons} balloons" if laminate.balloons > 1 else "one balloon"
     caption = (
-        f"{laminate.name}: {laminate.bonded_materials} solid of {what} before inflation, cut open "
-        f"at {cut.chamber}; height exaggerated {factor} times"
+        f"{laminate.name}: {laminate.bonded_materials} solid of {content} before inflation, cut "
+        f"open at {cut.chamber}; height exaggerated {factor} times"
         + "".join(f"; {note}" for note in laminate.notes)
     )
     return canvas.png([rings[0] for rings in base.faces], caption, laminate.bonded_materials)
@@ -203,3 +203,65 @@ def _paint(prism: Prism, shape: Shape, camera: Camera, canvas: Canvas) -> None:
 
 def _raised(points: list[Point], lift: float) -> list[Point]:
     return [(x, y - lift) for x, y in points]
+
+
+# The sector that the picture cuts away, so that pockets, bores and neck rings show.
+
+
+LEAST_SECTOR = math.radians(44.0)
+
+
+@dataclass(frozen=True)
+class RemovedSector:
+    """A sector with its tip at ``apex``, counter-clockwise from angle ``first`` to ``last``."""
+
+    chamber: str
+    apex: Point
+    first: float
+    last: float
+    removed: Region
+
+    def on_face(self, edge: Edge) -> bool:
+        """Return True if an edge lies on one of the two faces of the cut."""
+        if not isinstance(edge, Line):
+            return False
+        return any(
+            all(_off_ray(self.apex, angle, p) < 1e-5 for p in (edge.start, edge.end))
+            for angle in (self.first, self.last)
+        )
+
+
+def cutaway(laminate: Laminate) -> RemovedSector:
+    """The sector beside one chamber: a face runs through its middle and along its inlet.
+
+    Round a lumen the tip is on the actuator's axis and the other face runs between two lobes;
+    else the tip is the chamber's middle and the sector a quarter.
+    """
+    inlet = next(iter(laminate.inlets), None)
+    u, v = inlet.direction if inlet else (1.0, 0.0)
+    last = math.atan2(v, u)
+    count = len(laminate.chambers)
+    if laminate.lumen and count > 1:
+        sector = math.pi / count
+        while sector < LEAST_SECTOR:
+            sector += math.tau / count
+        return _sector(laminate, laminate.chambers[0].name, (0.0, 0.0), last - sector, last)
+    # The chamber at the sector's open side: the quarter then cuts no other.
+    places = [(p, chamber.name) for chamber in laminate.chambers for p in chamber.centres]
+    apex, name = max(places, key=lambda place: place[0][0] * v - place[0][1] * u)
+    return _sector(laminate, name, apex, last - math.pi / 2, last)
+
+
+def _sector(
+    laminate: Laminate, chamber: str, apex: Point, first: float, last: float
+) -> RemovedSector:
+    low_x, low_y, high_x, high_y = laminate.bounds
+    reach = 4.0 * math.hypot(high_x - low_x, high_y - low_y)
+    x, y = apex
+    rays = [first, (first + last) / 2, last]
+    tips = [(x + reach * math.cos(a), y + reach * math.sin(a)) for a in rays]
+    return RemovedSector(chamber, apex, first, last, polygon([apex, *tips]))
+
+
+def _off_ray(apex: Point, angle: float, p: Point) -> float:
+    return abs((p[0] - apex[0]) * math.sin(angle) - (p[1] - apex[1]) * math.cos(angle))

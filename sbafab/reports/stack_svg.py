@@ -5,18 +5,195 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.section import Interval
-from sbafab.geometry.svg import number
-from sbafab.laminate.films import Film
-from sbafab.laminate.inks import ink
-from sbafab.laminate.laminate import Laminate
+from sbafab.geometry.region import Interval, coord, section
+from sbafab.laminate.assembly import assembly
+from sbafab.laminate.films import Film, ink
+from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
-from sbafab.reports.features import length
-from sbafab.reports.stack_labels import StackLabel, feature_labels, layer_labels, pin_labels
-from sbafab.reports.stack_pins import Rod
-from sbafab.reports.stack_section import Joint, SectionSlab, StackSection, chamber_section, opening
+from sbafab.reports.drawing import length
+
+# The dowel pins that the section cuts: through which layers each stands, and in which steps.
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A pin in the plane of the section, from ``span`` start to end.
+
+    It holds layers ``stacks``, lowest and highest index of each stack that is pressed by itself,
+    and is in at the press steps ``steps``.
+    """
+
+    name: str
+    span: Interval
+    stacks: tuple[tuple[int, int], ...]
+    steps: tuple[int, ...]
+
+    @property
+    def middle(self) -> float:
+        return (self.span[0] + self.span[1]) / 2
+
+    @property
+    def words(self) -> str:
+        many = "s" if len(self.steps) > 1 else ""
+        return f"pin {self.name}, step{many} {', '.join(map(str, self.steps))}"
+
+
+def rods(laminate: Laminate, origin: Point, direction: Point) -> tuple[Rod, ...]:
+    """The pins that a vertical plane meets, in the laminate's order; places from ``origin``."""
+    pin_rods = []
+    for pin in laminate.pins:
+        dx, dy = pin.centre[0] - origin[0], pin.centre[1] - origin[1]
+        along, aside = dx * direction[0] + dy * direction[1], dx * direction[1] - dy * direction[0]
+        radius = pin.diameter / 2
+        if abs(aside) < radius:
+            half = math.sqrt(radius**2 - aside**2)
+            stacks, steps = _stands(laminate, pin)
+            pin_rods.append(Rod(pin.name, (along - half, along + half), stacks, steps))
+    return tuple(rod for rod in pin_rods if rod.stacks)
+
+
+def _stands(laminate: Laminate, pin: Pin) -> tuple[tuple[tuple[int, int], ...], tuple[int, ...]]:
+    """Lowest and highest layer that the pin holds, stack by stack, and the steps."""
+    pinned = {
+        layer.index
+        for layers in laminate.patterns.values()
+        if pin in laminate.pins_holding(layers[0])
+        for layer in layers
+    }
+    steps = [step for step in assembly(laminate) if pin in step.pins]
+    spans = [
+        (min(joined), max(joined)) for step in steps if (joined := pinned.intersection(step.layers))
+    ]
+    whole = [
+        span
+        for span in dict.fromkeys(spans)
+        if not any(a <= span[0] and span[1] <= b for a, b in spans if (a, b) != span)
+    ]
+    return tuple(whole), tuple(step.number for step in steps)
+
+
+# The section through one chamber: which layers it shows and where each is cut.
+
+
+MOST_BALLOONS = 4
+"""Up to so many balloons are shown in full."""
+BEYOND_LUMEN = 3.25
+
+
+@dataclass(frozen=True)
+class SectionSlab:
+    """A layer cut by the plane: where along it there is film."""
+
+    layer: Layer
+    spans: tuple[Interval, ...]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """An interface cut by the plane: where along it the gap is filled with TPE."""
+
+    interface: Interface
+    spans: tuple[Interval, ...]
+
+
+@dataclass(frozen=True)
+class StackSection:
+    """The cut, in mm along the plane from the chamber's axis, positive toward its inlet.
+
+    ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
+    ``lumen`` is the axis of the actuator along the plane, where there is a lumen. ``cropped``
+    says that what lies beyond ``low`` is not shown. ``tab`` runs from the outline to its mouth.
+    """
+
+    chamber: str
+    slabs: tuple[SectionSlab, ...]
+    joints: tuple[Joint, ...]
+    low: float
+    high: float
+    cropped: bool
+    lumen: float | None
+    tab: Interval | None
+    hidden: int
+    break_above: int
+    rods: tuple[Rod, ...]
+
+
+def chamber_section(laminate: Laminate) -> StackSection:
+    """The section in the plane of the first chamber's axis and its inlet."""
+    chamber = laminate.chambers[0]
+    origin = next(
+        (bore.centre for bore in laminate.bores if bore.chamber == chamber.name),
+        chamber.centres[0],
+    )
+    inlet = next(
+        (candidate for candidate in laminate.inlets if candidate.chamber == chamber.name), None
+    )
+    direction = inlet.direction if inlet else (1.0, 0.0)
+    layers, hidden, break_above = _shown(laminate)
+    lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
+    patterns = {layer.pattern: layer.profile for layer in layers}
+    cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
+    ends = [end for spans in cuts.values() for span in spans for end in span]
+    low, high = min(ends), max(ends)
+    crop = low if lumen is None else max(low, lumen - (laminate.lumen or 0) / 2 - BEYOND_LUMEN)
+    shown = {layer.index for layer in layers}
+    joints = [
+        Joint(interface, _clipped(section(interface.bond, origin, direction), crop))
+        for interface in laminate.interfaces
+        if interface.masks and shown.issuperset(mask.index for mask in interface.masks)
+    ]
+    slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
+    return StackSection(
+        chamber.name,
+        tuple(slabs),
+        tuple(joints),
+        crop,
+        high,
+        crop > low,
+        lumen,
+        _tab(inlet, origin) if inlet else None,
+        hidden,
+        break_above,
+        tuple(rod for rod in rods(laminate, origin, direction) if rod.span[0] > crop),
+    )
+
+
+def _tab(inlet: Inlet, origin: Point) -> Interval:
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+    mouth = (x - origin[0]) * u + (y - origin[1]) * v
+    return mouth - inlet.length, mouth
+
+
+def _shown(laminate: Laminate) -> tuple[tuple[Layer, ...], int, int]:
+    """Layers to show, how many balloons are left out, and above which layer."""
+    count = laminate.balloons
+    if count <= MOST_BALLOONS:
+        return laminate.layers, 0, 0
+    bottom = [layer for layer in laminate.layers if layer.balloon is None or layer.balloon <= 2]
+    top = [
+        layer
+        for layer in laminate.layers
+        if layer.balloon == count or (layer.balloon == count - 1 and layer.role == "separator-mask")
+    ]
+    return (*bottom, *top), count - 3, bottom[-1].index
+
+
+def _clipped(spans: Sequence[Interval], low: float) -> tuple[Interval, ...]:
+    return tuple((max(start, low), end) for start, end in spans if end > low)
+
+
+def opening(spans: Sequence[Interval], at: float) -> Interval | None:
+    """The opening between two spans that holds ``at``; None where ``at`` is covered or outside."""
+    before = [end for _, end in spans if end <= at]
+    after = [start for start, _ in spans if start >= at]
+    if not before or not after or any(start < at < end for start, end in spans):
+        return None
+    return max(before), min(after)
+
 
 PAGE_WIDTH = 297.0
 LEFT, RIGHT = 56.0, 56.0
@@ -39,7 +216,7 @@ SectionDimension = tuple[Interval, str]
 
 @dataclass(frozen=True)
 class StackView:
-    """Where the section lands on the page."""
+    """The place of the section on the page."""
 
     section: StackSection
     across: float
@@ -142,14 +319,14 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
-    what = (
+    content = (
         f"Section through {view.section.chamber} along its inlet. "
-        f"Height exaggerated {view.factor}{draw.TIMES}, {number(laminate.thickness)} in all "
+        f"Height exaggerated {view.factor}{draw.TIMES}, {coord(laminate.thickness)} in all "
         "(nominal). All dimensions in mm."
     )
     return [
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
-        draw.text((10.0, 18.6), what),
+        draw.text((10.0, 18.6), content),
         *(
             draw.text((10.0, 23.4 + 4.2 * row), note, bold=True)
             for row, note in enumerate(laminate.notes)
@@ -163,13 +340,13 @@ def _breaks(view: StackView) -> list[str]:
     if section.hidden:
         last = next(s.layer for s in section.slabs if s.layer.index == section.break_above)
         base = view.y(last.z + last.film.thickness, last.index)
-        left = view.x(section.low) - (0.0 if section.cropped else 3.0)
+        x0 = view.x(section.low) - (0.0 if section.cropped else 3.0)
         right = view.x(_reach(section)) + 3.0
         for y in (base - 1.6, base - BREAK + 1.6):
-            parts.append(_wave((left, y), (right, y)))
+            parts.append(_wave((x0, y), (right, y)))
         noun = "balloon" if section.hidden == 1 else "balloons"
         words = f"\u2026 {section.hidden} more {noun} \u2026"
-        middle = ((left + right) / 2, base - BREAK / 2 + 1.0)
+        middle = ((x0 + right) / 2, base - BREAK / 2 + 1.0)
         parts.append(draw.text(middle, words, anchor="middle"))
     if section.cropped:
         x = view.x(section.low)
@@ -178,7 +355,7 @@ def _breaks(view: StackView) -> list[str]:
 
 
 def _reach(section: StackSection) -> float:
-    """How far the layers above the break go toward the inlet."""
+    """Return the distance by which the layers above the break go toward the inlet."""
     above = [s for s in section.slabs if s.layer.index > section.break_above]
     return max(end for slab in above for _, end in slab.spans)
 
@@ -301,7 +478,7 @@ def _legend(view: StackView, page: float) -> list[str]:
     y = page - 10.0
     films = dict.fromkeys(slab.layer.film for slab in view.section.slabs)
     entries = [
-        (f"{film.material} film, {number(film.thickness)}", draw.film_fill(film)) for film in films
+        (f"{film.material} film, {coord(film.thickness)}", draw.film_fill(film)) for film in films
     ]
     entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
     entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
@@ -320,6 +497,141 @@ def _legend(view: StackView, page: float) -> list[str]:
 
 
 def _bonding(films: Iterable[Film]) -> str:
-    """What flows into a gap: the structural film, if there is one alone."""
-    found = [film.material for film in films if not film.is_mask]
-    return found[0] if len(found) == 1 else "the film that melts"
+    """Return the material that flows into a gap: the structural film, if there is one alone."""
+    structural = [film.material for film in films if not film.is_mask]
+    return structural[0] if len(structural) == 1 else "the film that melts"
+
+
+# Targets of the section's leaders, measured on the section itself.
+
+
+class StackLabel(NamedTuple):
+    """Words for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
+
+    words: str
+    s: float
+    z: float
+    layer: int
+    film: Film | None = None
+
+
+def layer_labels(section: StackSection) -> list[StackLabel]:
+    """Number and role of every layer shown, pointing near its end at the inlet's side."""
+    base_end = max(slab.spans[-1][1] for slab in section.slabs if not slab.layer.is_mask)
+    labels = []
+    for slab in section.slabs:
+        if not slab.spans:
+            continue
+        end = slab.spans[-1][1]
+        words = f"{slab.layer.index} {slab.layer.role.replace('-', ' ')}"
+        if slab.layer.role == "chamber-mask" and end > base_end:
+            words += ", inlet strip"
+        placed_label = _in_slab(words, end - min(0.2, 0.25 * (end - slab.spans[-1][0])), slab)
+        labels.append(placed_label._replace(film=slab.layer.film))
+    return labels
+
+
+def pin_labels(section: StackSection, beyond_tab: bool) -> list[StackLabel]:
+    """Name and press steps of the pins on this side of the tab's end, or beyond it."""
+    mouth = section.tab[1] if section.tab else section.high
+    slabs = {slab.layer.index: slab for slab in section.slabs}
+    return [
+        _in_slab(rod.words, rod.middle, slabs[rod.stacks[-1][1]])
+        for rod in section.rods
+        if (rod.middle > mouth) == beyond_tab
+    ]
+
+
+def feature_labels(section: StackSection) -> list[StackLabel]:
+    """Bond, neck ring, overhang, bore, pocket and lumen, where the section has them."""
+    features = [
+        _bond(section),
+        _pocket(section),
+        _neck_ring(section),
+        _overhang(section),
+        _bore(section),
+        _lumen(section),
+    ]
+    return [label for label in features if label is not None]
+
+
+def _joints(section: StackSection, kind: str) -> list[Joint]:
+    return [joint for joint in section.joints if joint.interface.kind == kind and joint.spans]
+
+
+def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
+    interface = joint.interface
+    return StackLabel(words, s, interface.z + interface.gap / 2, interface.masks[0].index)
+
+
+def _bond(section: StackSection) -> StackLabel | None:
+    """The bonded ring beside the bottom pocket, on the side away from the inlet."""
+    for joint in _joints(section, "chamber"):
+        beside = [span for span in joint.spans if span[1] < 0]
+        if beside:
+            start, end = beside[-1]
+            return _in_gap(f"bond {length(end - start)}", (start + end) / 2, joint)
+    return None
+
+
+def _pocket(section: StackSection) -> StackLabel | None:
+    """The pocket of the second balloon, or of the only one (open toward its inlet)."""
+    joints = _joints(section, "chamber")[:2]
+    for joint in reversed(joints):
+        pocket = opening(joint.spans, 0.0)
+        if pocket is not None:
+            words = f"chamber pocket {length(pocket[1] - pocket[0])}"
+            return _in_gap(words, 0.6 * pocket[0], joint)
+        before = [end for _, end in joint.spans if end < 0]
+        if before:
+            return _in_gap("chamber pocket", 0.6 * max(before), joint)
+    return None
+
+
+def _neck_ring(section: StackSection) -> StackLabel | None:
+    """The bond beside the bore that carries one balloon on the next, or a sheet's window."""
+    for joint in _joints(section, "separator"):
+        for start, end in joint.spans:
+            if start < 0 < end:
+                return _in_gap(f"window, bond {length(end - start)}", (start + end) / 2, joint)
+        beside = [span for span in joint.spans if span[1] <= 0]
+        if beside:
+            start, end = max(beside)
+            return _in_gap(f"neck ring, bond {length(end - start)}", (start + end) / 2, joint)
+    return None
+
+
+def _overhang(section: StackSection) -> StackLabel | None:
+    """The lowest separator mask past the wall above it, away from the inlet if that shows."""
+    for mask, wall in pairwise(section.slabs):
+        if mask.layer.role != "separator-mask" or not mask.spans or not wall.spans:
+            continue
+        start, end = mask.spans[0][0], wall.spans[0][0]
+        if section.cropped:
+            start, end = wall.spans[-1][1], mask.spans[-1][1]
+        if end - start > 1e-3:
+            return _in_slab(f"overhang {length(end - start)}", (start + end) / 2, mask)
+    return None
+
+
+def _bore(section: StackSection) -> StackLabel | None:
+    for slab in section.slabs:
+        through = opening(slab.spans, 0.0)
+        if not slab.layer.is_mask and through is not None:
+            return _in_slab(f"bore ⌀{length(through[1] - through[0])}", 0.0, slab)
+    return None
+
+
+def _lumen(section: StackSection) -> StackLabel | None:
+    if section.lumen is None:
+        return None
+    cap = section.slabs[-1]
+    through = opening(cap.spans, section.lumen)
+    if through is None:
+        return None
+    return _in_slab(f"lumen ⌀{length(through[1] - through[0])}", section.lumen, cap)
+
+
+def _in_slab(words: str, s: float, slab: SectionSlab) -> StackLabel:
+    layer = slab.layer
+    return StackLabel(words, s, layer.z + layer.film.thickness / 2, layer.index)

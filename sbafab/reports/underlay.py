@@ -8,18 +8,18 @@ how much steadier it makes a hand was not measured.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.region import Region, coord, disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.pressing.words import listed
-from sbafab.reports.pdf import BLACK, PdfPage, Rgb, pdf
-from sbafab.reports.traveller.layup import Bed, beds
+from sbafab.pressing.schedule import joined_words
+from sbafab.reports.traveller.shapes import Bed, beds
 
 NAME = "underlay.pdf"
 PAPER = (210.0, 279.4)
@@ -83,10 +83,10 @@ class Guide:
 
     @property
     def words(self) -> str:
-        what = listed(self.films) + (", dashed" if self.is_mask else "")
+        materials = joined_words(self.films) + (", dashed" if self.is_mask else "")
         return (
-            f"{listed(self.patterns)} ({what}): outer edge, press step"
-            f"{'s' if len(self.steps) > 1 else ''} {listed([str(n) for n in self.steps])}"
+            f"{joined_words(self.patterns)} ({materials}): outer edge, press step"
+            f"{'s' if len(self.steps) > 1 else ''} {joined_words([str(n) for n in self.steps])}"
         )
 
 
@@ -101,19 +101,19 @@ def underlay_pdf(
     They show the laminate at each of the ``places`` that it has in the press, and the edge of the
     base plate, as large as the ``platen`` (mm), to be cut out along.
     """
-    found = guides(laminate)
-    if not found:
+    outlines = guides(laminate)
+    if not outlines:
         return None
     spread = leaves(laminate, places, platen)
     plate = whole_plate(laminate, platen, places).outers[0]
     pages = []
     for number, leaf in enumerate(spread, 1):
         page = PdfPage(*leaf.size)
-        _draw(page, laminate, found, places, leaf, plate)
+        _draw(page, laminate, outlines, places, leaf, plate)
         _bars(page)
         which = f", page {number} of {len(spread)}" if len(spread) > 1 else ""
         _words(page, f"{laminate.name}: alignment underlay{which}, seen from above, 1:1")
-        _notes(page, found, design_sha256, leaf)
+        _notes(page, outlines, design_sha256, leaf)
         pages.append(page)
     return pdf(pages, f"{laminate.name}: alignment underlay")
 
@@ -121,20 +121,21 @@ def underlay_pdf(
 def leaves(
     laminate: Laminate, places: Sequence[Point], platen: tuple[float, float] = PLATEN
 ) -> tuple[Leaf, ...]:
-    """Which places lie on which page, whole rows and columns of them; none without a guide.
+    """Return the places that lie on each page, whole rows and columns of them; none without a
+    guide.
 
     A laminate that is itself larger than the paper gets a page as large as it takes. No page
     reaches past the base plate, which is as large as the ``platen``.
     """
-    found = guides(laminate)
-    if not found:
+    outlines = guides(laminate)
+    if not outlines:
         return ()
-    own = _bounds(found)
+    box = _bounds(outlines)
     xs, ys = (sorted({place[axis] for place in places}) for axis in (0, 1))
-    margins = 2 * SIDE, HEAD + _foot(found)
+    margins = 2 * SIDE, HEAD + _foot(outlines)
     room = [PAPER[axis] - margins[axis] - 2 * BEYOND for axis in (0, 1)]
-    columns = _runs(xs, own[2] - own[0], room[0])
-    rows = _runs(ys, own[3] - own[1], room[1])
+    columns = _runs(xs, box[2] - box[0], room[0])
+    rows = _runs(ys, box[3] - box[1], room[1])
     plate = whole_plate(laminate, platen, places).bounds
     has_room = all(plate[axis + 2] - plate[axis] <= PAPER[axis] - margins[axis] for axis in (0, 1))
     spread = []
@@ -143,34 +144,34 @@ def leaves(
             numbers = tuple(n for n, (x, y) in enumerate(places, 1) if x in column and y in row)
             if not numbers:
                 continue
-            wide = max(column) - min(column) + own[2] - own[0] + 2 * BEYOND
-            high = max(row) - min(row) + own[3] - own[1] + 2 * BEYOND
+            wide = max(column) - min(column) + box[2] - box[0] + 2 * BEYOND
+            high = max(row) - min(row) + box[3] - box[1] + 2 * BEYOND
             size = max(PAPER[0], wide + margins[0]), max(PAPER[1], high + margins[1])
             if len(rows) * len(columns) == 1 and has_room:
                 spread.append(Leaf(size, numbers, plate, is_plate=True))
             else:
-                spans = _between(xs, column, own, plate, 0), _between(ys, row, own, plate, 1)
+                spans = _between(xs, column, box, plate, 0), _between(ys, row, box, plate, 1)
                 (x0, x1), (y0, y1) = spans
                 spread.append(Leaf(size, numbers, (x0, y0, x1, y1)))
     return tuple(spread)
 
 
-def _runs(steps: Sequence[float], own: float, room: float) -> list[list[float]]:
+def _runs(steps: Sequence[float], size: float, room: float) -> list[list[float]]:
     """Rows or columns page by page, as evenly as may be, at least one on each."""
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
-    most = max(1, int((room - own) / pitch + 1 + 1e-9)) if pitch else 1
+    most = max(1, int((room - size) / pitch + 1 + 1e-9)) if pitch else 1
     pages = -(-len(steps) // most)
     each = -(-len(steps) // pages)
     return [list(steps[first : first + each]) for first in range(0, len(steps), each)]
 
 
 def _between(
-    steps: Sequence[float], here: Sequence[float], own: Bounds, plate: Bounds, axis: int
+    steps: Sequence[float], here: Sequence[float], box: Bounds, plate: Bounds, axis: int
 ) -> tuple[float, float]:
     """From half-way to the page before to half-way to the next; at an end as far as the cross, or
     the plate.
     """
-    low, high = own[axis], own[axis + 2]
+    low, high = box[axis], box[axis + 2]
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
     half = (pitch - (high - low)) / 2
     ends = min(here) + low, max(here) + high
@@ -180,60 +181,60 @@ def _between(
 
 
 def _beyond(free: float) -> float:
-    """How far paper reaches past what is drawn on it, with so much of the plate free there."""
+    """Return the reach of paper past what is drawn on it, with so much of the plate free there."""
     return min(BEYOND, max(free, 0.0))
 
 
-def _foot(found: Sequence[Guide]) -> float:
+def _foot(outlines: Sequence[Guide]) -> float:
     """Room below the drawing for what its lines are, mm."""
-    return 24 + ROW * (len(found) + len(NOTES))
+    return 24 + ROW * (len(outlines) + len(NOTES))
 
 
 def _draw(
     page: PdfPage,
     laminate: Laminate,
-    found: tuple[Guide, ...],
+    outlines: tuple[Guide, ...],
     places: Sequence[Point],
     leaf: Leaf,
     plate: Contour,
 ) -> None:
     """The laminates of a page, numbered where there are several, its trim frame in its middle."""
-    own = _bounds(found)
-    foot = _foot(found)
-    left, low, right, top = leaf.trim
-    x = page.width / 2 - (left + right) / 2
+    box = _bounds(outlines)
+    foot = _foot(outlines)
+    x0, low, right, top = leaf.trim
+    x = page.width / 2 - (x0 + right) / 2
     y = foot + (page.height - HEAD - foot) / 2 - (low + top) / 2
     for number in leaf.places:
         place = places[number - 1]
         at = x + place[0], y + place[1]
-        _laminate(page, laminate, found, at)
+        _laminate(page, laminate, outlines, at)
         if len(places) > 1:
-            page.text((at[0] + own[0], at[1] + own[1] - 2.3), f"{number}", SMALL)
+            page.text((at[0] + box[0], at[1] + box[1] - 2.3), f"{number}", SMALL)
     page.stroke(BLACK, THIN, (0.2, 0.8))
     if leaf.is_plate:
         (frame,) = _moved(Region((plate,)), (x, y))
         page.contour(frame)
         return
-    ring = [(left, low), (right, low), (right, top), (left, top), (left, low)]
+    ring = [(x0, low), (right, low), (right, top), (x0, top), (x0, low)]
     for start, end in zip(ring, ring[1:], strict=False):
         page.line((start[0] + x, start[1] + y), (end[0] + x, end[1] + y))
 
 
-def _laminate(page: PdfPage, laminate: Laminate, found: tuple[Guide, ...], shift: Point) -> None:
+def _laminate(page: PdfPage, laminate: Laminate, outlines: tuple[Guide, ...], shift: Point) -> None:
     """The cross, the pins and the lines of one laminate."""
-    _cross(page, _bounds(found), shift)
+    _cross(page, _bounds(outlines), shift)
     for pin in laminate.pins:
         page.stroke(GREY, THIN)
         for contour in disc(pin.centre, pin.diameter / 2).moved(*shift).contours:
             page.contour(contour)
-    for guide in found:
+    for guide in outlines:
         _stroke(page, guide)
         for contour in _moved(guide.region, shift):
             page.contour(contour)
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
-    """What is laid by hand in any step, equal outlines once, in the order of the steps."""
+    """Return all that is laid by hand in any step, equal outlines once, in order of steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
     parts = assembly(laminate)
     # What is laid down again as one whole stack has no edge to lie by.
@@ -260,15 +261,15 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
 def _loose(laminate: Laminate, step: AssemblyStep, bed: Bed) -> Iterator[Layer]:
     """The layers whose edges show where a bed lies that no pin of the step holds."""
     layers = distinct_layers(laminate, bed.layers)
-    held = [layer for layer in layers if set(step.pins) & set(laminate.pins_holding(layer))]
+    pinned = [layer for layer in layers if set(step.pins) & set(laminate.pins_holding(layer))]
     if bed.made_in is None:
-        yield from (layer for layer in layers if layer not in held)
-    elif not held:
+        yield from (layer for layer in layers if layer not in pinned)
+    elif not pinned:
         yield max(layers, key=lambda layer: sum(contour.area for contour in layer.profile.outers))
 
 
-def _bounds(found: tuple[Guide, ...]) -> Bounds:
-    boxes = [guide.region.bounds for guide in found]
+def _bounds(outlines: tuple[Guide, ...]) -> Bounds:
+    boxes = [guide.region.bounds for guide in outlines]
     lows, highs = [box[:2] for box in boxes], [box[2:] for box in boxes]
     return (
         min(x for x, _ in lows),
@@ -299,13 +300,13 @@ def _bars(page: PdfPage) -> None:
     """A bar along each way of the page."""
     page.stroke(BLACK, THIN)
     y, x = page.height - HEAD + 8, 14.0
-    left, low = (page.width - BAR) / 2, page.height - HEAD - BAR
-    page.line((left, y), (left + BAR, y))
+    x0, low = (page.width - BAR) / 2, page.height - HEAD - BAR
+    page.line((x0, y), (x0 + BAR, y))
     page.line((x, low), (x, low + BAR))
     for end in (0.0, BAR):
-        page.line((left + end, y - 2), (left + end, y + 2))
+        page.line((x0 + end, y - 2), (x0 + end, y + 2))
         page.line((x - 2, low + end), (x + 2, low + end))
-    page.text((left + BAR / 2 - 8, y + 1.5), f"{BAR:g} mm", WORDS)
+    page.text((x0 + BAR / 2 - 8, y + 1.5), f"{BAR:g} mm", WORDS)
     page.text((x - 4, low - 6), f"{BAR:g} mm", WORDS)
 
 
@@ -317,10 +318,10 @@ def _words(page: PdfPage, title: str) -> None:
         page.text((14, top - 1 - ROW * number), line, WORDS)
 
 
-def _notes(page: PdfPage, found: tuple[Guide, ...], sha256: str, leaf: Leaf) -> None:
-    """What the lines are, below the drawing."""
-    y = _foot(found) - 8
-    for guide in found:
+def _notes(page: PdfPage, outlines: tuple[Guide, ...], sha256: str, leaf: Leaf) -> None:
+    """Write the meaning of the lines below the drawing."""
+    y = _foot(outlines) - 8
+    for guide in outlines:
         _stroke(page, guide)
         page.line((14, y + 1), (24, y + 1))
         page.text((27, y), guide.words, WORDS)
@@ -330,3 +331,121 @@ def _notes(page: PdfPage, found: tuple[Guide, ...], sha256: str, leaf: Leaf) -> 
         page.text((14, y), line, WORDS)
         y -= ROW
     page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)
+
+
+# Pages of lines, curves and words as PDF, in millimetres and to scale.
+#
+# PDF 1.4 without compression, dates or fonts of its own: the same pages give the same bytes with
+# every version of every library. Arcs become Bezier curves that leave them by 5e-6 of their radius.
+
+
+POINTS = 72 / 25.4
+"""Of a millimetre."""
+MOST_SWEEP = math.pi / 4
+ENCODING = "cp1252"
+"""Of the fonts that every reader has."""
+Rgb = tuple[float, float, float]
+BLACK: Rgb = (0.0, 0.0, 0.0)
+
+
+class PdfPage:
+    """A page, its lower left corner at (0, 0); what is drawn later covers what was earlier."""
+
+    def __init__(self, width: float, height: float) -> None:
+        self.width, self.height = width, height
+        self._drawn: list[str] = [f"{POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
+
+    def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
+        """Set colour, width and dashes (mm) of the lines that follow."""
+        shades = " ".join(map(coord, colour))
+        on = " ".join(map(coord, dashes))
+        self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
+
+    def contour(self, contour: Contour) -> None:
+        """A closed line of straight edges and arcs."""
+        path = [f"{_at(contour.edges[0].start)} m", *map(_drawn, contour.edges), "h S"]
+        self._drawn.append(" ".join(path))
+
+    def line(self, start: Point, end: Point) -> None:
+        self._drawn.append(f"{_at(start)} m {_at(end)} l S")
+
+    def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
+        """Words that begin at a point, ``size`` mm; what Windows-1252 does not hold becomes "?"."""
+        font = "F2" if bold else "F1"
+        self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
+
+    def objects(self, number: int) -> tuple[bytes, bytes]:
+        """The page and what is drawn on it, as objects of a file; the latter has this number."""
+        content = "\n".join(self._drawn).encode(ENCODING, "replace")
+        box = f"[0 0 {self.width * POINTS:.4f} {self.height * POINTS:.4f}]"
+        return (
+            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents {number} 0 R /Resources "
+            "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>".encode(),
+            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
+        )
+
+
+def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
+    """The whole file; a printer that obeys it prints at actual size."""
+    font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
+    drawn = [page.objects(6 + 2 * place) for place, page in enumerate(pages)]
+    kids = " ".join(f"{5 + 2 * place} 0 R" for place in range(len(pages)))
+    return _file(
+        [
+            b"<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
+            f"<< /Type /Pages /Kids [{kids}] /Count {len(pages)} >>".encode(),
+            (font % "Helvetica").encode(),
+            (font % "Helvetica-Bold").encode(),
+            *(part for pair in drawn for part in pair),
+            f"<< /Title {_string(title)} >>".encode(ENCODING, "replace"),
+        ]
+    )
+
+
+def _file(objects: Iterable[bytes]) -> bytes:
+    """Numbered objects with the table of where each begins; the last one is the file's title."""
+    data = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
+    places = []
+    for index, body in enumerate(objects, 1):
+        places.append(len(data))
+        data += b"%d 0 obj\n%s\nendobj\n" % (index, body)
+    start, count = len(data), len(places) + 1
+    data += b"xref\n0 %d\n0000000000 65535 f \n" % count
+    data += b"".join(b"%010d 00000 n \n" % place for place in places)
+    data += b"trailer\n<< /Size %d /Root 1 0 R /Info %d 0 R >>\n" % (count, count - 1)
+    data += b"startxref\n%d\n%%%%EOF\n" % start
+    return bytes(data)
+
+
+def _string(words: str) -> str:
+    for mark in "\\()":
+        words = words.replace(mark, f"\\{mark}")
+    return f"({words})"
+
+
+def _at(p: Point) -> str:
+    return f"{coord(p[0])} {coord(p[1])}"
+
+
+def _drawn(edge: Edge) -> str:
+    if not isinstance(edge, Arc):
+        return f"{_at(edge.end)} l"
+    parts = max(1, math.ceil(abs(edge.sweep) / MOST_SWEEP - 1e-9))
+    step = edge.sweep / parts
+    # Handles of this length put the curve's middle on the arc.
+    handle = 4 / 3 * math.tan(step / 4) * edge.radius
+    curves = []
+    for part in range(parts):
+        first, last = (edge.start_angle + step * n for n in (part, part + 1))
+        (x0, y0), (x1, y1) = (_round(edge, angle) for angle in (first, last))
+        leave = x0 - handle * math.sin(first), y0 + handle * math.cos(first)
+        arrive = x1 + handle * math.sin(last), y1 - handle * math.cos(last)
+        curves.append(f"{_at(leave)} {_at(arrive)} {_at((x1, y1))} c")
+    return " ".join(curves)
+
+
+def _round(edge: Arc, angle: float) -> Point:
+    return (
+        edge.centre[0] + edge.radius * math.cos(angle),
+        edge.centre[1] + edge.radius * math.sin(angle),
+    )

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
+from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
-from sbafab.reproduction import mechanics, rows
-from sbafab.reproduction.records import Row, predicted, table
+from sbafab.output.schema_ids import REPRODUCTION_SCHEMA
+from sbafab.reports.charts import relation_svg
+from sbafab.reproduction import rows
+from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
-Written by `sbafab reproduce`; this file, with a last section of its own, by
-`python -m docs.scripts.validate`, and a test holds that it is what the command writes. But for the
-section "Calibrated on the 1-DoF" no constant of a model is fitted. Where a number is itself a
-measurement of the paper (handling time, full height), the row says so. The residual is prediction
-minus paper; in parentheses, how many of the paper's own errors that is, where it gives one. A
-reason that we have not tested says "likely". Models and their ranges are in
+Written by `sbafab reproduce`. But for the section "Calibrated on the 1-DoF" no constant of a model
+is fitted. Where a number is itself a measurement of the paper (handling time, full height), the row
+says so. The residual is prediction minus paper; in parentheses, how many of the paper's own errors
+that is, where it gives one. A reason that we have not tested says "likely". Models and their
+ranges are in
 [prediction.md](prediction.md), the paper's inputs (films, widths, temperatures, errors of cutting
 and pins) in [paper.md](paper.md).
 
@@ -54,63 +59,63 @@ for every actuator, so that one number would only move the residuals about.
 """
 
 
-def tables(one: Prediction, three: Prediction) -> dict[str, list[Row]]:
+def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
     """All rows, by section."""
     return {
         "Making": list(rows.process()),
         "Sizes": list(rows.sizes(three)),
-        "Stroke and volume": [*rows.strokes(), *mechanics.fuller()],
-        "Energy": list(mechanics.energy()),
-        "Force": list(mechanics.forces(one, three)),
-        "Time and bending": list(mechanics.motion(three)),
-        "Stiffness and power": list(mechanics.stiffness(one, three)),
-        "Calibrated on the 1-DoF": list(mechanics.calibrated()),
+        "Stroke and volume": [*rows.strokes(), *rows.fuller()],
+        "Energy": list(rows.energy()),
+        "Force": list(rows.forces(single, three)),
+        "Time and bending": list(rows.motion(three)),
+        "Stiffness and power": list(rows.stiffness(single, three)),
+        "Calibrated on the 1-DoF": list(rows.calibrated()),
         "Figures of the paper's own simulations": list(rows.simulators()),
     }
 
 
 def page() -> str:
     """The text of the page."""
-    one, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    return page_of(tables(one, three), one, three)
+    single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
+    return page_of(tables(single, three), single, three)
 
 
-def page_of(found: dict[str, list[Row]], one: Prediction, three: Prediction) -> str:
-    """The same of rows that are known."""
+def page_of(sections: dict[str, list[Row]], single: Prediction, three: Prediction) -> str:
+    """Return the page of rows that are computed already."""
     parts = [HEAD]
-    for title, lines in found.items():
-        first, *others = table(title, lines)
+    for title, lines in sections.items():
+        first, *lines_below = table(title, lines)
         parts.append(first)
         if title.startswith("Calibrated"):
             parts.append(calibrated_said(lines))
-        parts += others
-    return "\n".join([*parts, FACTORS + "\n".join(mechanics.factors(one, three)), ""])
+        parts += lines_below
+    return "\n".join([*parts, FACTORS + "\n".join(rows.factors(single, three)), ""])
 
 
 def calibrated_said(lines: Sequence[Row]) -> str:
-    """What was fitted, and which of the held-out rows are as near as aimed at."""
-    given = mechanics.FITTED
-    found: dict[bool, list[str]] = {True: [], False: []}
+    """Return the fitted values, and which of the held-out rows are as near as aimed at."""
+    factors = rows.FITTED
+    names: dict[bool, list[str]] = {True: [], False: []}
     for row in lines:
-        name, _, role = row.what.rpartition(" (")
-        if mechanics.HELD_OUT in role and row.predicted is not None:
+        name, _, role = row.figure.rpartition(" (")
+        if rows.HELD_OUT in role and row.predicted is not None:
             assumed = row.model.split(" in ")[-1] if row.measured.unit == "deg" else ""
             miss = abs(row.predicted - row.measured.value)
-            is_met = miss <= mechanics.aim(row.measured)
-            found[is_met].append(f"{name} ({assumed})" if assumed else name)
-    met, missed = ("; ".join(found[kind]) or "none" for kind in (True, False))
+            is_met = miss <= rows.aim(row.measured)
+            names[is_met].append(f"{name} ({assumed})" if assumed else name)
+    met, missed = ("; ".join(names[kind]) or "none" for kind in (True, False))
     return CALIBRATED.format(
-        loss=given.pocket_loss, press=given.press_factor, met=met, missed=missed
+        loss=factors.pocket_loss, press=factors.press_factor, met=met, missed=missed
     )
 
 
-def charts(one: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
-    """The charts of what the paper shows as figures: name of the file, and relation."""
+def charts(single: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
+    """Return the charts of the paper's figures: name of the file, and relation."""
     ten = predicted("1dof-10mm")
-    wanted = (
+    figures = (
         ("figure-7a-stroke-d10", ten, "stroke"),
-        ("figure-7b-stroke-d5", one, "stroke"),
-        ("figure-8a-force-1dof", one, "force"),
+        ("figure-7b-stroke-d5", single, "stroke"),
+        ("figure-8a-force-1dof", single, "force"),
         ("figure-8a-force-3dof", three, "force"),
         ("figure-9a-bending", three, "bending"),
         ("figure-9-bend-by-pressure", three, "bend"),
@@ -118,7 +123,54 @@ def charts(one: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
     )
     return [
         (file, relation)
-        for file, found, name in wanted
-        for relation in found.relations
+        for file, prediction, name in figures
+        for relation in prediction.relations
         if relation.name == name
     ]
+
+
+# The reproduction as files: page, table for programs, charts.
+
+
+def reproduce(folder: Path) -> dict[str, list[Row]]:
+    """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder.
+
+    Raises OutputError where the folder cannot be written.
+    """
+    single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
+    sections = tables(single, three)
+    files = {
+        "reproduction.md": page_of(sections, single, three),
+        "reproduction.json": json.dumps(as_json(sections), indent=1) + "\n",
+    }
+    for name, relation in charts(single, three):
+        files[f"{name}.svg"] = relation_svg(name, relation)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be written: {error.strerror}") from None
+    return sections
+
+
+def as_json(sections: dict[str, list[Row]]) -> dict[str, Any]:
+    """Return the contents of ``reproduction.json``."""
+    return {
+        "schema": REPRODUCTION_SCHEMA,
+        "rows": [
+            {
+                "section": section,
+                "figure": row.figure,
+                "unit": row.measured.unit,
+                "where": row.measured.where,
+                "paper": row.measured.value if row.measured.unit else None,
+                "error": row.measured.error or None,
+                "predicted": None if row.predicted is None else float(f"{row.predicted:.7g}"),
+                "model": row.model,
+                "why": row.why,
+            }
+            for section, rows in sections.items()
+            for row in rows
+        ],
+    }

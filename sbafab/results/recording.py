@@ -1,42 +1,54 @@
-"""Recording what came out of one design or of a whole assembly: the same for command and Python."""
+"""Results of built actuators: recorded from Python or a batch's table, and found again."""
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.loading import load
-from sbafab.assemblies.writing import assembly_sha256
-from sbafab.design.reading import Change
+from sbafab.assemblies.files import assembly_sha256, load
+from sbafab.cutting.calibration import table_text
+from sbafab.design.files import Change
+from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256
 from sbafab.errors import DesignError
-from sbafab.output.settings import GENERATOR
-from sbafab.results.batch import read_batch
-from sbafab.results.builds import kit_name, promised, promised_assembly
-from sbafab.results.records import ERRORS, NUMBERS, TEXTS, LabResult, Record, checked
+from sbafab.results.records import (
+    COLUMNS,
+    ERRORS,
+    NUMBERS,
+    TEXTS,
+    Build,
+    LabResult,
+    Record,
+    checked,
+    kit_name,
+    promised,
+    promised_assembly,
+)
 from sbafab.results.store import Lab
+from sbafab.version import GENERATOR
 
-SAID = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
-"""What can be said of an actuator, by its name."""
+RESULT_NAMES = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
+"""Names of the values that a result of an actuator may have."""
 
 
 def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:
-    """The design, or the assembly put together, of a template, a file or the folder built from."""
+    """Return the design, or the assembly put together, of a template, a file or a run's folder."""
     if isinstance(source, Design):
         return source.with_(*changes) if changes else source
     resolved = Path(source) / "design.toml"
-    found = load(resolved if resolved.is_file() else source, changes)
-    return found if isinstance(found, Design) else assemble(found)
+    loaded = load(resolved if resolved.is_file() else source, changes)
+    return loaded if isinstance(loaded, Design) else assemble(loaded)
 
 
 def record(
     lab: Lab, built: Design | Assembled, results: Sequence[LabResult], is_again: bool = False
 ) -> list[Record]:
-    """Stores results of what was built, with what it promises; all or none.
+    """Store results of a built design, with what it promises; all or none.
 
     ``is_again``: as new attempts of actuators that were mended and tested again. Raises
     DesignError.
@@ -45,34 +57,34 @@ def record(
         sha256, kit = design_sha256(built), kit_name(built)
     else:
         sha256 = assembly_sha256(built)
-        kit = ", ".join(dict.fromkeys(kit_name(made.design) for made in built.designs))
+        kit = ", ".join(dict.fromkeys(kit_name(part.design) for part in built.designs))
     results = [replace(result, kit=result.kit or kit) for result in results]
     if lab.knows(sha256, GENERATOR):
         return lab.add(sha256, None, results, is_again)
-    said = promised(built) if isinstance(built, Design) else promised_assembly(built)
-    return lab.add(sha256, said, results, is_again)
+    promise = promised(built) if isinstance(built, Design) else promised_assembly(built)
+    return lab.add(sha256, promise, results, is_again)
 
 
-def results_of(said: Mapping[str, Any], table: str | Path | None = None) -> list[LabResult]:
-    """One result of what is said by name, or those of a table. Raises DesignError.
+def results_of(values: Mapping[str, Any], table: str | Path | None = None) -> list[LabResult]:
+    """Return one result from values by name, or those of a table. Raises DesignError.
 
     Errors are one number or several.
     """
     if table is not None:
-        if said:
-            raise DesignError(f"a table says it all; leave out {', '.join(said)}")
+        if values:
+            raise DesignError(f"a table says it all; leave out {', '.join(values)}")
         return read_batch(Path(table))
-    if not said.get("serial"):
+    if not values.get("serial"):
         raise DesignError("an actuator needs its serial; give serial, as on its traveller")
-    errors = {q.name: said[q.name] for q in ERRORS if q.name in said}
-    serial, operator, kit, note, leak = (str(said.get(name, "")) for name in (*TEXTS, "leak"))
+    errors = {q.name: values[q.name] for q in ERRORS if q.name in values}
+    serial, operator, kit, note, leak = (str(values.get(name, "")) for name in (*TEXTS, "leak"))
     result = LabResult(
         serial=serial,
         leak=leak,
         operator=operator,
         kit=kit,
         note=note,
-        numbers={q.name: float(said[q.name]) for q in NUMBERS if q.name in said},
+        numbers={q.name: float(values[q.name]) for q in NUMBERS if q.name in values},
         errors={
             name: tuple(map(float, (value,) if isinstance(value, int | float) else value))
             for name, value in errors.items()
@@ -81,3 +93,129 @@ def results_of(said: Mapping[str, Any], table: str | Path | None = None) -> list
     if result.is_empty:
         raise DesignError('say what came out, such as leak="pass" or a note')
     return [checked(result)]
+
+
+# A batch's table as it was filled in: a row an actuator, all rows or none.
+
+
+_NUMBER = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
+
+
+def read_batch(path: Path) -> list[LabResult]:
+    """Return a result for each row of a table with some of COLUMNS, "serial" among them.
+
+    Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas;
+    several errors stand in one cell, separated by blanks. Raises DesignError with the line.
+    """
+    lines = [
+        (f"{path}, line {number}", line)
+        for number, line in enumerate(table_text(path).splitlines(), start=1)
+        if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
+    ]
+    if not lines:
+        raise DesignError(f"{path} is empty; its first line names columns: {', '.join(COLUMNS)}")
+    separator = max(",;\t", key=lines[0][1].count)
+    names = [name.lower() for name in _cells(lines[0], separator)]
+    _check_names(names, path)
+    results = [_result(_row(line, names, separator), line[0]) for line in lines[1:]]
+    if not results:
+        raise DesignError(f"{path} has no row below its columns; fill in one for each actuator")
+    return results
+
+
+def _check_names(names: Sequence[str], path: Path) -> None:
+    for name in names:
+        if name and name not in COLUMNS:
+            raise DesignError(f"{path} has a column {name[:40]!r}; known are {', '.join(COLUMNS)}")
+        if name and names.count(name) > 1:
+            raise DesignError(f"{path} has two columns {name}; keep one")
+    if "serial" not in names:
+        raise DesignError(f"{path} has no column serial; each actuator needs one")
+
+
+def _cells(line: tuple[str, str], separator: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line[1]], delimiter=separator))]
+    except csv.Error as error:
+        raise DesignError(f"{line[0]} cannot be read ({error}); save the table as CSV") from None
+
+
+def _row(line: tuple[str, str], names: Sequence[str], separator: str) -> dict[str, str]:
+    cells = _cells(line, separator)
+    while len(cells) > len(names) and not cells[-1]:
+        cells.pop()
+    if len(cells) != len(names):
+        raise DesignError(
+            f"{line[0]} has {len(cells)} cells where the header has {len(names)}; write decimal "
+            "points, or part columns by semicolons"
+        )
+    return {name: cell for name, cell in zip(names, cells, strict=True) if name and cell}
+
+
+def _result(row: dict[str, str], where: str) -> LabResult:
+    if "serial" not in row:
+        raise DesignError(f"{where} has no serial")
+    serial, operator, kit, note = (row.get(name, "") for name in TEXTS)
+    result = LabResult(
+        serial=serial,
+        operator=operator,
+        kit=kit,
+        note=note,
+        leak=row.get("leak", "").lower(),
+        numbers={q.name: _number(row[q.name], q.name, where) for q in NUMBERS if q.name in row},
+        errors={
+            q.name: tuple(_number(text, q.name, where) for text in row[q.name].split())
+            for q in ERRORS
+            if q.name in row
+        },
+    )
+    if result.is_empty:
+        raise DesignError(
+            f"{where}: nothing is said of {result.serial}; fill in a cell or remove it"
+        )
+    return checked(result, where)
+
+
+def _number(text: str, column: str, where: str) -> float:
+    if _NUMBER.fullmatch(text) is None:
+        raise DesignError(f"{where}: {column} is {text[:40]!r}, not a number such as 16.8")
+    return float(text.replace(",", "."))
+
+
+# Records found by a traveller's code, a serial or a design's name.
+
+
+_HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
+
+
+def found_by(
+    text: str, serial: str, records: Sequence[Record], builds: Mapping[str, Build]
+) -> list[Record]:
+    """Return the records of the design whose hash (eight digits or more of it) the text holds.
+
+    With them come those of other designs that build the same actuator. Else those of a serial or of
+    a design of that name, or the one of that number; of these only those of ``serial``, if one is
+    given. Raises DesignError where there are none.
+    """
+    text = text.strip()
+    hashes = _HASH.findall(text.lower())
+    actuators = {
+        build.actuator
+        for build in builds.values()
+        if any(h.startswith(part) for part in hashes for h in (build.sha256, build.actuator))
+    }
+    matches = [record for record in records if builds[record.design_sha256].actuator in actuators]
+    if not matches:
+        matches = [
+            record
+            for record in records
+            if text in (record.serial, builds[record.design_sha256].name, str(record.id))
+        ]
+    matches = [record for record in matches if serial in ("", record.serial)]
+    if not matches:
+        query = " ".join([*text.split(), serial]).strip()[:60]
+        raise DesignError(
+            f"no record goes with {query!r}; give a serial, a design's name, 8 "
+            "digits or more of its sha256, or what the traveller's code says"
+        )
+    return matches

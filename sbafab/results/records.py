@@ -1,4 +1,4 @@
-"""What is recorded of an actuator that was built: what came out, by whom, and what was measured."""
+"""Records of built actuators: test results, operator, measurements, promises of the design."""
 
 from __future__ import annotations
 
@@ -8,7 +8,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, NamedTuple
 
+from sbafab.actuators import build as laminate_of
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_toml
+from sbafab.design.identity import actuator_sha256, design_sha256, kit_of
+from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError
+from sbafab.models.figures import Prediction, PredictionRequest
+from sbafab.models.formulas import burst_pressure
+from sbafab.models.paper import BURST
+from sbafab.models.prediction import predict
+from sbafab.output.checked import limits
+from sbafab.rules.registration_yield import simulate
+from sbafab.version import GENERATOR
 
 PASS, FAIL = "pass", "fail"
 LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
@@ -17,7 +29,7 @@ _UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class Measurand(NamedTuple):
-    """A number that is measured: its unit, the most that can be meant, and the option's name."""
+    """A measured number: its unit, the largest plausible value, and the option's name."""
 
     name: str
     unit: str
@@ -48,7 +60,7 @@ COLUMNS = (*TEXTS[:3], "leak", *(q.name for q in (*NUMBERS, *ERRORS)), "note")
 
 @dataclass(frozen=True)
 class LabResult:
-    """What one record says of the actuator ``serial``; what it does not say is empty.
+    """A record of the actuator ``serial``; a field that it does not state is empty.
 
     ``leak`` is "pass", "fail" or "". ``operator`` built it. Units stand in the names of NUMBERS
     and ERRORS; errors are sizes without sign.
@@ -65,26 +77,26 @@ class LabResult:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it says nothing that came out."""
+        """True if no result is stated."""
         return not (self.leak or self.note or self.numbers or self.errors)
 
     @property
     def once(self) -> dict[str, str | float]:
-        """What only one record of an actuator may say."""
+        """The values that only one record of an actuator may state."""
         texts = {"leak": self.leak, "operator": self.operator, "kit": self.kit}
         return {**{name: text for name, text in texts.items() if text}, **self.numbers}
 
-    def changed(self, other: LabResult) -> LabResult:
-        """The same with all that ``other`` says in its place."""
+    def changed(self, change: LabResult) -> LabResult:
+        """Return the result with all that ``change`` states in its place."""
         texts = {
-            name: getattr(other, name) for name in (*TEXTS, "leak") if getattr(other, name) != ""
+            name: getattr(change, name) for name in (*TEXTS, "leak") if getattr(change, name) != ""
         }
         return replace(
             self,
             **texts,
-            numbers={**self.numbers, **other.numbers},
-            errors={**self.errors, **other.errors},
-            withdrawn=other.withdrawn,
+            numbers={**self.numbers, **change.numbers},
+            errors={**self.errors, **change.errors},
+            withdrawn=change.withdrawn,
         )
 
 
@@ -104,7 +116,7 @@ class Record(LabResult):
     def as_dict(self) -> dict[str, Any]:
         """The record for JSON; units stand in the keys."""
         plain = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {**plain, "errors": {name: list(found) for name, found in self.errors.items()}}
+        return {**plain, "errors": {name: list(sizes) for name, sizes in self.errors.items()}}
 
 
 @dataclass(frozen=True)
@@ -162,3 +174,89 @@ def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
             f"{place}{quantity.name} is {value:g}; it must be {least}, at most {quantity.most:,g} "
             f"{quantity.unit}"
         )
+
+
+# Promises of a design, stored with its records so that a report needs no design file.
+
+
+FIGURES = {
+    "stroke_mm": ("full stroke", ""),
+    "force_n": ("blocked force at 100 kPa, flat", "virtual work on Eq. 4"),
+    "height_mm": ("deflated height", ""),
+    "mass_g": ("mass", ""),
+}
+"""The prediction's figure and model that a measured quantity is held against."""
+TOLERANCES = {
+    "offset_mm": "hand_placement",
+    "turn_deg": "hand_turn",
+    "cut_mm": "cutting_error",
+}
+"""The key of [registration] that bounds a measured error."""
+
+
+def promised(design: Design) -> Build:
+    """The design with its predictions, tolerances and yield. Raises DesignError."""
+    laminate = laminate_of(design)
+    share = simulate(laminate, limits(design)).whole
+    registration = design.registration
+    return Build(
+        sha256=design_sha256(design),
+        generator=GENERATOR,
+        name=design.name,
+        family=design.family,
+        method=registration.method,
+        toml=design_toml(design),
+        predicted=_predicted(
+            predict(design, PredictionRequest(pressures_kpa=(100.0,))),
+            burst_pressure(design.form, laminate),
+        ),
+        tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
+        good_builds=(share.good, share.builds),
+        actuator_sha256=actuator_sha256(design),
+    )
+
+
+def promised_assembly(assembled: Assembled) -> Build:
+    """Return the promises of an assembly: it holds where every part holds. Raises DesignError."""
+    good, builds = 1.0, 0
+    for part in assembled.designs:
+        share = simulate(part.laminate, limits(part.design)).whole
+        good *= (share.good / share.builds) ** len(part.parts)
+        builds = max(builds, share.builds)
+    designs = [part.design for part in assembled.designs]
+    return Build(
+        sha256=assembly_sha256(assembled),
+        generator=GENERATOR,
+        name=assembled.assembly.name,
+        family="assembly",
+        method=", ".join(dict.fromkeys(design.registration.method for design in designs)),
+        toml=assembly_toml(assembled),
+        predicted={},
+        tolerances={
+            name: max(getattr(design.registration, key) for design in designs)
+            for name, key in TOLERANCES.items()
+        },
+        good_builds=(round(good * builds), builds),
+        actuator_sha256=assembled_sha256(assembled),
+    )
+
+
+def kit_name(design: Design) -> str:
+    """The name of the design's kit, as the kit's file says it. Raises DesignError."""
+    return kit_of(design).name
+
+
+def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[float, str]]:
+    """Return the prediction of each quantity and its model; the paper's burst pressure, scaled
+    to the design's pockets.
+    """
+    figures = {}
+    if burst is not None:
+        model_text = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
+        figures["burst_kpa"] = (burst, model_text)
+    for quantity, (name, model) in FIGURES.items():
+        for figure in prediction.figures:
+            if figure.name == name and figure.model.title.startswith(model):
+                figures[quantity] = (figure.value, figure.model.title)
+                break
+    return figures

@@ -1,4 +1,4 @@
-"""What a lab's records say together: success, measured against predicted, tolerances.
+"""Evaluation of a lab's records: success, measured against predicted, tolerances.
 
 Designs that build the same actuator (``Build.actuator``) count as one. An actuator that was mended
 and tested again counts by its first attempt.
@@ -6,16 +6,53 @@ and tested again counts by its first attempt.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from statistics import mean, stdev
 from typing import Any, Literal, NamedTuple
 
+from sbafab.cutting.calibration import Value, student_t
 from sbafab.errors import DesignError
-from sbafab.results.builds import TOLERANCES
-from sbafab.results.intervals import Most, mean_of, most_of
-from sbafab.results.records import ERRORS, NUMBERS, PASS, Build, Record
+from sbafab.results.records import ERRORS, NUMBERS, PASS, TOLERANCES, Build, Record
+from sbafab.results.store import rebuilt, yield_with
 from sbafab.rules.registration_yield import Share
+
+# Intervals of 95 % for what a few measurements say, by closed formulas.
+
+
+DOUBT = 0.05
+
+
+class Most(NamedTuple):
+    """The largest of some errors, and the most that it leaves room for (95 %).
+
+    An error is never larger than its tolerance, so the tolerance lies between both.
+    """
+
+    errors: int
+    largest: float
+    highest: float
+
+
+def mean_of(values: Sequence[float]) -> Value | None:
+    """Return the mean with Student's interval; None for fewer than two values."""
+    if len(values) < 2:
+        return None
+    uncertainty = stdev(values) / math.sqrt(len(values))
+    return Value(mean(values), uncertainty, student_t(len(values) - 1) * uncertainty)
+
+
+def most_of(errors: Sequence[float], dimensions: int) -> Most:
+    """The bound of errors that are spread evenly within it, as registration-yield assumes.
+
+    On a line (1 dimension) the largest of n stays below m with (m / bound) ** n, over a disc (2)
+    with (m / bound) ** 2n; the highest bound is the one under which that is 5 %.
+    """
+    largest = max(errors)
+    return Most(len(errors), largest, largest / DOUBT ** (1 / (dimensions * len(errors))))
+
 
 By = Literal["all", "design", "kit", "method", "operator"]
 UNSAID = "not said"
@@ -49,7 +86,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Success:
-    """How many actuators of a group passed the leak test at once, of those that were tested.
+    """Actuators of a group that passed the leak test at once, of those that were tested.
 
     ``passed_later`` more passed at a later attempt.
     """
@@ -85,7 +122,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Whether the prediction lies in the interval of the mean, in words."""
+        """The place of the prediction relative to the interval of the mean, in words."""
         if self.predicted is None:
             return "not predicted"
         if self.low is None or self.high is None:
@@ -111,7 +148,7 @@ class Tolerance:
 
     @property
     def verdict(self) -> str:
-        """Whether the stated tolerance holds, in words."""
+        """The measured errors relative to the stated tolerance, in words."""
         if self.found.largest > self.stated:
             return "too small"
         return "holds" if self.stated <= self.found.highest else "wider than needed"
@@ -220,49 +257,49 @@ def _share(share: Share) -> dict[str, Any]:
 
 
 def standing(records: Iterable[Record]) -> list[Record]:
-    """The records that no other one corrects and none withdraws."""
+    """Return the records that no other one corrects and none withdraws."""
     records = list(records)
     corrected = {record.corrects for record in records}
     return [r for r in records if r.id not in corrected and not r.withdrawn]
 
 
 def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]:
-    """The actuators, by what was built and serial, in the order of their first record."""
+    """Return the actuators, by what was built and serial, in the order of their first record."""
     names = _names(builds)
-    found = []
+    actuators = []
     for (actuator, serial), unsorted in _by_actuator(records, builds).items():
         # The first attempt comes first; in each, the first record.
-        own = sorted(unsorted, key=lambda record: record.attempt)
+        history = sorted(unsorted, key=lambda record: record.attempt)
         errors: dict[str, tuple[float, ...]] = {}
         numbers: dict[str, float] = {}
-        for record in own:
+        for record in history:
             for name, values in record.errors.items():
                 errors[name] = (*errors.get(name, ()), *values)
             numbers = {**record.numbers, **numbers}
-        tests = [(record.attempt, record.leak) for record in own if record.leak]
+        tests = [(record.attempt, record.leak) for record in history if record.leak]
         first = min(tests, default=(1, ""))[0]
-        found.append(
+        actuators.append(
             Built(
                 actuator=actuator,
-                design_sha256=own[0].design_sha256,
+                design_sha256=history[0].design_sha256,
                 serial=serial,
                 design=names[actuator],
-                method=builds[own[0].design_sha256].method,
-                kit=_first(own, "kit"),
-                operator=_first(own, "operator"),
-                leak=_first(own, "leak"),
+                method=builds[history[0].design_sha256].method,
+                kit=_first(history, "kit"),
+                operator=_first(history, "operator"),
+                leak=_first(history, "leak"),
                 numbers=numbers,
                 errors=errors,
-                passed_later=_first(own, "leak") != PASS
+                passed_later=_first(history, "leak") != PASS
                 and any(attempt > first and leak == PASS for attempt, leak in tests),
             )
         )
-    return found
+    return actuators
 
 
-def _first(own: Iterable[Record], name: str) -> str:
-    """What the first record that says something of it says."""
-    return next((said for said in (getattr(record, name) for record in own) if said), "")
+def _first(history: Iterable[Record], name: str) -> str:
+    """Return the first value that a record states."""
+    return next((text for text in (getattr(record, name) for record in history) if text), "")
 
 
 def _by_actuator(
@@ -282,14 +319,14 @@ def contradictions(records: Iterable[Record], builds: Mapping[str, Build]) -> li
     by designs that differ in order or sheets alone.
     """
     sentences = []
-    for (_, serial), own in _by_actuator(records, builds).items():
+    for (_, serial), history in _by_actuator(records, builds).items():
         before: dict[tuple[int, str], tuple[object, int]] = {}
-        for record in own:
+        for record in history:
             for name, value in record.once.items():
-                other, number = before.setdefault((record.attempt, name), (value, record.id))
-                if other != value:
+                earlier, number = before.setdefault((record.attempt, name), (value, record.id))
+                if earlier != value:
                     sentences.append(
-                        f"serial {serial} has {name} = {other} in record {number} and {value} in "
+                        f"serial {serial} has {name} = {earlier} in record {number} and {value} in "
                         f"record {record.id}; correct one of them with --correct"
                     )
     return sentences
@@ -309,55 +346,57 @@ def _names(builds: Mapping[str, Build]) -> dict[str, str]:
 
 
 def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
-    """What the records say; every design recorded must be among ``builds``."""
-    found = items(records, builds)
+    """Evaluate the records; every design recorded must be among ``builds``."""
+    actuators = items(records, builds)
     return Report(
         len(records),
-        len(found),
-        tuple(_success(found)),
-        tuple(_comparisons(found, builds)),
-        tuple(_tolerances(found, builds)),
-        tuple(_promises(found, builds)),
+        len(actuators),
+        tuple(_success(actuators)),
+        tuple(_comparisons(actuators, builds)),
+        tuple(_tolerances(actuators, builds)),
+        tuple(_promises(actuators, builds)),
         tuple(contradictions(records, builds)),
     )
 
 
-def _groups(found: Iterable[Built], key: Callable[[Built], Any]) -> list[tuple[Any, list[Built]]]:
+def _groups(
+    actuators: Iterable[Built], key: Callable[[Built], Any]
+) -> list[tuple[Any, list[Built]]]:
     groups: dict[Any, list[Built]] = defaultdict(list)
-    for item in found:
+    for item in actuators:
         groups[key(item)].append(item)
     return sorted(groups.items())
 
 
-def _passed(own: Sequence[Built]) -> Share:
-    return Share(sum(item.leak == PASS for item in own), len(own))
+def _passed(group: Sequence[Built]) -> Share:
+    return Share(sum(item.leak == PASS for item in group), len(group))
 
 
-def _later(own: Sequence[Built]) -> int:
-    return sum(item.passed_later for item in own)
+def _later(group: Sequence[Built]) -> int:
+    return sum(item.passed_later for item in group)
 
 
-def _success(found: Sequence[Built]) -> Iterable[Success]:
-    tested = [item for item in found if item.leak]
+def _success(actuators: Sequence[Built]) -> Iterable[Success]:
+    tested = [item for item in actuators if item.leak]
     if tested:
         yield Success("all", "all", _passed(tested), _later(tested))
-    told: dict[By, Callable[[Built], str]] = {
+    groupings: dict[By, Callable[[Built], str]] = {
         "design": lambda item: item.design,
         "kit": lambda item: item.kit or UNSAID,
         "method": lambda item: item.method,
         "operator": lambda item: item.operator or UNSAID,
     }
-    for by, key in told.items():
-        for name, own in _groups(tested, key):
-            yield Success(by, name, _passed(own), _later(own))
+    for by, key in groupings.items():
+        for name, group in _groups(tested, key):
+            yield Success(by, name, _passed(group), _later(group))
 
 
-def _comparisons(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Comparison]:
+def _comparisons(actuators: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Comparison]:
     newest = {build.actuator: build for build in builds.values()}
-    for (design, actuator), own in _groups(found, lambda item: (item.design, item.actuator)):
+    for (design, actuator), group in _groups(actuators, lambda item: (item.design, item.actuator)):
         for quantity in NUMBERS:
             name = quantity.name
-            values = [item.numbers[name] for item in own if name in item.numbers]
+            values = [item.numbers[name] for item in group if name in item.numbers]
             if not values:
                 continue
             predicted, model = newest[actuator].predicted.get(name, (None, ""))
@@ -376,40 +415,40 @@ def _comparisons(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterabl
             )
 
 
-def _tolerances(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Tolerance]:
+def _tolerances(actuators: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Tolerance]:
     for quantity in ERRORS:
         name = quantity.name
-        measured = [item for item in found if item.errors.get(name)]
+        measured = [item for item in actuators if item.errors.get(name)]
 
         def stated(item: Built, name: str = name) -> tuple[str, str, float]:
             hand = (item.operator or UNSAID) if name != CUT else ""
             return item.kit or UNSAID, hand, builds[item.design_sha256].tolerances[name]
 
-        for (kit, operator, value), own in _groups(measured, stated):
-            errors = [error for item in own for error in item.errors[name]]
+        for (kit, operator, value), group in _groups(measured, stated):
+            errors = [error for item in group for error in item.errors[name]]
             most = most_of(errors, DIMENSIONS[name])
             key = f"registration.{TOLERANCES[name]}"
             yield Tolerance(kit, operator, name, quantity.unit, key, value, most)
 
 
-def _promises(found: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Promise]:
-    tested = [item for item in found if item.leak]
-    for (design, _), own in _groups(tested, lambda item: (item.design, item.actuator)):
-        stated = [builds[item.design_sha256] for item in own]
-        promised = sum(build.good_builds[0] / build.good_builds[1] for build in stated) / len(own)
-        bounds = _bounds(own, found)
+def _promises(actuators: Sequence[Built], builds: Mapping[str, Build]) -> Iterable[Promise]:
+    tested = [item for item in actuators if item.leak]
+    for (design, _), group in _groups(tested, lambda item: (item.design, item.actuator)):
+        stated = [builds[item.design_sha256] for item in group]
+        promised = sum(build.good_builds[0] / build.good_builds[1] for build in stated) / len(group)
+        bounds = _bounds(group, actuators)
         is_enough = all(
             bound.largest <= build.tolerances[name]
             for name, bound in bounds.items()
             for build in stated
         )
         measured = _measured_yield(stated[-1], bounds) if bounds else None
-        yield Promise(design, _passed(own), promised, measured, is_enough)
+        yield Promise(design, _passed(group), promised, measured, is_enough)
 
 
-def _bounds(own: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
+def _bounds(group: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
     """The errors of the hands and lasers that built these, measured on whatever they built."""
-    hands = {(item.kit, item.operator) for item in own}
+    hands = {(item.kit, item.operator) for item in group}
     kits = {kit for kit, _ in hands}
     bounds = {}
     for name, dimensions in DIMENSIONS.items():
@@ -426,8 +465,6 @@ def _bounds(own: Iterable[Built], every: Iterable[Built]) -> dict[str, Most]:
 
 def _measured_yield(build: Build, bounds: Mapping[str, Most]) -> MeasuredYield | None:
     """The yield of a recorded design with measured errors for stated ones."""
-    from sbafab.results.rebuilt import rebuilt, yield_with
-
     design = rebuilt(build)
     if design is None:
         return None

@@ -9,16 +9,23 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
+from sbafab.actuators import build as laminate_of
+from sbafab.actuators import records
+from sbafab.design.files import ASSEMBLY
+from sbafab.design.identity import actuator_sha256
+from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
-from sbafab.results.rebuilt import actuator_of
+from sbafab.output.checked import limits
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
+from sbafab.rules.registration_yield import Share, simulate
 
 APPLICATION = 0x5BAFAB
 VERSION = 2
@@ -99,7 +106,7 @@ class Lab:
         self.path, self.patience, self.clock = path, patience, clock
 
     def knows(self, sha256: str, generator: str) -> bool:
-        """Whether this design is stored as this version predicts it."""
+        """True if this design is stored with the predictions of this version."""
         if not self.path.exists():
             return False
         with self._reading() as (rows, _):
@@ -135,11 +142,11 @@ class Lab:
             return added
 
     def correct(self, number: int, change: LabResult) -> Record:
-        """Stores a record that says what ``number`` says but for what ``change`` says."""
+        """Store a record that repeats ``number`` but for what ``change`` states."""
         if not self.path.exists():
             raise OutputError(f"{self.path} does not exist, so there is no record to correct")
         with self._writing() as rows:
-            old = _one(rows, number)
+            old = _record_numbered(rows, number)
             if old is None:
                 raise DesignError(
                     f"{self.path} holds no record {number}; see: sbafab record --find"
@@ -175,9 +182,9 @@ class Lab:
         live: Sequence[Record],
     ) -> Record:
         if not result.withdrawn:
-            for other in live:
-                if other.id != corrects and other.attempt == attempt:
-                    _refuse_contradiction(result, other)
+            for live_record in live:
+                if live_record.id != corrects and live_record.attempt == attempt:
+                    _refuse_contradiction(result, live_record)
         values = (
             *(None, self.clock().strftime("%Y-%m-%dT%H:%M:%SZ"), sha256, corrects),
             int(result.withdrawn),
@@ -191,14 +198,14 @@ class Lab:
             f"INSERT INTO result ({', '.join(_RESULT)}) VALUES ({marks})", values
         ).lastrowid
         assert added is not None
-        stored = _one(rows, added)
+        stored = _record_numbered(rows, added)
         assert stored is not None
         return stored
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """One transaction, in a file that is made where there is none."""
-        with self._told(), closing(self._open()) as rows:
+        with self._sqlite_errors(), closing(self._open()) as rows:
             rows.execute("BEGIN IMMEDIATE")
             try:
                 _bring_up_to_date(rows, self._version(rows))
@@ -216,7 +223,7 @@ class Lab:
                 f"{self.path} is no file of records; record something first, or name the lab's "
                 "file with --lab"
             )
-        with self._told(), closing(self._open("?mode=ro")) as rows:
+        with self._sqlite_errors(), closing(self._open("?mode=ro")) as rows:
             rows.execute("BEGIN")
             version = self._version(rows)
             if version == 0:
@@ -258,8 +265,8 @@ class Lab:
         return int(version)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Turns what SQLite says into one sentence."""
+    def _sqlite_errors(self) -> Iterator[None]:
+        """Turn SQLite's errors into one sentence."""
         try:
             yield
         except sqlite3.Error as error:
@@ -289,7 +296,7 @@ def _shape(rows: sqlite3.Connection) -> set[tuple[object, ...]]:
 
 @cache
 def _shape_of(version: int) -> set[tuple[object, ...]]:
-    """What a new file of a version holds."""
+    """Return the tables, indices and triggers of a new file of a version."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as rows:
         _make(rows)
         if version > 1:
@@ -333,25 +340,25 @@ def _make(rows: sqlite3.Connection) -> None:
     """Makes the tables of version 1."""
     for statement in _SCHEMA.split(";"):
         rows.execute(statement)
-    for name, what in _TRIGGERS.items():
-        rows.execute(_KEPT.format(name=name, what=what))
+    for name, event in _TRIGGERS.items():
+        rows.execute(_KEPT.format(name=name, what=event))
     rows.execute(f"PRAGMA application_id = {APPLICATION}")
     rows.execute("PRAGMA user_version = 1")
 
 
 def _is_known(rows: sqlite3.Connection, sha256: str, generator: str) -> bool:
-    asked = "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?"
-    return rows.execute(asked, (sha256, generator)).fetchone() is not None
+    query = "SELECT 1 FROM design WHERE sha256 = ? AND generator = ?"
+    return rows.execute(query, (sha256, generator)).fetchone() is not None
 
 
 def _put_build(rows: sqlite3.Connection, build: Build) -> None:
     plain = [getattr(build, name) for name in _BUILD[:6]]
-    told = [
+    tables = [
         json.dumps(value, sort_keys=True)
         for value in (dict(build.predicted), dict(build.tolerances), list(build.good_builds))
     ]
     marks = ", ".join("?" * len(_BUILD))
-    values = [*plain, *told, build.actuator_sha256]
+    values = [*plain, *tables, build.actuator_sha256]
     rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", values)
 
 
@@ -359,10 +366,10 @@ def _builds(
     rows: sqlite3.Connection, version: int = VERSION, sha256: Sequence[str] = ()
 ) -> list[Build]:
     """The designs, or those of the hashes, in the order in which they were recorded."""
-    asked = f"SELECT {', '.join(_columns(_BUILD, version))} FROM design"
+    query = f"SELECT {', '.join(_columns(_BUILD, version))} FROM design"
     if sha256:
-        asked += f" WHERE sha256 IN ({', '.join('?' * len(sha256))})"
-    return [_build(row) for row in rows.execute(f"{asked} ORDER BY rowid", sha256)]
+        query += f" WHERE sha256 IN ({', '.join('?' * len(sha256))})"
+    return [_build(row) for row in rows.execute(f"{query} ORDER BY rowid", sha256)]
 
 
 def _live(rows: sqlite3.Connection, sha256: str, serial: str) -> list[Record]:
@@ -393,7 +400,7 @@ def _build(row: Sequence[str]) -> Build:
     return replace(build, actuator_sha256=actuator_of(build))
 
 
-def _one(rows: sqlite3.Connection, number: int) -> Record | None:
+def _record_numbered(rows: sqlite3.Connection, number: int) -> Record | None:
     row = rows.execute(f"{_select()} WHERE id = ?", (number,)).fetchone()
     return None if row is None else _record(row)
 
@@ -423,16 +430,68 @@ def _record(row: Sequence[object]) -> Record:
     return record
 
 
-def _refuse_contradiction(result: LabResult, other: Record) -> None:
+def _refuse_contradiction(result: LabResult, stored: Record) -> None:
     for name, value in result.once.items():
-        if name in other.once and other.once[name] != value:
+        if name in stored.once and stored.once[name] != value:
             raise DesignError(
-                f"serial {result.serial} has {name} = {other.once[name]} in record {other.id}; "
-                f"where that is wrong, add: sbafab record --correct {other.id}; where it was "
+                f"serial {result.serial} has {name} = {stored.once[name]} in record {stored.id}; "
+                f"where that is wrong, add: sbafab record --correct {stored.id}; where it was "
                 "mended and tested again, record that with --again"
             )
-        if name in other.once and name not in ("operator", "kit"):
+        if name in stored.once and name not in ("operator", "kit"):
             raise DesignError(
-                f"serial {result.serial} has {name} = {value} in record {other.id} already; leave "
+                f"serial {result.serial} has {name} = {value} in record {stored.id} already; leave "
                 "it out, or choose another serial"
             )
+
+
+# Designs read again from a lab's file of records, as this version understands them.
+
+
+BUILDS = 2000
+"""Random builds at most: their interval of 2 % is within what a few measured errors leave open."""
+
+
+def rebuilt(build: Build) -> Design | None:
+    """Return the design of a record; None of an assembly and of what cannot be read any more.
+
+    All that its kit gave stands in the record, so the kit's file is not asked for. A drawn outline
+    is not in it: the file at its path may be another by now.
+    """
+    try:
+        tables = tomllib.loads(build.toml)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return None
+    tables.pop("kit", None)
+    if not tables or tables.get("family") == ASSEMBLY:
+        return None
+    try:
+        design = validated(tables, records(), Path())
+    except DesignError:
+        return None
+    return None if design.drawing is not None else design
+
+
+def actuator_of(build: Build) -> str:
+    """Return the hash by which records of a design are grouped, as this version counts it.
+
+    So an earlier version's record groups with today's, also where keys were added since. What
+    cannot be read again has the hash of its day, or that of the design.
+    """
+    design = rebuilt(build)
+    return build.actuator if design is None else actuator_sha256(design)
+
+
+def yield_with(design: Design, errors: Mapping[str, float]) -> Share:
+    """Return the share of random builds that keep every limit with other errors than stated.
+
+    ``errors``: the most by which placement (mm), turn (degrees) or cutting (mm) are off, by the
+    name in Tolerances. Raises DesignError where the design cannot be built.
+    """
+    stated = limits(design)
+    bench = replace(
+        stated,
+        tolerances=replace(stated.tolerances, **errors),
+        yield_builds=min(stated.yield_builds or BUILDS, BUILDS),
+    )
+    return simulate(laminate_of(design), bench).whole

@@ -3,34 +3,45 @@
 from __future__ import annotations
 
 from sbafab.geometry.width import Width
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import DistinctInterface, Measures, distinct_interfaces, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "bond-width"
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The least width of any bond, measured between facing edges."""
-    measures = measures or Measures(laminate, limits)
-    worst: tuple[float, Width | None, Alike] | None = None
-    for alike in distinct_interfaces(laminate):
-        bond = alike.interface.bond
-        width = measures.bond(alike.interface)
+    laminate, limits = measures.laminate, measures.limits
+    worst: tuple[float, Width | None, DistinctInterface] | None = None
+    for distinct in distinct_interfaces(laminate):
+        bond = distinct.interface.bond
+        width = measures.bond(distinct.interface)
         if width is None and not bond.is_empty:
             continue
         value = width.value if width else 0.0
         if worst is None or value < worst[0] - 1e-9:
-            worst = value, width, alike
+            worst = value, width, distinct
     if worst is None:
         return [_finding(None, limits, Place(), "the laminate has no bond to measure")]
-    value, width, alike = worst
-    interface = alike.interface
+    value, width, distinct = worst
+    interface = distinct.interface
     x, y = width.middle if width else (None, None)
     place = Place(interface.index, interface.layer_indices, x, y)
-    return [_finding(value, limits, place, _message(value, width, alike, limits))]
+    return [_finding(value, limits, place, _message(value, width, distinct, limits))]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every bond is at least 0.75 mm wide between facing edges",
+        "A narrower ring peels or leaks under pressure; the paper found 0.75 mm to hold (Sec. 2).",
+        "Make bond.width larger, move what lies near the edge away from it, or round the outline.",
+        ("rules.bond_width", "bond.width"),
+    ),
+)
 
 
 def _finding(value: float | None, limits: Limits, place: Place, message: str) -> Finding:
@@ -38,8 +49,8 @@ def _finding(value: float | None, limits: Limits, place: Place, message: str) ->
     return Finding(NAME, "pass" if good else "fail", limits.bond_width, value, "mm", place, message)
 
 
-def _message(value: float, width: Width | None, alike: Alike, limits: Limits) -> str:
-    where = interface_name(alike.interface) + alike.others
+def _message(value: float, width: Width | None, distinct: DistinctInterface, limits: Limits) -> str:
+    where = interface_name(distinct.interface) + distinct.suffix
     if width is None:
         return f"nothing bonds at {where}: the mask covers all of it; make the mask smaller"
     narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"

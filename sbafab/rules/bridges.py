@@ -9,10 +9,11 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import least_width
-from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.laminate.panel import SheetPanel, freed
+from sbafab.laminate.laminate import Laminate, Layer, SheetPanel, freed
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "bridges"
 LEAST = 0.5
@@ -33,8 +34,9 @@ class _Wrong(NamedTuple):
     message: str
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The narrowest bridge; fails as well where a part is loose, or not freed as it should be."""
+    laminate, limits = measures.laminate, measures.limits
     limit = max(LEAST, limits.least_feature)
     panel = laminate.panel
     if panel is None:
@@ -60,20 +62,32 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, "pass" if good else "fail", limit, narrow.width, "mm", place, message)]
 
 
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every part hangs in its registered sheet by bridges that the second cut frees",
+        "A part that hangs on too little shifts; one that is not freed is torn off.",
+        "Make panel.bridge_width larger, or move the copies apart with panel.web.",
+        ("panel.bridge_width", "panel.second_cut_error"),
+    ),
+)
+
+
 def sheeted(laminate: Laminate, masks: bool = False) -> list[Layer]:
     """One layer of every distinct film sheet, or of every mask sheet."""
     panel = laminate.panel
     if panel is None:
         return []
-    found: dict[tuple[str, str], Layer] = {}
+    distinct: dict[tuple[str, str], Layer] = {}
     for layer in laminate.layers:
         if layer.is_mask == masks:
-            found.setdefault((panel.sheets[layer.index - 1].key, layer.pattern), layer)
-    return list(found.values())
+            distinct.setdefault((panel.sheets[layer.index - 1].key, layer.pattern), layer)
+    return list(distinct.values())
 
 
 def _wrong(laminate: Laminate, panel: SheetPanel, limits: Limits) -> Iterator[_Wrong]:
-    """What no width measures."""
+    """Faults of the sheets that no width measures."""
     films, masks = sheeted(laminate), sheeted(laminate, masks=True)
     for layer in films:
         yield from _loose(panel, layer)
@@ -98,23 +112,23 @@ def _loose(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
     for place in panel.places:
         count = sum(panel.holds(bridge.at, place) for bridge in bridges)
         if count < FEWEST:
-            said = f"{named} hangs on {count} bridges in the copy at {at(place)}"
-            yield _Wrong(layer, place, f"{said}, and needs {FEWEST}; add bridges")
+            fault = f"{named} hangs on {count} bridges in the copy at {at(place)}"
+            yield _Wrong(layer, place, f"{fault}, and needs {FEWEST}; add bridges")
 
 
 def _misfreed(panel: SheetPanel, layer: Layer) -> Iterator[_Wrong]:
-    """Parts that the cuts leave otherwise than they are meant to be."""
+    """Parts that the cuts free otherwise than designed."""
     for place, part in zip(panel.places, freed(panel, layer).parts, strict=True):
         room = TOLERANCE * sum(contour.length for contour in layer.profile.contours)
-        if part != layer.profile and apart(part, layer.profile) > room:
-            what = "is still held after the second cut" if part.is_empty else "is cut otherwise"
-            said = f"layer {layer.index} ({layer.name}) {what} in the copy at {at(place)}"
-            yield _Wrong(layer, place, f"{said}; regenerate the sheets")
+        if part != layer.profile and mismatch_area(part, layer.profile) > room:
+            state = "is still held after the second cut" if part.is_empty else "is cut otherwise"
+            fault = f"layer {layer.index} ({layer.name}) {state} in the copy at {at(place)}"
+            yield _Wrong(layer, place, f"{fault}; regenerate the sheets")
 
 
-def apart(one: Region, other: Region) -> float:
-    """The area in mm2 that one of two regions has and the other not."""
-    return sum(rest.area for rest in (one - other, other - one) if not rest.is_empty)
+def mismatch_area(region: Region, reference: Region) -> float:
+    """Area of the symmetric difference of two regions, mm2."""
+    return sum(rest.area for rest in (region - reference, reference - region) if not rest.is_empty)
 
 
 def _cut_into(panel: SheetPanel, layer: Layer, near: Region, needed: float) -> Iterator[_Wrong]:
@@ -123,13 +137,13 @@ def _cut_into(panel: SheetPanel, layer: Layer, near: Region, needed: float) -> I
         met = near.moved(*place) & panel.second
         if not met.is_empty:
             spot = met.edges[0].start
-            said = f"the second cut comes nearer than {needed:g} mm to the pocket of layer"
-            text = f"{said} {layer.index}, {at(spot)}; make panel.stub larger"
+            fault = f"the second cut comes nearer than {needed:g} mm to the pocket of layer"
+            text = f"{fault} {layer.index}, {at(spot)}; make panel.stub larger"
             yield _Wrong(layer, spot, text)
 
 
 def _welded(laminate: Laminate, panel: SheetPanel, mask: Layer, error: float) -> Iterator[_Wrong]:
-    """What an error of the second cut may leave of bridges past the mask between two balloons.
+    """Rests of bridges past the mask between two balloons after an error of the second cut.
 
     There the bridges of all balloons weld to each other.
     """
@@ -145,13 +159,13 @@ def _welded(laminate: Laminate, panel: SheetPanel, mask: Layer, error: float) ->
 
 
 def _beyond(sheet: Region) -> Point | None:
-    """A place of what hangs on nothing, if there is any."""
+    """A place of a piece that is not joined to the sheet, or None."""
     pieces = sorted(sheet.pieces, key=lambda piece: -Region(piece.outers).area)
     return pieces[1].outers[0].edges[0].start if len(pieces) > 1 else None
 
 
 def _bridges(panel: SheetPanel, layer: Layer) -> list[_Bridge]:
-    """What the second cut takes out of a sheet; as wide as its area by the slot's least width."""
+    """Bridges of a sheet, which the second cut removes; width is area by the slot's least width."""
     slot = least_width(panel.second)
     if slot is None:
         return []

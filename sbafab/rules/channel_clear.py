@@ -1,17 +1,57 @@
-"""channel-clear: what is open through all layers of a channel still passes its diameter."""
+"""channel-clear: the common opening of all layers of a channel passes its diameter.
+
+Channels are the chambers' bores and the lumen.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Point, distance_to
-from sbafab.geometry.region import Contour
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.rules.channels import Channel, channels
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.limits import at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
+
+# Channels: chamber bores and the lumen, and the layers each runs through.
+
+
+class Channel(NamedTuple):
+    """A channel and one layer of every pattern that it must be open in."""
+
+    name: str
+    centre: Point
+    diameter: float
+    layers: tuple[Layer, ...]
+
+
+def channels(laminate: Laminate) -> list[Channel]:
+    """Bores, from above the first base to below the cap, and the lumen, through every layer."""
+    chamber_gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
+    passages = []
+    if laminate.bores and chamber_gaps:
+        bottom, top = chamber_gaps[0].below.index, chamber_gaps[-1].above.index
+        bored = _distinct(layer for layer in laminate.layers if bottom < layer.index < top)
+        passages = [
+            Channel(f"bore of {bore.chamber}", bore.centre, bore.diameter, bored)
+            for bore in laminate.bores
+        ]
+    if laminate.lumen is not None:
+        layers = _distinct(laminate.layers)
+        passages.append(Channel("lumen", (0.0, 0.0), laminate.lumen, layers))
+    return passages
+
+
+def _distinct(layers: Iterable[Layer]) -> tuple[Layer, ...]:
+    first: dict[str, Layer] = {}
+    for layer in layers:
+        first.setdefault(layer.pattern, layer)
+    return tuple(first.values())
+
 
 NAME = "channel-clear"
 
@@ -27,14 +67,14 @@ class _Clear(NamedTuple):
     layer: Layer
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """The diameter that passes through each channel, worst against what the design states."""
-    del limits
-    found = [_clear(channel) for channel in channels(laminate)]
-    if not found:
+def check(measures: Measures) -> list[Finding]:
+    """Return the diameter that passes through each channel, worst against the stated one."""
+    laminate = measures.laminate
+    clearances = [_clear(channel) for channel in channels(laminate)]
+    if not clearances:
         message = "no balloon is joined to another, so there is no channel to keep clear"
         return [Finding(NAME, "pass", None, None, "mm", Place(), message)]
-    worst = min(found, key=lambda clear: clear.diameter - clear.channel.diameter)
+    worst = min(clearances, key=lambda clear: clear.diameter - clear.channel.diameter)
     stated = worst.channel.diameter
     good = holds(worst.diameter, stated)
     message = f"the {worst.channel.name} passes {worst.diameter:.3f} mm, {at(worst.at)}"
@@ -45,6 +85,18 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         )
     place = Place(None, (worst.layer.index,), *worst.at)
     return [Finding(NAME, "pass" if good else "fail", stated, worst.diameter, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "all openings along a bore, and along the lumen, together pass its diameter",
+        "One layer off its axis narrows the channel to what all openings have in common.",
+        "Draw the openings about one axis, or ask for less: bore.diameter, lumen.diameter.",
+        ("bore.diameter", "lumen.diameter"),
+    ),
+)
 
 
 def _clear(channel: Channel) -> _Clear:
@@ -92,7 +144,7 @@ def _signed_room(layer: Layer, edges: Sequence[Edge], p: Point) -> float:
 
 
 def _highest(value: Callable[[Point], float], start: Point, reach: float) -> Point:
-    """Where a concave function is highest, by golden section along y within one along x."""
+    """Maximum of a concave function, by golden section along y within one along x."""
 
     def best_y(x: float) -> float:
         return _golden(lambda y: value((x, y)), start[1] - reach, start[1] + reach)

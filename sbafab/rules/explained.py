@@ -1,131 +1,13 @@
-"""What every rule and check asks, why, and what to change: for people, by name.
-
-``sbafab explain`` and the reference of the documentation read it.
-"""
+"""Explanations of every rule and check by name, for ``sbafab explain`` and the reference pages."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
+from sbafab.rules.deck import RULES
+from sbafab.rules.rule import Explanation
 
-class Explanation(NamedTuple):
-    """What ``holds`` where a rule passes, ``why`` that matters, how to ``mend`` a failure.
-
-    ``keys`` of a design file set the limit or what it is held against.
-    """
-
-    holds: str
-    why: str
-    mend: str
-    keys: tuple[str, ...] = ()
-
-
-DECK: Mapping[str, Explanation] = {
-    "bond-width": Explanation(
-        "every bond is at least 0.75 mm wide between facing edges",
-        "A narrower ring peels or leaks under pressure; the paper found 0.75 mm to hold (Sec. 2).",
-        "Make bond.width larger, move what lies near the edge away from it, or round the outline.",
-        ("rules.bond_width", "bond.width"),
-    ),
-    "mask-overhang": Explanation(
-        "every mask reaches at least 0.50 mm past the film edges it keeps apart",
-        "Film that melts at an edge runs round the end of a short mask and welds the pocket shut.",
-        "Make mask.overhang larger. A flush mask at a pinned bore is meant, and waived by itself.",
-        ("rules.mask_overhang", "mask.overhang"),
-    ),
-    "facing-films": Explanation(
-        "films of two balloons meet where they are meant to bond, and nowhere else",
-        "The press welds any two films with neither film nor mask between them, neighbours or not.",
-        "Make balloons more alike, tabs shorter, or masks larger where the message says.",
-        ("rules.mask_overhang", "mask.overhang", "chamber.diameter"),
-    ),
-    "sealing": Explanation(
-        "every pocket is reached from its own chamber's inlet and from nowhere else",
-        "A pocket that opens elsewhere leaks; one that is cut off never inflates.",
-        "Look at the place named: an opening too near another, or a mask that crosses a bond.",
-        ("bore.diameter", "lumen.diameter", "inlet.width"),
-    ),
-    "channel-clear": Explanation(
-        "all openings along a bore, and along the lumen, together pass its diameter",
-        "One layer off its axis narrows the channel to what all openings have in common.",
-        "Draw the openings about one axis, or ask for less: bore.diameter, lumen.diameter.",
-        ("bore.diameter", "lumen.diameter"),
-    ),
-    "tube-fit": Explanation(
-        "the inlet strip, cut at its narrowest, opens to the tube and its own film",
-        "A flat channel opens to half the perimeter of what goes in; less, and the tube tears it.",
-        "Leave inlet.width out, so that it follows the tube, or use a thinner tube.",
-        ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
-    ),
-    "piece-count": Explanation(
-        "every layer falls into the pieces that its role says",
-        "A film in two pieces is no film; a mask in one piece too many shifts in the press.",
-        "Make the chamber larger or the bond narrower, so that the layer hangs together.",
-        ("chamber.diameter", "bond.width"),
-    ),
-    "pin-holes": Explanation(
-        "every pin finds its holes, no film stands in its way, two pins hold what ears pin",
-        "A pin without a hole lifts the film; a film on one pin turns about it.",
-        "Use the registration method's own holes; see the place named.",
-        ("registration.method", "registration.pin_diameter"),
-    ),
-    "pin-fit": Explanation(
-        "every film goes on its pins with hole and pin at their worst: 30 % stretch at most",
-        "Holes come out narrower than drawn; a film stretched further over its pin tears.",
-        "Use a thinner pin, a wider bore, or registration.pin_clearance.",
-        ("registration.pin_stretch", "bore.clearance", "bore.pin_diameter"),
-    ),
-    "bridges": Explanation(
-        "every part hangs in its registered sheet by bridges that the second cut frees",
-        "A part that hangs on too little shifts; one that is not freed is torn off.",
-        "Make panel.bridge_width larger, or move the copies apart with panel.web.",
-        ("panel.bridge_width", "panel.second_cut_error"),
-    ),
-    "scrap": Explanation(
-        "all scrap of registered sheets comes off, and every inlet is free",
-        "Scrap that is welded to a part, or locked in it, cannot be taken away after pressing.",
-        "Move the copies apart with panel.web, or make the tab longer.",
-        ("panel.web", "inlet.tab_length"),
-    ),
-    "film-limits": Explanation(
-        "nothing is finer than the laser cuts, before and after kerf",
-        "A slot or web below the beam's own width burns away or stays uncut.",
-        "Make the feature at the place named wider, or measure the kerf.",
-        ("laser.least_feature", "laser.kerf_tpe", "laser.kerf_ptfe"),
-    ),
-    "press-fit": Explanation(
-        "the laminate lies in the heated area; more than 20 balloons, and films whose minutes "
-        "nobody stated, draw a warning",
-        "What lies outside the platen is not bonded; heat may not reach a tall stack's middle.",
-        "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer; try "
-        "another film on a sample and name it in press.minutes_for.",
-        (
-            "press.platen_width",
-            "press.platen_length",
-            "rules.validated_balloons",
-            "press.minutes_for",
-        ),
-    ),
-    "registration-nominal": Explanation(
-        "bores are coaxial and the two outlines of a balloon congruent, to 1 um",
-        "What is drawn off its place is off before any hand has touched it.",
-        "Draw both from the same edge.",
-    ),
-    "registration-worst-case": Explanation(
-        "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
-        "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
-        'Lay up with care, set registration.method = "ears", or make bond and overhang larger.',
-        ("rules.worst_bond_width", "rules.worst_mask_overhang", "registration.hand_placement"),
-    ),
-    "registration-yield": Explanation(
-        "enough random builds keep what registration-worst-case asks",
-        "The worst of all errors at once is rare; this counts how rare. The hand is calibrated on "
-        "the paper's success of nine in ten, not measured.",
-        "Run sbafab check DESIGN --target-yield 0.95: it advises bond and overhang.",
-        ("rules.target_yield", "registration.hand_placement", "registration.hand_turn"),
-    ),
-}
+DECK: Mapping[str, Explanation] = {rule.name: rule.explanation for rule in RULES}
 """The rules on a design, in the deck's order."""
 
 BETWEEN_PARTS: Mapping[str, Explanation] = {

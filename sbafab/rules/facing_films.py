@@ -12,23 +12,22 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import LOOSE, Laminate, Pin
-from sbafab.rules.alike import distinct_interfaces
-from sbafab.rules.boundary import beside, edges_along, outward_reach
-from sbafab.rules.facing import Facing, without_slivers
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Pin
+from sbafab.rules.boundary import Facing, beside, edges_along, outward_reach, without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.margins import pin_at
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "facing-films"
 
 
 class _Weld(NamedTuple):
-    """A place where two films weld that should not; ``number`` of them are alike."""
+    """A place at which two films weld unintentionally, and the ``number`` of such places."""
 
     region: Region
     gap: Interface
@@ -41,9 +40,9 @@ class _Overhang(NamedTuple):
     gap: Interface
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
-    """The largest place where films weld that should not; with none, the least overhang there."""
-    measures = measures or Measures(laminate, limits)
+def check(measures: Measures) -> list[Finding]:
+    """Return the largest unintended weld; without any, the least overhang of masks there."""
+    laminate, limits = measures.laminate, measures.limits
     pairs = _distinct(measures.facing)
     welds = [*_past_films(pairs), *_at_rims(laminate)]
     if welds:
@@ -54,8 +53,21 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     return [clear, _least(overhangs, limits)] if overhangs else [clear]
 
 
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "films of two balloons meet where they are meant to bond, and nowhere else",
+        "The press welds any two films with neither film nor mask between them, neighbours or not.",
+        "Make balloons more alike, tabs shorter, or masks larger where the message says.",
+        ("rules.mask_overhang", "mask.overhang", "chamber.diameter"),
+    ),
+    at_most=True,
+)
+
+
 def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
-    """The first of those that are alike, and how many they are."""
+    """Return the first of each set of equal pairs, with their number."""
     groups: dict[object, list[Facing]] = {}
     for pair in pairs:
         key = pair.gap.pattern, pair.gap.unbonded, pair.bare
@@ -71,8 +83,8 @@ def _past_films(pairs: Iterable[tuple[Facing, int]]) -> Iterator[_Weld]:
 
 def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
     """Bonds between neighbouring balloons that reach an edge of film that is no bore's."""
-    for alike in distinct_interfaces(laminate):
-        gap = alike.interface
+    for distinct in distinct_interfaces(laminate):
+        gap = distinct.interface
         if gap.kind == "chamber":
             continue
         rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
@@ -80,11 +92,11 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
             if _is_apart(piece, rim) or _is_ear(piece, laminate):
                 continue
             if edges_along(piece, rim):
-                yield _Weld(piece, gap, alike.number)
+                yield _Weld(piece, gap, distinct.number)
 
 
 def _is_apart(piece: Region, rim: Region) -> bool:
-    """Whether a circle round the piece lies so far from the rim that no edge of it can be one."""
+    """Return True if a circle round the piece lies too far from the rim to share an edge."""
     low_x, low_y, high_x, high_y = piece.bounds
     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
     return rim.distance_to_edge(middle) > math.dist(middle, (high_x, high_y)) + TOLERANCE
@@ -95,7 +107,7 @@ def _is_bore(contour: Contour, laminate: Laminate) -> bool:
 
 
 def _is_ear(piece: Region, laminate: Laminate) -> bool:
-    """Whether it lies round a tooling hole, nowhere twice as far from it as at the nearest."""
+    """Return True if the piece surrounds a tooling hole, within twice its least radius."""
     for pin in laminate.pins:
         if any(math.dist(pin.centre, bore.centre) < LOOSE for bore in laminate.bores):
             continue
@@ -106,7 +118,7 @@ def _is_ear(piece: Region, laminate: Laminate) -> bool:
 
 
 def _overhangs(gap: Interface, pins: tuple[Pin, ...], measures: Measures) -> Iterator[_Overhang]:
-    """How far the masks reach past the edges of either film where these face each other."""
+    """Reach of the masks past the edges of either film where these face each other."""
     for edge, reach in measures.reaches(gap):
         if not pin_at(edge, pins):
             yield _Overhang(reach.value, edge.nearest(reach.at), gap)
@@ -121,9 +133,9 @@ def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
         f"weld there; let the mask below layer {gap.above.index} reach over that place"
     )
     masks = laminate.interfaces[gap.index - 1].masks
-    others = sum(weld.number for weld in welds) - 1
-    if others:
-        message += f" (and {others} more such place{'s' if others > 1 else ''})"
+    more = sum(weld.number for weld in welds) - 1
+    if more:
+        message += f" (and {more} more such place{'s' if more > 1 else ''})"
     layers = (gap.below.index, *(mask.index for mask in masks), gap.above.index)
     place = Place(gap.index, layers, *p)
     return Finding(NAME, "fail", 0.0, area, "mm2", place, message)

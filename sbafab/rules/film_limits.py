@@ -6,13 +6,15 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from sbafab.geometry.beam import beam_path, place_of, widths
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import GeometryError
+from sbafab.geometry.offset import beam_path, widths
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import Width, least_gap, least_width
+from sbafab.geometry.width import Width, least_gap, least_width, place_of
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "film-limits"
 
@@ -29,8 +31,9 @@ class _Feature(NamedTuple):
     width: Width
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The finest web, slot or gap of any layer; and whether the cut path keeps every contour."""
+    laminate, limits = measures.laminate, measures.limits
     limit = limits.least_feature
     lost = _lost_to_kerf(laminate, limits)
     if lost is not None:
@@ -51,16 +54,31 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
 
 
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "nothing is finer than the laser cuts, before and after kerf",
+        "A slot or web below the beam's own width burns away or stays uncut.",
+        "Make the feature at the place named wider, or measure the kerf.",
+        ("laser.least_feature", "laser.kerf_tpe", "laser.kerf_ptfe"),
+    ),
+)
+
+
 def _finest(laminate: Laminate) -> _Feature | None:
-    """The narrowest web or slot of all layers; wider ones than are known are not looked for."""
-    layers = [(own[0], laminate.first_cut(own[0])) for own in laminate.patterns.values()]
+    """The narrowest web or slot of all layers; wider ones than the holes known are skipped."""
+    layers = [
+        (layers_of_pattern[0], laminate.first_cut(layers_of_pattern[0]))
+        for layers_of_pattern in laminate.patterns.values()
+    ]
     round_holes = (hole.circle for _, cut in layers for hole in cut.holes if hole.circle)
     narrowest = min((2 * radius for _, radius in round_holes), default=math.inf)
     return _finer(layers, narrowest + ROUNDING) or _finer(layers, math.inf)
 
 
 def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> _Feature | None:
-    """The same, if it is narrower than so many mm."""
+    """Return the narrowest feature below ``than`` mm, or None."""
     finest: _Feature | None = None
     for layer, cut in layers:
         for kind, least in (("web", least_width), ("slot or hole", least_gap)):
@@ -77,7 +95,7 @@ def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
         kerf = limits.kerf.get(layer.film.material, 0.0)
         if max(widths(kerf)) == 0:
             continue
-        place, what = Place(None, (layer.index,)), "loses or joins a hole or piece"
+        place, fault = Place(None, (layer.index,)), "loses or joins a hole or piece"
         try:
             lost = beam_path(laminate.first_cut(layer), kerf).lost
             if lost is None:
@@ -85,12 +103,12 @@ def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
             spot = place_of(laminate.first_cut(layer), lost, kerf)
             place = Place(None, (layer.index,), *spot)
             kind = "hole" if lost.contour.is_hole else "outline"
-            what = f"has a {kind} that {lost.fate} at {at(spot)}"
+            fault = f"has a {kind} that {lost.fate} at {at(spot)}"
         except GeometryError:
             pass
         width = " x ".join(f"{w:g}" for w in dict.fromkeys(widths(kerf)))
         message = (
-            f"layer {layer.index} ({layer.name}) {what} when its cut path is moved by half the "
+            f"layer {layer.index} ({layer.name}) {fault} when its cut path is moved by half the "
             f"kerf of {width} mm; widen what is narrower than the kerf"
         )
         return Finding(NAME, "fail", max(widths(kerf)), None, "mm", place, message)

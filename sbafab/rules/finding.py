@@ -1,4 +1,4 @@
-"""What a rule found, as data."""
+"""Findings of rules and checks as data: verdict, value, limit, place and message."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Verdict = Literal["pass", "fail", "waived", "warn"]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a worst value occurs: interface (from 1, or None), layer indices, x and y in mm."""
+    """Place of a worst value: interface (from 1, or None), layer indices, x and y in mm."""
 
     interface: int | None = None
     layers: tuple[int, ...] = ()
@@ -26,9 +26,9 @@ class Place:
 class Finding:
     """A verdict with the measured worst value, its limit, unit and place.
 
-    ``by_user`` tells a failure that the design waives by name from a waiver that the rule itself
-    grants (a flush mask at a pinned bore). ``remedy`` says what to do about a warning; the message
-    begins with it.
+    ``by_user`` distinguishes a failure that the design waives by name from a waiver that the rule
+    grants (a flush mask at a pinned bore). ``remedy`` is the action that a warning asks for; the
+    message begins with it.
     """
 
     rule: str
@@ -65,34 +65,36 @@ class Finding:
 
 
 def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
-    """One finding a rule, the one that decides its verdict, in the order of the rules.
+    """Return the finding that decides each rule's verdict, in the order of the rules.
 
-    A failure goes before a warning, that before a waiver by the user, that before what holds; what
-    a rule waives itself comes last.
+    A failure precedes a warning, then a waiver by the user, then a pass; a waiver by the rule is
+    last.
     """
-    found: dict[str, Finding] = {}
+    deciding: dict[str, Finding] = {}
     for finding in findings:
-        known = found.get(finding.rule)
-        if known is None or _gravity(finding) > _gravity(known):
-            found[finding.rule] = finding
-    return found
+        current = deciding.get(finding.rule)
+        if current is None or _gravity(finding) > _gravity(current):
+            deciding[finding.rule] = finding
+    return deciding
 
 
 def summary(findings: Iterable[Finding]) -> dict[str, object]:
-    """Whether all may be cut, and how many rules have each verdict, as ``checks.json`` holds it."""
+    """The overall verdict and the number of rules by verdict, as ``checks.json`` holds it."""
     counts = Counter(finding.verdict for finding in decisive(findings).values())
     verdicts: tuple[Verdict, ...] = ("pass", "warn", "waived", "fail")
     return {"holds": counts["fail"] == 0, **{name: counts[name] for name in verdicts}}
 
 
-def counted(findings: Iterable[Finding]) -> str:
-    """Return in words how many rules pass, warn, are waived by the design, or fail."""
-    counts = summary(findings)
+def counted(*groups: Iterable[Finding]) -> str:
+    """Return the number of rules in groups of findings, and of warnings, waived and failed ones."""
+    counts: Counter[str] = Counter()
+    for findings in groups:
+        counts.update(finding.verdict for finding in decisive(findings).values())
     words = [
-        f"{counts['pass']} {'rule passes' if counts['pass'] == 1 else 'rules pass'}",
-        f"{counts['warn']} warn{'s' if counts['warn'] == 1 else ''}" if counts["warn"] else "",
+        "1 rule" if counts.total() == 1 else f"{counts.total()} rules",
+        f"{counts['warn']} warning{'s' if counts['warn'] > 1 else ''}" if counts["warn"] else "",
         f"{counts['waived']} waived" if counts["waived"] else "",
-        f"{counts['fail']} fail{'s' if counts['fail'] == 1 else ''}" if counts["fail"] else "",
+        f"{counts['fail']} failed" if counts["fail"] else "",
     ]
     return ", ".join(word for word in words if word)
 
@@ -104,13 +106,13 @@ def _gravity(finding: Finding) -> int:
 
 
 class Findings(tuple[Finding, ...]):
-    """What the deck found, in its order: a tuple that shows itself as a table."""
+    """Findings of the deck in its order: a tuple that displays as a table."""
 
     __slots__ = ()
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The failures that nobody waived; without any the design may be cut."""
+        """Failures that are not waived; without any the design may be cut."""
         return tuple(finding for finding in self if finding.verdict == "fail")
 
     @property
@@ -133,7 +135,7 @@ class Findings(tuple[Finding, ...]):
         ]
 
     def __repr__(self) -> str:
-        return f"Findings({counted(self) or 'none'})"
+        return f"Findings({counted(self)})"
 
     def _repr_html_(self) -> str:
         rows = [(f.rule, f.verdict, f.measured, f.limit, f.unit, f.message) for f in self]

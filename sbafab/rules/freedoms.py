@@ -1,9 +1,8 @@
-"""How far each layer may lie off its place once the laminate is put together.
+"""Freedoms: how far each layer may lie off its place once the laminate is assembled.
 
-Layers come together in the steps of the assembly. What is not yet bonded together is a body of its
-own: a piece of a layer, or all that an earlier step has joined. Two pins hold a body but for the
-pin error and the play in its holes; on one pin it may also turn; a body on no pin is laid by hand
-on what lies below it.
+Layers come together in the steps of the assembly. A body is a piece of a layer, or all pieces that
+an earlier step has joined. Two pins locate a body but for the pin error and the play in its holes;
+on one pin it may also turn; a body on no pin is placed by hand on the film below it.
 """
 
 from __future__ import annotations
@@ -13,20 +12,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
 from typing import Final, NamedTuple
 
-from sbafab.geometry.centroid import centroid
+from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point, distance_to
-from sbafab.geometry.nanometres import nanometres
 from sbafab.geometry.nearby import boxes_meet, widened
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
 
 INSIDE: Final = 0.05
-"""mm from an edge at which it is looked whether two shapes meet, before they are laid over."""
+"""mm from an edge at which shapes are tested for overlap before booleans are computed."""
 BESIDE: Final = 4
-"""Beside so many edges of each shape, about."""
+"""Number of edges of each shape that are sampled, about."""
 
 
 class Part(NamedTuple):
@@ -56,11 +54,11 @@ class Freedom(NamedTuple):
 
     @property
     def by_hand(self) -> bool:
-        """Whether the hand decides it: every turn, and the place of what no pin holds."""
+        """True if the hand decides it: every turn, and the place of a body without pins."""
         return self.centre is not None or self.pins == 0 or self.in_sheet
 
     def lever(self, p: Point, normal: Point) -> float:
-        """How many mm the body moves along ``normal`` at ``p`` per radian of its turn."""
+        """Return the body's displacement along ``normal`` at ``p`` per radian of its turn, mm."""
         if self.centre is None:
             return 1.0
         return (p[0] - self.centre[0]) * normal[1] - (p[1] - self.centre[1]) * normal[0]
@@ -72,32 +70,32 @@ class Freedom(NamedTuple):
 
 
 class Freedoms(dict[Part, tuple[Freedom, ...]]):
-    """What each piece of each layer can do. A freedom is one object wherever it is felt."""
+    """Freedoms of each piece of each layer; pieces that share a freedom share the object."""
 
-    def __init__(self, found: Mapping[Part, tuple[Freedom, ...]]) -> None:
-        super().__init__(found)
+    def __init__(self, by_part: Mapping[Part, tuple[Freedom, ...]]) -> None:
+        super().__init__(by_part)
         self._of_layer: dict[int, list[tuple[Freedom, ...]]] = {}
-        for part, own in found.items():
-            self._of_layer.setdefault(part.layer, []).append(own)
+        for part, ways in by_part.items():
+            self._of_layer.setdefault(part.layer, []).append(ways)
         self._unshared: dict[tuple[int, ...], list[tuple[Freedom, ...]]] = {}
 
     def unshared(self, layers: tuple[int, ...]) -> list[tuple[Freedom, ...]]:
-        """What each piece of these layers, one layer after the other, can do that not all can."""
-        known = self._unshared.get(layers)
-        if known is None:
-            every = [own for layer in layers for own in self._of_layer[layer]]
+        """Freedoms of each piece of these layers, in order, but those that all pieces share."""
+        result = self._unshared.get(layers)
+        if result is None:
+            every = [ways for layer in layers for ways in self._of_layer[layer]]
             shared = set(map(id, every[0]))
-            for own in every[1:]:
-                shared.intersection_update(map(id, own))
-            known = [tuple([one for one in own if id(one) not in shared]) for own in every]
-            self._unshared[layers] = known
-        return known
+            for ways in every[1:]:
+                shared.intersection_update(map(id, ways))
+            result = [tuple([way for way in ways if id(way) not in shared]) for ways in every]
+            self._unshared[layers] = result
+        return result
 
 
 class Laid(NamedTuple):
     """A body as it is laid in a step, with its play on the ``pins`` that hold it.
 
-    One that none holds is laid on the part ``under`` it. ``centre``: what it turns about.
+    A body without pins is laid on the part ``under`` it. ``centre``: the point it turns about.
     ``stays``: no pin holds anything in this step, and it is the lowest.
     """
 
@@ -110,76 +108,82 @@ class Laid(NamedTuple):
 
 
 def lay_up(laminate: Laminate) -> list[Laid]:
-    """All bodies in the order in which they are laid, whatever the tolerances; none in sheets."""
+    """Return all bodies in the order they are laid, for any tolerances; none for sheets."""
     if laminate.panel is not None:
         return []
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
-    found: list[Laid] = []
+    laid: list[Laid] = []
     for step in assembly(laminate):
         layers = frozenset(step.layers)
         present = sorted(body for body in bodies if body[0].layer in layers)
-        held = [shapes.pins(body, step) for body in present]
-        for body, pins in zip(present, held, strict=True):
+        pins_of_bodies = [shapes.pins(body, step) for body in present]
+        for body, pins in zip(present, pins_of_bodies, strict=True):
             under = None if pins else shapes.under(body, present)
             # The lowest body of a step without pins stays: the others are laid on it.
-            stays = not pins and under is None and not any(held)
+            stays = not pins and under is None and not any(pins_of_bodies)
             centre = next(iter(pins), None) or shapes.centre(body)
-            found.append(Laid(body, step.number, pins, centre, under, stays))
+            laid.append(Laid(body, step.number, pins, centre, under, stays))
         bodies = [body for body in bodies if body[0].layer not in layers]
         bodies += shapes.joined(present)
-    return found
+    return laid
 
 
 def freedoms(
     laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid] | None = None
 ) -> Freedoms:
-    """All that each piece of each layer can do, from every step that it goes through.
+    """Return the freedoms of each piece of each layer, from every step that it goes through.
 
-    Two pieces lie off each other by what one of them does and the other does not. ``laid`` is what
-    ``lay_up`` says, where it is known.
+    Two pieces lie off each other by the freedoms that they do not share. ``laid`` is the result of
+    ``lay_up``, if available.
     """
     if laminate.panel is not None:
         return _in_sheets(laminate, tolerances)
-    counts = {name: len(own[0].profile.pieces) for name, own in laminate.patterns.items()}
-    found: dict[Part, tuple[Freedom, ...]] = {
+    counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
+    by_part: dict[Part, tuple[Freedom, ...]] = {
         Part(layer.index, piece): ()
         for layer in laminate.layers
         for piece in range(counts[layer.pattern])
     }
-    for number, one in enumerate(lay_up(laminate) if laid is None else laid, 1):
-        own = () if one.stays else _own(one, number, tolerances, tolerances.on_pins(laminate))
-        if one.under is not None:
-            own = (*found[one.under], *own)
-        for part in one.body:
-            found[part] += own
-    return Freedoms(found)
+    for number, item in enumerate(lay_up(laminate) if laid is None else laid, 1):
+        ways = (
+            ()
+            if item.stays
+            else _body_freedoms(item, number, tolerances, tolerances.on_pins(laminate))
+        )
+        if item.under is not None:
+            ways = (*by_part[item.under], *ways)
+        for part in item.body:
+            by_part[part] += ways
+    return Freedoms(by_part)
 
 
 def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
-    """The same for registered sheets: all parts of a sheet move as one, masks with the film below.
+    """Freedoms in registered sheets: all parts of a sheet move as one, masks with the film below.
 
     A mask is tacked to that film before the sheets are stacked.
     """
-    found: dict[Part, tuple[Freedom, ...]] = {}
+    by_part: dict[Part, tuple[Freedom, ...]] = {}
     under: tuple[Freedom, ...] = ()
     added = {index: step.number for step in assembly(laminate) for index in step.adds}
     for layer in laminate.layers:
         number, step, pins = layer.index, added[layer.index], len(laminate.pins)
         on_pins = Freedom(step, number, number, number, pins, tolerances.pin)
         both = on_pins, on_pins._replace(body=-number, most=tolerances.sheet, in_sheet=True)
-        own = tuple(one for one in both if one.most > 0)
+        ways = tuple(way for way in both if way.most > 0)
         if layer.is_mask:
-            own = (*under, *own)
+            ways = (*under, *ways)
         else:
-            under = own
+            under = ways
         for piece in range(len(layer.profile.pieces)):
-            found[Part(layer.index, piece)] = own
-    return Freedoms(found)
+            by_part[Part(layer.index, piece)] = ways
+    return Freedoms(by_part)
 
 
-def _own(laid: Laid, number: int, tolerances: Tolerances, on_pins: float) -> tuple[Freedom, ...]:
-    """What a body can do in a step by itself; ``on_pins`` mm off its place on its pins."""
+def _body_freedoms(
+    laid: Laid, number: int, tolerances: Tolerances, on_pins: float
+) -> tuple[Freedom, ...]:
+    """Freedoms that a step gives a body; ``on_pins`` mm off its place on its pins."""
     pins = laid.pins
     lowest, highest = min(laid.body).layer, max(laid.body).layer
 
@@ -192,26 +196,26 @@ def _own(laid: Laid, number: int, tolerances: Tolerances, on_pins: float) -> tup
         both = [shift, freedom(*_turn_on(pins))]
     else:
         both = [shift, freedom(math.radians(tolerances.turn), laid.centre)]
-    return tuple(one for one in both if one.most > 0)
+    return tuple(way for way in both if way.most > 0)
 
 
 def _turn_on(pins: Mapping[Point, float]) -> tuple[float, Point]:
-    """How far, in radians, play on two or more pins lets a body turn, and about which point.
+    """Greatest turn (radians) that play on two or more pins allows a body, and its centre.
 
-    Of all pairs the one that holds best decides; the body turns about the place between its pins
+    Of all pairs the one that holds best decides; the body turns about the point between its pins
     that their play divides.
     """
-    found = []
+    turns = []
     for (a, loose_a), (b, loose_b) in combinations(pins.items(), 2):
         both = loose_a + loose_b
         share = loose_a / both if both else 0.0
         centre = a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share
-        found.append((both / math.dist(a, b), centre))
-    return min(found)
+        turns.append((both / math.dist(a, b), centre))
+    return min(turns)
 
 
 class _Shapes:
-    """The pieces of the layers, each pattern looked at once."""
+    """The pieces of the layers; each pattern is examined once."""
 
     def __init__(self, laminate: Laminate) -> None:
         self.laminate = laminate
@@ -234,14 +238,14 @@ class _Shapes:
         """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
         if not step.pins:
             return {}
-        found: dict[str, float] = {}
+        play: dict[str, float] = {}
         for part in body:
             key = self.pattern[part.layer], part.piece
             if key not in self.holders:
-                self.holders[key] = _held(self.laminate, self._region(part))
+                self.holders[key] = _play_on_pins(self.laminate, self._region(part))
             for name, loose in self.holders[key].items():
-                found[name] = min(loose, found.get(name, loose))
-        return {pin.centre: found[pin.name] for pin in step.pins if pin.name in found}
+                play[name] = min(loose, play.get(name, loose))
+        return {pin.centre: play[pin.name] for pin in step.pins if pin.name in play}
 
     def centre(self, body: Sequence[Part]) -> Point:
         """The body's centre of area, all its parts counted."""
@@ -255,12 +259,12 @@ class _Shapes:
         return x / area, y / area
 
     def overlap(self, a: Part, b: Part) -> bool:
-        """Whether two parts lie over each other."""
+        """Return True if two parts lie over each other."""
         key = (self.pattern[a.layer], a.piece, self.pattern[b.layer], b.piece)
         if key not in self.overlaps:
-            one, other = self._region(a), self._region(b)
-            self.overlaps[key] = boxes_meet(one.bounds, other.bounds) and (
-                _plainly_meet(one, other) or not (one & other).is_empty
+            region_a, region_b = self._region(a), self._region(b)
+            self.overlaps[key] = boxes_meet(region_a.bounds, region_b.bounds) and (
+                _plainly_meet(region_a, region_b) or not (region_a & region_b).is_empty
             )
         return self.overlaps[key]
 
@@ -277,18 +281,18 @@ class _Shapes:
         return self.meeting[key]
 
     def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
-        """What a body laid by hand is laid on: the highest film of the body below it."""
+        """The part that a body placed by hand lies on: the highest film of the body below."""
         lowest = min(body).layer
         feet = [part for part in body if part.layer == lowest]
-        below = [(part, other) for other in present for part in other if part.layer < lowest]
-        for part, other in sorted(below, reverse=True):
+        below = [(part, lower) for lower in present for part in lower if part.layer < lowest]
+        for part, lower in sorted(below, reverse=True):
             if any(self.overlap(part, foot) for foot in feet):
-                seen = [p for p in other if not self.laminate.layer(p.layer).is_mask]
-                return max(seen or other)
+                films = [p for p in lower if not self.laminate.layer(p.layer).is_mask]
+                return max(films or lower)
         return None
 
     def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
-        """The bodies after a step: parts that lie on each other have become one."""
+        """Return the bodies after a step: parts that lie on each other have become one."""
         home: dict[int, dict[int, int]] = {}
         for index, body in enumerate(present):
             for layer, piece in body:
@@ -303,19 +307,19 @@ class _Shapes:
         for lower, upper in pairwise(sorted(home)):
             ours, theirs = home[lower], home[upper]
             for a, b in self.meet(lower, upper):
-                one, other = first(ours[a]), first(theirs[b])
-                if one < other:
-                    leader[other] = one
+                leader_a, leader_b = first(ours[a]), first(theirs[b])
+                if leader_a < leader_b:
+                    leader[leader_b] = leader_a
                 else:
-                    leader[one] = other
+                    leader[leader_a] = leader_b
         merged: dict[int, list[Part]] = {}
         for part in sorted(part for body in present for part in body):
             merged.setdefault(first(home[part.layer][part.piece]), []).append(part)
         return list(merged.values())
 
 
-def _held(laminate: Laminate, part: Region) -> dict[str, float]:
-    """The pins that hold a part, and by how much it may lie off each as its hole is drawn."""
+def _play_on_pins(laminate: Laminate, part: Region) -> dict[str, float]:
+    """The pins that hold a part, and its play on each by the drawn hole, mm."""
     circles = [hole.circle for hole in part.holes if hole.circle is not None]
     return {
         pin.name: max(
@@ -328,24 +332,26 @@ def _held(laminate: Laminate, part: Region) -> dict[str, float]:
 
 
 def _plainly_meet(a: Region, b: Region) -> bool:
-    """Whether a point beside one of some edges lies well inside both, so that they surely meet."""
+    """Return True if a point beside a sampled edge lies well inside both regions."""
     # What lies beside an edge of the smaller one is rather within the other than the other way.
-    for region, other in sorted(((a, b), (b, a)), key=lambda both: _size(both[0])):
+    for region, opposite in sorted(((a, b), (b, a)), key=lambda both: _size(both[0])):
         for edge in region.edges[:: max(1, len(region.edges) // BESIDE)]:
             p = beside(edge, INSIDE)
-            if all(one.contains(p) and not _has_edge_near(one, p) for one in (other, region)):
+            if all(
+                shape.contains(p) and not _has_edge_near(shape, p) for shape in (opposite, region)
+            ):
                 return True
     return False
 
 
 def _size(region: Region) -> float:
-    """Half the way round its box, mm."""
+    """Half the perimeter of a region's box, mm."""
     left, low, right, high = region.bounds
     return right - left + high - low
 
 
 def _has_edge_near(region: Region, p: Point) -> bool:
-    """Whether an edge of a region lies within half of INSIDE of a point."""
+    """Return True if an edge of a region lies within half of INSIDE of a point."""
     left, low, right, high = widened((*p, *p), INSIDE / 2)
     return any(
         box[0] <= right

@@ -1,17 +1,18 @@
-"""What the rules measure against."""
+"""Limits that the rules measure against, and the limits that a design lowers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from sbafab.geometry.beam import Kerf
 from sbafab.geometry.edges import Point
+from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.laminate import Laminate
 
 TOLERANCE = 0.001
-"""mm by which a value may miss its limit and still hold it: what the cut files promise."""
+"""mm by which a value may miss its limit and still pass: the resolution of the cut files."""
 
 
 @dataclass(frozen=True)
@@ -74,15 +75,75 @@ class Limits:
 
 
 def holds(measured: float, limit: float) -> bool:
-    """Whether a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
-    return measured >= least_held(limit)
+    """True if a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
+    return measured >= least_passing(limit)
 
 
-def least_held(limit: float) -> float:
-    """The least value that still holds a least limit."""
+def least_passing(limit: float) -> float:
+    """Return the least value that passes a least limit."""
     return limit - TOLERANCE - 1e-9
 
 
 def at(p: Point) -> str:
-    """A point as messages print it."""
+    """Return a point as messages print it."""
     return f"x {round(p[0], 3) + 0.0:.3f}, y {round(p[1], 3) + 0.0:.3f}"
+
+
+# Limits that a design lowers below the usual ones. No waiver, but stated in every file like one.
+
+
+USUAL = Limits()
+CHECKED_AGAINST = "checked against limits below the usual ones: "
+"""Introduces the lowered limits in a sentence."""
+WORST = ("registration-worst-case", "registration-yield")
+
+
+class _Key(NamedTuple):
+    """A key of the design, the rules that it weakens, and where its usual value comes from."""
+
+    name: str
+    rules: tuple[str, ...]
+    value: Callable[[Limits], float]
+    source: str = "paper"
+    is_weaker_above: bool = False
+
+
+# Left out, as none of them lets a worse design pass: target_yield (none by default), yield_builds
+# (the finding states its interval), speeds and heat_distance (no rule reads them), kerf (measured,
+# and written in KERF_WIDTH), platen (the size of a press, printed at every step).
+KEYS = (
+    _Key("bond_width", ("bond-width", "tube-fit"), lambda lim: lim.bond_width),
+    _Key("mask_overhang", ("mask-overhang",), lambda lim: lim.mask_overhang),
+    _Key("worst_bond_width", WORST, lambda lim: lim.worst_bond_width, "default"),
+    _Key("worst_mask_overhang", WORST, lambda lim: lim.worst_mask_overhang, "default"),
+    _Key("validated_balloons", ("press-fit",), lambda lim: lim.validated_balloons, "paper", True),
+    _Key("least_feature", ("film-limits",), lambda lim: lim.least_feature, "default"),
+    _Key("unknown_kerf", ("tube-fit",), lambda lim: lim.unknown_kerf, "default"),
+    _Key("pin_stretch", ("pin-fit",), lambda lim: lim.pin_stretch, "default", True),
+    _Key("cutting_error", (*WORST, "pin-fit", "tube-fit"), lambda lim: lim.tolerances.cutting),
+    _Key("pin_error", WORST, lambda lim: lim.tolerances.pin),
+    _Key("hand_placement", WORST, lambda lim: lim.tolerances.placement, "default"),
+    _Key("hand_turn", WORST, lambda lim: lim.tolerances.turn, "default"),
+    _Key("sheet_error", WORST, lambda lim: lim.tolerances.sheet, "default"),
+    _Key("second_cut_error", ("bridges",), lambda lim: lim.tolerances.second_cut, "default"),
+)
+"""Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""
+
+
+def lowered(limits: Limits, rule: str | None = None) -> tuple[str, ...]:
+    """Return each lowered limit (of one rule) with its value: "bond_width 0.3 (paper 0.75)"."""
+    return tuple(
+        weakened(key.name, key.value(limits), key.value(USUAL), key.source)
+        for key in KEYS
+        if (rule is None or rule in key.rules) and _is_weaker(key, limits)
+    )
+
+
+def _is_weaker(key: _Key, limits: Limits) -> bool:
+    value, usual = key.value(limits), key.value(USUAL)
+    return value > usual if key.is_weaker_above else value < usual
+
+
+def weakened(name: str, value: float, usual: float, source: str) -> str:
+    """Return one lowered limit as every file states it."""
+    return f"{name} {value:g} ({source} {usual:g})"

@@ -1,6 +1,6 @@
-"""Where bond and overhang are narrow, whose edges bound them, and what can move these.
+"""Margins: the narrow places of bonds and overhangs, the owners of their edges, and their losses.
 
-To first order in the small displacements: what is left at a place is its nominal width and the
+To first order in the small displacements, the width left at a place is its nominal width and the
 change along the normal there, which is linear in every cutting error, shift and turn.
 """
 
@@ -9,21 +9,31 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.cache import cached, cached_batch
+from sbafab.geometry.edge_table import (
+    CellOrder,
+    EdgeTable,
+    boxes_round,
+    columns_of,
+    crossings,
+    dot,
+    touching_in_parts,
+)
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Point, left_normal
+from sbafab.geometry.facing_places import facing_places_of, sampled
+from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.rules.boundary import Reach
-from sbafab.rules.facing import Facing
+from sbafab.laminate.laminate import Interface, Laminate, Pin
+from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
 from sbafab.rules.freedoms import Freedom, Freedoms, Part
 from sbafab.rules.limits import TOLERANCE, Limits, holds
 
 if TYPE_CHECKING:
-    from sbafab.rules.narrow_places import Places
+    from sbafab.geometry.edge_table import Bools, Floats, Indices
 
 Quantity = Literal["bond", "overhang"]
 QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
@@ -36,8 +46,9 @@ ROOM: Final = 1e-6
 
 
 class Owner(NamedTuple):
-    """Whose edge it is: the layer's seat in the interface (0 below, 1 above, then the masks), the
-    contour and the piece of its profile.
+    """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
+
+    Seats are 0 below, 1 above, then the masks.
     """
 
     seat: int
@@ -76,7 +87,7 @@ class Push(NamedTuple):
 
 @dataclass(frozen=True)
 class InterfaceMargins:
-    """Interfaces of equal profiles and equal freedoms, the first of them, and its margins.
+    """Interfaces of equal profiles and equal freedoms, and the margins of the first.
 
     ``places`` are those of bonds, then those of overhangs.
     """
@@ -89,22 +100,22 @@ class InterfaceMargins:
         return self.interfaces[0]
 
     def __len__(self) -> int:
-        return sum(len(found.nominal) for found in self.places.values())
+        return sum(len(places.nominal) for places in self.places.values())
 
     def __getitem__(self, number: int) -> Margin:
-        for quantity, found in self.places.items():
-            if number < len(found.nominal):
-                (x, y), (u, v) = found.start[:, number].tolist(), found.end[:, number].tolist()
-                nx, ny = found.normal[:, number].tolist()
-                nominal = float(found.nominal[number])
-                owners = found.owners[found.between[number]]
+        for quantity, places in self.places.items():
+            if number < len(places.nominal):
+                (x, y), (u, v) = places.start[:, number].tolist(), places.end[:, number].tolist()
+                nx, ny = places.normal[:, number].tolist()
+                nominal = float(places.nominal[number])
+                owners = places.owners[places.between[number]]
                 return Margin(quantity, nominal, (x, y), (u, v), (nx, ny), owners)
-            number -= len(found.nominal)
+            number -= len(places.nominal)
         raise IndexError(number)
 
 
 def seated(interface: Interface) -> tuple[int, ...]:
-    """Layer indices by seat."""
+    """Return layer indices by seat."""
     return (
         interface.below.index,
         interface.above.index,
@@ -112,10 +123,10 @@ def seated(interface: Interface) -> tuple[int, ...]:
     )
 
 
-def felt(
+def relative_freedoms(
     owners: tuple[Owner, Owner], layers: Sequence[int], moves: Freedoms
 ) -> list[tuple[Freedom, bool]]:
-    """The freedoms that one of two edges has and the other not, and whether it is the end's.
+    """Return the freedoms that only one of two edges has, each with True if it is the end's.
 
     ``layers`` are those of the interface, by seat.
     """
@@ -128,7 +139,7 @@ def felt(
 
 
 def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
-    """What can narrow a margin, and by how much."""
+    """Return the freedoms that can narrow a margin, with the most that each takes, mm."""
     return [
         Push(
             freedom,
@@ -136,17 +147,17 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
             * abs(freedom.lever(margin.end if at_end else margin.start, margin.normal)),
             at_end,
         )
-        for freedom, at_end in felt(margin.owners, seated(interface), moves)
+        for freedom, at_end in relative_freedoms(margin.owners, seated(interface), moves)
     ]
 
 
-def felt_alike(
+def group_interfaces(
     laminate: Laminate, facing: Iterable[Facing], moves: Freedoms
 ) -> list[list[Interface]]:
-    """Interfaces by equal profiles and equal freedoms.
+    """Return interfaces grouped by equal profiles and equal freedoms.
 
-    Films that face each other past a smaller balloon count as an interface of their own; where no
-    mask lies between them, facing-films tells of it.
+    Films that face each other past a smaller balloon count as an interface of their own;
+    facing-films reports those without a mask between them.
     """
     groups: dict[object, list[Interface]] = {}
     faced = [pair.gap for pair in facing if pair.bare.is_empty]
@@ -157,17 +168,18 @@ def felt_alike(
 
 
 def _signature(interface: Interface, moves: Freedoms) -> tuple[object, ...]:
-    """Equal for interfaces whose parts can do the same, whatever the bodies are called."""
+    """Equal for interfaces whose parts have the same freedoms, whatever the bodies are called."""
     names: dict[int, int] = {}
     return tuple(
-        tuple([(names.setdefault(id(freedom), len(names)), freedom.like()) for freedom in own])
-        for own in moves.unshared(seated(interface))
+        tuple([(names.setdefault(id(freedom), len(names)), freedom.like()) for freedom in ways])
+        for ways in moves.unshared(seated(interface))
     )
 
 
 class _Loss(NamedTuple):
-    """What margins of an interface can lose: no two edges more than ``most``, and ``all`` of what
-    moves together, cutting counted.
+    """Bounds of the loss at an interface's margins, mm.
+
+    ``most`` between any two edges, ``all`` when everything moves together, cutting counted.
     """
 
     most: float
@@ -175,9 +187,9 @@ class _Loss(NamedTuple):
     cutting: float
 
     def slack(self, least: float, drawn: float, limit: float) -> float:
-        """How much wider than the ``least`` those are that could become the worst or come short.
+        """Return how far above the ``least`` width a place may become the worst or come short, mm.
 
-        Where the least is short as ``drawn``, those that are not count too.
+        Where the least is short as ``drawn``, all that are not short count too.
         """
         if not holds(least, drawn):
             return self.all
@@ -186,19 +198,19 @@ class _Loss(NamedTuple):
 
 def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
     parts = _parts(interface)
-    own = moves.unshared(seated(interface))
+    ways_of_parts = moves.unshared(seated(interface))
     reach: list[dict[int, float]] = []
-    for region, found in zip(parts, own, strict=True):
+    for region, ways in zip(parts, ways_of_parts, strict=True):
         box = region.bounds
-        reach.append({id(freedom): freedom.most * _farthest(freedom, box) for freedom in found})
+        reach.append({id(freedom): freedom.most * _farthest(freedom, box) for freedom in ways})
     most = max(
         (
-            _cost_without(other, one) + _cost_without(one, other)
-            for one, other in combinations(reach, 2)
+            _cost_without(costs_b, costs_a) + _cost_without(costs_a, costs_b)
+            for costs_a, costs_b in combinations(reach, 2)
         ),
         default=0.0,
     )
-    loose = {id(freedom): freedom for found in own for freedom in found}.values()
+    loose = {id(freedom): freedom for ways in ways_of_parts for freedom in ways}.values()
     box = interface.contact.bounds
     cutting = 2 * limits.tolerances.cutting
     together = sum([freedom.most * _farthest(freedom, box) for freedom in loose], 0.0)
@@ -206,12 +218,12 @@ def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
 
 
 def _cost_without(shared: Mapping[int, float], costs: Mapping[int, float]) -> float:
-    """What all freedoms cost together but those that are shared."""
+    """Total cost of the freedoms that are not shared, mm."""
     return sum([cost for freedom, cost in costs.items() if freedom not in shared], 0.0)
 
 
 def _parts(interface: Interface) -> list[Region]:
-    """The pieces of its layers, by seat."""
+    """The pieces of an interface's layers, by seat."""
     layers = (interface.below, interface.above, *interface.masks)
     return [piece for layer in layers for piece in layer.profile.pieces]
 
@@ -223,53 +235,53 @@ def _farthest(freedom: Freedom, box: Bounds) -> float:
     return max(math.dist(freedom.centre, (x, y)) for x in box[::2] for y in box[1::2])
 
 
-class Felt(NamedTuple):
-    """Interfaces that are alike, and what their margins can lose; ``bond`` is the least width."""
+class InterfaceGroup(NamedTuple):
+    """Equal interfaces, the loss that their margins may suffer, and the ``bond``'s least width."""
 
-    alike: tuple[Interface, ...]
+    interfaces: tuple[Interface, ...]
     loss: _Loss
     bond: Width | None
 
     @staticmethod
-    def of(alike: Sequence[Interface], limits: Limits, moves: Freedoms, bond: Width | None) -> Felt:
-        return Felt(tuple(alike), _loss(alike[0], limits, moves), bond)
+    def of(
+        interfaces: Sequence[Interface], limits: Limits, moves: Freedoms, bond: Width | None
+    ) -> InterfaceGroup:
+        return InterfaceGroup(tuple(interfaces), _loss(interfaces[0], limits, moves), bond)
 
     def slack(self, limits: Limits) -> float:
-        """How much wider than its narrowest place a bond is looked at."""
+        """Return how far above its narrowest place a bond is examined, mm."""
         if self.bond is None:
             return 0.0
         return self.loss.slack(self.bond.value, limits.bond_width, limits.worst_bond_width)
 
 
 def narrow_places(
-    every: Sequence[Felt],
+    groups: Sequence[InterfaceGroup],
     pins: tuple[Pin, ...],
     limits: Limits,
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
 ) -> list[dict[Quantity, Places]]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
-    ``reaches`` is how far masks reach past film edges, for each of the interfaces that are alike.
+    ``reaches`` are the masks' reaches past film edges, for each group of interfaces.
     """
-    from sbafab.rules.narrow_places import BondAsked, OverhangAsked, places_of, profiles_of
-
-    slacks = [felt.slack(limits) for felt in every]
+    slacks = [group.slack(limits) for group in groups]
     # Of one bond all interfaces ask for the same places.
     widest: dict[Region, float] = {}
-    for felt, slack in zip(every, slacks, strict=True):
-        bond = felt.alike[0].bond
+    for group, slack in zip(groups, slacks, strict=True):
+        bond = group.interfaces[0].bond
         widest[bond] = max(slack, widest.get(bond, 0.0))
-    asked: list[tuple[int, Quantity, BondAsked | OverhangAsked]] = []
+    queries: list[tuple[int, Quantity, BondQuery | OverhangQuery]] = []
     flush = limits.mask_overhang
-    for number, (felt, slack) in enumerate(zip(every, slacks, strict=True)):
-        interface = felt.alike[0]
+    for number, (group, slack) in enumerate(zip(groups, slacks, strict=True)):
+        interface = group.interfaces[0]
         if interface.contact.is_empty:
             continue
         profiles = profiles_of(interface)
-        if felt.bond is not None:
+        if group.bond is not None:
             bond = interface.bond
-            asked.append(
-                (number, "bond", BondAsked(bond, felt.bond, slack, widest[bond], profiles))
+            queries.append(
+                (number, "bond", BondQuery(bond, group.bond, slack, widest[bond], profiles))
             )
         free = tuple(
             (edge, reach)
@@ -278,18 +290,18 @@ def narrow_places(
         )
         if free:
             least = min(reach.value for _, reach in free)
-            farther = felt.loss.slack(least, flush, limits.worst_mask_overhang)
-            overhang = OverhangAsked(interface.mask, free, farther, profiles)
-            asked.append((number, "overhang", overhang))
-    found: list[dict[Quantity, Places]] = [{} for _ in every]
-    told = places_of([one for *_, one in asked])
-    for (number, quantity, _), places in zip(asked, told, strict=True):
-        found[number][quantity] = places
-    return found
+            farther = group.loss.slack(least, flush, limits.worst_mask_overhang)
+            overhang = OverhangQuery(interface.mask, free, farther, profiles)
+            queries.append((number, "overhang", overhang))
+    by_group: list[dict[Quantity, Places]] = [{} for _ in groups]
+    results = places_of([query for *_, query in queries])
+    for (number, quantity, _), places in zip(queries, results, strict=True):
+        by_group[number][quantity] = places
+    return by_group
 
 
 def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
-    """The pin that fills a bore with this edge."""
+    """Return the pin that fills a bore with this edge, or None."""
     if not isinstance(edge, Arc) or edge.ccw:
         return None
     for pin in pins:
@@ -299,3 +311,468 @@ def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
         ):
             return pin
     return None
+
+
+# Narrow places of interfaces in arrays: position, width and owners of their edges. All queries are
+# answered together; edges are tabulated once a profile.
+
+
+ON_EDGE: Final = 1e-5
+"""mm within which a point lies on an edge: booleans keep points to 4 nm, files to 1 nm."""
+SQUARE: Final = 0.9
+"""Cosine above which an edge counts as square to a direction (within 25 degrees)."""
+
+
+class Places(NamedTuple):
+    """Places from an edge to another, in the order of detection.
+
+    ``nominal`` mm apart along the unit ``normal``; ``between`` is the number of both edges' owners
+    among ``owners``.
+    """
+
+    nominal: Floats
+    start: Floats
+    end: Floats
+    normal: Floats
+    between: Indices
+    owners: Sequence[tuple[Owner, Owner]]
+
+    def at(self, numbers: Indices) -> Places:
+        return Places(
+            self.nominal.take(numbers),
+            self.start.take(numbers, axis=1),
+            self.end.take(numbers, axis=1),
+            self.normal.take(numbers, axis=1),
+            self.between.take(numbers),
+            self.owners,
+        )
+
+
+class BondQuery(NamedTuple):
+    """Query of a bond's places at most ``slack`` mm wider than its narrowest.
+
+    ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
+    the layers, by seat.
+    """
+
+    bond: Region
+    least: Width
+    slack: float
+    widest: float
+    profiles: tuple[Region, ...]
+
+
+class OverhangQuery(NamedTuple):
+    """Query of overhangs: places at most ``slack`` mm wider than the nearest."""
+
+    mask: Region
+    free: tuple[tuple[Edge, Reach], ...]
+    slack: float
+    profiles: tuple[Region, ...]
+
+
+PlacesQuery = BondQuery | OverhangQuery
+
+
+def profiles_of(interface: Interface) -> tuple[Region, ...]:
+    """Return an interface's layer profiles by seat."""
+    return tuple([layer.profile for layer in (interface.below, interface.above, *interface.masks)])
+
+
+@cached_batch
+def places_of(queries: Sequence[PlacesQuery]) -> Sequence[Places]:
+    """Return the narrow places of each bond and overhang, searched together."""
+    bonds = [query for query in queries if isinstance(query, BondQuery)]
+    overhangs = [query for query in queries if isinstance(query, OverhangQuery)]
+    of_bonds = iter(_of_bonds(bonds))
+    of_overhangs = iter(_of_overhangs(overhangs))
+    segments = [
+        next(of_bonds if isinstance(query, BondQuery) else of_overhangs) for query in queries
+    ]
+    located = _owned(segments, [query.profiles for query in queries])
+    return [
+        places
+        if isinstance(query, BondQuery) or not len(places.nominal)
+        else _nearest(places, query.slack)
+        for query, places in zip(queries, located, strict=True)
+    ]
+
+
+def _nearest(places: Places, slack: float) -> Places:
+    """Places that are at most ``slack`` wider than the narrowest."""
+    (near,) = (places.nominal <= places.nominal.min() + slack).nonzero()
+    return places.at(near)
+
+
+class _Segments(NamedTuple):
+    """Places before the owners of their edges are determined.
+
+    ``from_films``: they go from films to masks; else either may lie at both ends.
+    """
+
+    nominal: Floats
+    start: Floats
+    end: Floats
+    normal: Floats
+    from_films: bool
+
+
+def _of_bonds(queries: Sequence[BondQuery]) -> list[_Segments]:
+    facing = facing_places_of([(query.bond, query.widest, SHARP, query.least) for query in queries])
+    segments = []
+    for query, every in zip(queries, facing, strict=True):
+        narrow = every
+        if query.slack < query.widest:
+            narrow = every.at(every.value <= query.least.value + query.slack)
+        off = narrow.end - narrow.start
+        length = np.sqrt(dot(off, off))
+        normal = off / np.where(length > 0, length, 1.0)
+        segments.append(_Segments(narrow.value, narrow.start, narrow.end, normal, False))
+    return segments
+
+
+def _of_overhangs(queries: Sequence[OverhangQuery]) -> list[_Segments]:
+    """Places of overhangs: each edge's own reach, then its samples."""
+    if not queries:
+        return []
+    withins = [
+        min(reach.value for _, reach in query.free) + query.slack + ROOM for query in queries
+    ]
+    nears = [
+        [(edge, reach) for edge, reach in query.free if reach.value <= within]
+        for query, within in zip(queries, withins, strict=True)
+    ]
+    near = [pair for pairs in nears for pair in pairs]
+    # The ask that each edge is of.
+    home = np.arange(len(queries)).repeat([len(pairs) for pairs in nears])
+    rays = Rays.of([edge for edge, _ in near])
+    masks = [_profile(query.mask).table for query in queries]
+    home_of_ray = home.take(rays.edge)
+    counts = np.bincount(home_of_ray, minlength=len(queries)).tolist()
+    parts = [(count, len(mask.radius)) for count, mask in zip(counts, masks, strict=True)]
+    within = np.array(withins).take(home_of_ray)
+    ray, value, end = first_met(rays, EdgeTable.joined(masks), within, parts)
+    feet = [edge.nearest(reach.at) for edge, reach in near]
+    outward = [left_normal(edge, p) for (edge, _), p in zip(near, feet, strict=True)]
+    edge = np.concatenate([np.arange(len(near)), rays.edge.take(ray)])
+    order = edge.argsort(kind="stable")
+    nominal = np.concatenate([[reach.value for _, reach in near], value])[order]
+    start = np.concatenate([columns_of(feet, 2), rays.start.take(ray, axis=1)], axis=1)[:, order]
+    ends = np.concatenate([columns_of([reach.at for _, reach in near], 2), end], axis=1)[:, order]
+    normal = np.concatenate([-columns_of(outward, 2), rays.outward.take(ray, axis=1)], axis=1)[
+        :, order
+    ]
+    stops = home.take(edge.take(order)).searchsorted(np.arange(len(queries) + 1)).tolist()
+    return [
+        _Segments(nominal[a:b], start[:, a:b], ends[:, a:b], normal[:, a:b], True)
+        for a, b in pairwise(stops)
+    ]
+
+
+def _owned(segments: Sequence[_Segments], profiles: Sequence[Sequence[Region]]) -> list[Places]:
+    """Places with the owners of their edges, one for each pair of owners."""
+    counts = [len(item.nominal) for item in segments]
+    total, home = sum(counts), np.arange(len(counts)).repeat(counts)
+    nominal = np.concatenate([item.nominal for item in segments])
+    start, end, normal = (
+        np.concatenate(column, axis=1)
+        for column in zip(*(item[1:4] for item in segments), strict=True)
+    )
+    # Of each ask its starts, then its ends.
+    order = np.concatenate([home, home]).argsort(kind="stable")
+    points, square_to = (
+        np.concatenate(both, axis=1).take(order, axis=1)
+        for both in ((start, end), (normal, normal))
+    )
+    place, owner, owners = _owners(points, square_to, _blocks(segments, profiles))
+    numbered = order.take(place)
+    segment, is_start = numbered % total, numbered < total
+    ours, theirs = segment[is_start], segment[~is_start]
+    end_counts = np.bincount(theirs, minlength=total)
+    begins = end_counts.cumsum() - end_counts
+    repeats = end_counts.take(ours)
+    rows = ours.repeat(repeats)
+    within = np.arange(len(rows)) - (repeats.cumsum() - repeats).repeat(repeats)
+    pairs = owner[is_start].repeat(repeats) * len(owners)
+    pairs += owner[~is_start].take(begins.take(rows) + within)
+    names = sorted(set(pairs.tolist()))
+    between = np.searchsorted(names, pairs)
+    named = [(owners[name // len(owners)], owners[name % len(owners)]) for name in names]
+    stops = home.take(rows).searchsorted(np.arange(len(counts) + 1)).tolist()
+    nominal, normal = nominal.take(rows), normal.take(rows, axis=1)
+    start, end = start.take(rows, axis=1), end.take(rows, axis=1)
+    places = []
+    for a, b in pairwise(stops):
+        # Owners are numbered ask by ask.
+        low, high = (int(between[a:b].min()), int(between[a:b].max()) + 1) if a < b else (0, 0)
+        local = between[a:b] - low
+        places.append(
+            Places(nominal[a:b], start[:, a:b], end[:, a:b], normal[:, a:b], local, named[low:high])
+        )
+    return places
+
+
+class _Block(NamedTuple):
+    """A number of points, and the edges that may run through them with their seats."""
+
+    points: int
+    edges: Sequence[tuple[int, _Profile]]
+
+
+def _blocks(segments: Sequence[_Segments], profiles: Sequence[Sequence[Region]]) -> list[_Block]:
+    """Blocks of starts and ends of each query: from films to masks, or anywhere."""
+    by_id: dict[int, _Profile] = {}
+    blocks = []
+    for segment, shapes in zip(segments, profiles, strict=True):
+        seated = [
+            (seat, by_id.get(id(profile)) or by_id.setdefault(id(profile), _profile(profile)))
+            for seat, profile in enumerate(shapes)
+        ]
+        count = len(segment.nominal)
+        if segment.from_films:
+            blocks += [_Block(count, seated[:2]), _Block(count, seated[2:])]
+        else:
+            blocks.append(_Block(2 * count, seated))
+    return blocks
+
+
+def _owners(
+    p: Floats, normal: Floats, blocks: Sequence[_Block]
+) -> tuple[Indices, Indices, list[Owner]]:
+    """Owners of the edges through each point: of those square to its normal, if any, else all.
+
+    Points in rising order, for each the numbers of its owners, and these.
+    """
+    owners: list[Owner] = []
+    numbers: list[Indices] = []
+    for block in blocks:
+        for seat, shape in block.edges:
+            numbers.append(shape.contour + len(owners))
+            owners += [Owner(seat, number, piece) for number, piece in enumerate(shape.pieces)]
+    table = EdgeTable.joined([shape.table for block in blocks for _, shape in block.edges])
+    parts = [sum(len(shape.contour) for _, shape in block.edges) for block in blocks]
+    boxes = boxes_round(p, p, ON_EDGE)
+    counts = [block.points for block in blocks]
+    place, number = touching_in_parts(boxes, counts, table.box, parts)
+    edges = table.at(number)
+    (here,) = (edges.distance(p.take(place, axis=1)) < ON_EDGE).nonzero()
+    place, number = place.take(here), number.take(here)
+    edges = edges.at(here)
+    aside = dot(edges.normal(p.take(place, axis=1)), normal.take(place, axis=1))
+    square = np.abs(aside) > SQUARE
+    has_square = np.zeros(p.shape[1], dtype=bool)
+    has_square[place[square]] = True
+    chosen = square | ~has_square.take(place)
+    place, number = place[chosen], number[chosen]
+    order = CellOrder(table.box, parts).sorted(boxes, place, number)
+    place, owner = place.take(order), np.concatenate(numbers).take(number.take(order))
+    # Each owner once a place, where it comes first.
+    key = place * len(owners) + owner
+    by_key = key.argsort(kind="stable")
+    in_order = key.take(by_key)
+    is_first = np.ones(len(key), dtype=bool)
+    is_first[by_key[1:]] = in_order[1:] != in_order[:-1]
+    return place[is_first], owner[is_first], owners
+
+
+class _Profile(NamedTuple):
+    """The edges of a layer, contour by contour, with the contour of each and its piece."""
+
+    table: EdgeTable
+    contour: Indices
+    pieces: list[int]
+
+
+@cached
+def _profile(profile: Region) -> _Profile:
+    numbered = [(n, c) for n, region in enumerate(profile.pieces) for c in region.contours]
+    return _Profile(
+        EdgeTable.of(
+            [edge for _, contour in numbered for edge in contour.edges],
+            [box for _, contour in numbered for box in contour.boxes],
+        ),
+        np.arange(len(numbered)).repeat([len(contour.edges) for _, contour in numbered]),
+        [piece for piece, _ in numbered],
+    )
+
+
+class Rays(NamedTuple):
+    """Points spread over edges, the outward unit normals there, and the numbers of their edges."""
+
+    start: Floats
+    outward: Floats
+    edge: Indices
+
+    @staticmethod
+    def of(edges: Sequence[Edge]) -> Rays:
+        points, counts = sampled(edges, END_ROOM)
+        start, numbers = columns_of(points, 2), np.arange(len(edges)).repeat(counts)
+        return Rays(start, -EdgeTable.of(edges).at(numbers).normal(start), numbers)
+
+
+def first_met(
+    rays: Rays, table: EdgeTable, within: float | Floats, parts: Sequence[tuple[int, int]] = ()
+) -> tuple[Indices, Floats, Floats]:
+    """Return the first edge that each ray meets: number of the ray, distance (mm) and point.
+
+    Edges farther off than ``within`` may be left out. ``parts``: numbers of rays and edges of
+    blocks; rays of a block meet its edges only.
+    """
+    counts, edge_counts = zip(*parts or [(len(rays.edge), len(table.radius))], strict=True)
+    boxes = boxes_round(rays.start, rays.start + within * rays.outward, END_ROOM)
+    ray, number = touching_in_parts(boxes, counts, table.box, edge_counts)
+    start, outward = rays.start.take(ray, axis=1), rays.outward.take(ray, axis=1)
+    edges = table.at(number)
+    height, there = crossings(start, outward, edges)
+    hits = []
+    for along, is_there in zip(height, there, strict=True):
+        q = start + along * outward
+        normal = edges.normal(q)
+        # What runs along the ray does not end it.
+        crosses = np.abs(dot(normal, outward)) >= STEEP
+        is_hit = is_there & (along > -EPSILON) & crosses & _on(edges, q)
+        hits.append((ray[is_hit], along[is_hit], q[:, is_hit]))
+    rows = np.concatenate([hit[0] for hit in hits])
+    value = np.concatenate([hit[1] for hit in hits])
+    q = np.concatenate([hit[2] for hit in hits], axis=1)
+    order = np.lexsort((value, rows))
+    sorted_rows = rows.take(order)
+    is_first = np.ones(len(rows), dtype=bool)
+    is_first[1:] = sorted_rows[1:] != sorted_rows[:-1]
+    chosen = order[is_first]
+    return rows.take(chosen), np.maximum(value.take(chosen), 0.0), q.take(chosen, axis=1)
+
+
+def _on(edges: EdgeTable, q: Floats) -> Bools:
+    """True for points of their lines and circles that lie between the ends of edges."""
+    chord = edges.end - edges.start
+    square = dot(chord, chord)
+    t = dot(chord, q - edges.start) / np.where(square == 0, 1.0, square)
+    on_line = (t >= -1e-12) & (t <= 1 + 1e-12)
+    on: Bools = np.where(edges.turn == 0, on_line, edges.faces(q, 1e-9))
+    return on
+
+
+# Linear forms of the width left at every margin.
+#
+# Margins between edges of the same two parts depend on the same moves: they differ in nominal
+# width, normal and levers. Worst case and yield read these forms, of all interfaces at once.
+
+
+class MarginRun(NamedTuple):
+    """The margins of one quantity of an interface: the number of its group, and the place of the
+    first among all margins of the interface.
+    """
+
+    group: int
+    quantity: Quantity
+    first: int
+
+
+class Moves(NamedTuple):
+    """Freedoms that one of two owners has and the other not: a column a pair, a line a move.
+
+    It shifts by up to ``shift`` mm or turns by up to ``turn`` radians, and counts by its ``sign``:
+    1 if it acts at the end. ``freedoms`` are the same, by column.
+    """
+
+    freedoms: Sequence[Sequence[Freedom]]
+    shift: Floats
+    turn: Floats
+    sign: Floats
+
+
+class LinearForms(NamedTuple):
+    """The margins of all interfaces, run after run, in the order they were found.
+
+    ``begins`` says where each run begins, ``run`` which one a margin is of. ``nominal`` (mm) and
+    ``normal`` (2 rows) have a column each; ``between`` is the number of the owners of both edges
+    among ``owners`` and ``moves``. ``levers`` has a line for each of these moves: mm per radian of
+    what turns, as it counts, else 0. ``loss`` is the most that all of them take from each margin,
+    mm; ``pinned_loss`` that of all but what the hand does.
+    """
+
+    runs: Sequence[MarginRun]
+    begins: Indices
+    run: Indices
+    nominal: Floats
+    normal: Floats
+    between: Indices
+    owners: Sequence[tuple[Owner, Owner]]
+    moves: Moves
+    levers: Floats
+    loss: Floats
+    pinned_loss: Floats
+
+    def by_quantity(self, values: Mapping[Quantity, float]) -> Floats:
+        """A value for each margin."""
+        return np.array([values[run.quantity] for run in self.runs], dtype=float)[self.run]
+
+
+def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearForms:
+    """Return the margins of all interfaces as linear forms."""
+    runs: list[MarginRun] = []
+    every: list[Places] = []
+    owners: list[tuple[Owner, Owner]] = []
+    acting: list[Sequence[tuple[Freedom, bool]]] = []
+    parts: list[int] = []
+    begins = [0]
+    between = [np.zeros(0, dtype=np.intp)]
+    for number, group in enumerate(groups):
+        first, layers = begins[-1], seated(group.first)
+        acting_by_parts: dict[tuple[int, ...], int] = {}
+        for quantity, places in group.places.items():
+            if not len(places.nominal):
+                continue
+            runs.append(MarginRun(number, quantity, begins[-1] - first))
+            begins.append(begins[-1] + len(places.nominal))
+            every.append(places)
+            between.append(places.between + len(owners))
+            owners += places.owners
+            for owner_a, owner_b in places.owners:
+                both = owner_a.seat, owner_a.piece, owner_b.seat, owner_b.piece
+                if both not in acting_by_parts:
+                    acting_by_parts[both] = len(acting)
+                    acting.append(relative_freedoms((owner_a, owner_b), layers, moves))
+                parts.append(acting_by_parts[both])
+    none = np.zeros((2, 0))
+    nominal = np.concatenate([none[0], *[places.nominal for places in every]])
+    start = np.concatenate([none, *[places.start for places in every]], axis=1)
+    end = np.concatenate([none, *[places.end for places in every]], axis=1)
+    normal = np.concatenate([none, *[places.normal for places in every]], axis=1)
+    pair = np.concatenate(between)
+    columns = _columns(acting).take(np.array(parts, dtype=np.intp), axis=2)
+    shift, turn, sign, pinned, x, y = columns.take(pair, axis=2)
+    p = np.where(sign > 0, end[:, None], start[:, None])
+    levers = np.where(turn > 0, sign, 0.0) * ((p[0] - x) * normal[1] - (p[1] - y) * normal[0])
+    return LinearForms(
+        runs,
+        np.array(begins),
+        np.repeat(np.arange(len(runs)), np.diff(begins)),
+        nominal,
+        normal,
+        pair,
+        owners,
+        Moves([[freedom for freedom, _ in acting[part]] for part in parts], *columns[:3]),
+        levers,
+        (shift + turn * np.abs(levers)).sum(axis=0),
+        pinned.sum(axis=0),
+    )
+
+
+def _columns(acting: Sequence[Sequence[tuple[Freedom, bool]]]) -> Floats:
+    """Arrays of shift, turn, sign, shift without the hand, and x and y of the centre of each move.
+
+    0 where it does not apply, or fewer moves act.
+    """
+    lines = max(map(len, acting), default=0)
+    values: list[float] = []
+    for ways in acting:
+        for freedom, is_end in ways:
+            sign, most = 1.0 if is_end else -1.0, freedom.most
+            if freedom.centre is None:
+                values += (most, 0.0, sign, 0.0 if freedom.by_hand else most, 0.0, 0.0)
+            else:
+                values += (0.0, most, sign, 0.0, *freedom.centre)
+        values += [0.0] * (6 * (lines - len(ways)))
+    return np.array(values).reshape(len(acting), lines, 6).transpose(2, 1, 0)

@@ -1,7 +1,7 @@
 """mask-overhang: the masks reach past every film edge they keep apart (paper Sec. 2).
 
-Short of that, film over-melts at the edge. Where a dowel pin stands in a bore a flush mask is
-meant (the pin holds all layers by it); it is reported as waived, by the pin's name.
+Short of that, film over-melts at the edge. At a bore with a dowel pin a flush mask is intended (the
+pin holds all layers by it); it is reported as waived, by the pin's name.
 """
 
 from __future__ import annotations
@@ -9,13 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate, Pin
-from sbafab.rules.alike import Alike, distinct_interfaces, interface_name
+from sbafab.laminate.laminate import Interface, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
 from sbafab.rules.margins import pin_at
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import DistinctInterface, Measures, distinct_interfaces, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "mask-overhang"
 
@@ -23,20 +22,20 @@ NAME = "mask-overhang"
 class _Overhang(NamedTuple):
     value: float
     at: Point
-    alike: Alike
+    distinct: DistinctInterface
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The least reach of any mask past an edge that bounds unbonded film, and pins' waivers."""
-    measures = measures or Measures(laminate, limits)
+    laminate, limits = measures.laminate, measures.limits
     free: list[_Overhang] = []
     pinned: dict[str, list[_Overhang]] = {}
-    bare: list[Alike] = []
-    for alike in distinct_interfaces(laminate):
-        if alike.interface.kind != "bond" and alike.interface.unbonded.is_empty:
-            bare.append(alike)
-        for edge, reach in measures.reaches(alike.interface):
-            overhang = _Overhang(reach.value, edge.nearest(reach.at), alike)
+    bare: list[DistinctInterface] = []
+    for distinct in distinct_interfaces(laminate):
+        if distinct.interface.kind != "bond" and distinct.interface.unbonded.is_empty:
+            bare.append(distinct)
+        for edge, reach in measures.reaches(distinct.interface):
+            overhang = _Overhang(reach.value, edge.nearest(reach.at), distinct)
             pin = pin_at(edge, laminate.pins)
             if pin is not None and not holds(overhang.value, limits.mask_overhang):
                 pinned.setdefault(pin.name, []).append(overhang)
@@ -46,12 +45,24 @@ def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) 
     return [_main(free, bare, limits), *waived]
 
 
-def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every mask reaches at least 0.50 mm past the film edges it keeps apart",
+        "Film that melts at an edge runs round the end of a short mask and welds the pocket shut.",
+        "Make mask.overhang larger. A flush mask at a pinned bore is meant, and waived by itself.",
+        ("rules.mask_overhang", "mask.overhang"),
+    ),
+)
+
+
+def _main(free: list[_Overhang], bare: list[DistinctInterface], limits: Limits) -> Finding:
     limit = limits.mask_overhang
     if bare:
         interface = bare[0].interface
         message = (
-            f"the mask at {interface_name(interface)}{bare[0].others} lies outside the film, so "
+            f"the mask at {interface_name(interface)}{bare[0].suffix} lies outside the film, so "
             "all of it bonds; put the mask where the film is"
         )
         return Finding(NAME, "fail", limit, 0.0, "mm", _place(interface), message)
@@ -59,8 +70,8 @@ def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:
         message = "no free film edge lies on a mask"
         return Finding(NAME, "pass", limit, None, "mm", Place(), message)
     worst = min(free, key=lambda overhang: overhang.value)
-    interface = worst.alike.interface
-    where = f"{interface_name(interface)}{worst.alike.others}, {at(worst.at)}"
+    interface = worst.distinct.interface
+    where = f"{interface_name(interface)}{worst.distinct.suffix}, {at(worst.at)}"
     good = holds(worst.value, limit)
     message = f"the least overhang of a mask past a film edge is {worst.value:.3f} mm, at {where}"
     if not good:
@@ -78,8 +89,10 @@ def _main(free: list[_Overhang], bare: list[Alike], limits: Limits) -> Finding:
 
 def _waived(pin: Pin, overhangs: list[_Overhang], limits: Limits) -> Finding:
     worst = min(overhangs, key=lambda overhang: overhang.value)
-    interface = worst.alike.interface
-    patterns = {overhang.alike.interface.index: overhang.alike.number for overhang in overhangs}
+    interface = worst.distinct.interface
+    patterns = {
+        overhang.distinct.interface.index: overhang.distinct.number for overhang in overhangs
+    }
     count = sum(patterns.values())
     interfaces = "1 interface" if count == 1 else f"{count} interfaces"
     message = (

@@ -1,28 +1,34 @@
-"""What several rules ask of one laminate under one set of limits, each worked out once."""
+"""Measures that several rules share: computed once for a laminate under one set of limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, cached_property
+from typing import NamedTuple
 
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
 from sbafab.geometry.width import Width, least_width
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules.boundary import Reach, edges_along, outward_reach
-from sbafab.rules.facing import Facing, facing_films
-from sbafab.rules.forms import LinearForms, linear_forms
+from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
 from sbafab.rules.limits import Limits
-from sbafab.rules.margins import SHARP, Felt, InterfaceMargins, felt_alike, narrow_places
+from sbafab.rules.margins import (
+    SHARP,
+    InterfaceGroup,
+    InterfaceMargins,
+    LinearForms,
+    group_interfaces,
+    linear_forms,
+    narrow_places,
+)
 
 
 class Measures:
-    """Measured when first asked for; the deck passes one to all rules that share them.
+    """Lazily computed measures; the deck passes one object to all rules.
 
-    ``pause`` is called between parts of long work; what it raises ends the work.
+    ``pause`` is called between parts of long work; an exception from it ends the work.
     """
 
     def __init__(
@@ -35,30 +41,30 @@ class Measures:
         self._reaches = cache(_reaches)
 
     def by_hand(self, limits: Limits) -> Measures:
-        """The same laminate laid by a hand no rougher than this one's, as ``limits`` say.
+        """Measures of the same laminate under ``limits`` with a hand no rougher than this one.
 
-        Places that are narrow with the rougher hand hold all that are so with a steadier one.
+        Places that are narrow with the rougher hand include all that are so with a steadier one.
         """
-        other = Measures(self.laminate, limits, self.pause)
-        other.margins, other.laid = self.margins, self.laid
-        return other
+        steadier = Measures(self.laminate, limits, self.pause)
+        steadier.margins, steadier.laid = self.margins, self.laid
+        return steadier
 
     @cached_property
     def facing(self) -> tuple[Facing, ...]:
-        """The films that face each other past others."""
+        """Films that face each other past others."""
         return facing_films(self.laminate)
 
     def bond(self, interface: Interface) -> Width | None:
-        """The least width of its bond; None where nothing bonds or no edge faces another."""
+        """Return the least width of an interface's bond; None without a bond or facing edges."""
         return self._bond(interface.bond)
 
     def reaches(self, interface: Interface) -> tuple[tuple[Edge, Reach], ...]:
-        """Film edges that bound unbonded film, and how far off the mask's edge lies."""
+        """Return film edges that bound unbonded film, each with its distance to the mask's edge."""
         return self._reaches(interface.unbonded, interface.contact, interface.mask)
 
     @cached_property
     def moves(self) -> Freedoms:
-        """What every piece of every layer can do."""
+        """Freedoms of every piece of every layer."""
         return freedoms(self.laminate, self.limits.tolerances, self.laid)
 
     @cached_property
@@ -70,19 +76,20 @@ class Measures:
     def margins(self) -> list[InterfaceMargins]:
         """The narrow places of every interface."""
         limits = self.limits
-        every = [
-            Felt.of(alike, limits, self.moves, self.bond(alike[0]))
-            for alike in felt_alike(self.laminate, self.facing, self.moves)
+        groups = [
+            InterfaceGroup.of(interfaces, limits, self.moves, self.bond(interfaces[0]))
+            for interfaces in group_interfaces(self.laminate, self.facing, self.moves)
         ]
-        reaches = [self.reaches(felt.alike[0]) for felt in every]
-        found = narrow_places(every, self.laminate.pins, limits, reaches)
+        reaches = [self.reaches(group.interfaces[0]) for group in groups]
+        places_of_groups = narrow_places(groups, self.laminate.pins, limits, reaches)
         return [
-            InterfaceMargins(felt.alike, places) for felt, places in zip(every, found, strict=True)
+            InterfaceMargins(group.interfaces, places)
+            for group, places in zip(groups, places_of_groups, strict=True)
         ]
 
     @cached_property
     def forms(self) -> LinearForms:
-        """The same as linear forms."""
+        """The margins as linear forms."""
         return linear_forms(self.margins, self.moves)
 
 
@@ -90,7 +97,36 @@ def _bond(bond: Region) -> Width | None:
     return None if bond.is_empty else least_width(bond, SHARP)
 
 
-@remembered
+@cached
 def _reaches(unbonded: Region, contact: Region, mask: Region) -> tuple[tuple[Edge, Reach], ...]:
-    found = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
-    return tuple([(edge, reach) for edge, reach in found if reach is not None])
+    reaches = ((edge, outward_reach(edge, mask.index)) for edge in edges_along(unbonded, contact))
+    return tuple([(edge, reach) for edge, reach in reaches if reach is not None])
+
+
+# Equal interfaces, so that each pattern is measured once.
+
+
+class DistinctInterface(NamedTuple):
+    """The first of a set of interfaces with equal profiles, and their number."""
+
+    interface: Interface
+    number: int
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of a message that holds for more than one interface: " (and 2 like it)"."""
+        return f" (and {self.number - 1} like it)" if self.number > 1 else ""
+
+
+def distinct_interfaces(laminate: Laminate) -> tuple[DistinctInterface, ...]:
+    """Return one interface of every pattern, bottom to top."""
+    groups: dict[tuple[str, ...], list[Interface]] = {}
+    for interface in laminate.interfaces:
+        groups.setdefault(interface.pattern, []).append(interface)
+    return tuple(DistinctInterface(group[0], len(group)) for group in groups.values())
+
+
+def interface_name(interface: Interface) -> str:
+    """Return an interface as messages name it, with its layers."""
+    kind = f"{interface.kind} interface"
+    return f"{kind} {interface.index} (layers {interface.below.index} and {interface.above.index})"

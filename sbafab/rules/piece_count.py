@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "piece-count"
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The largest departure of any layer's number of pieces from the one it should have."""
-    del limits
+    laminate = measures.laminate
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     worst = max(laminate.layers, key=lambda layer: abs(counts[layer.pattern] - layer.pieces))
     count = counts[worst.pattern]
@@ -36,3 +36,16 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     )
     place = Place(None, (worst.index,), x, y)
     return [Finding(NAME, "fail", 0.0, float(off), "pieces", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every layer falls into the pieces that its role says",
+        "A film in two pieces is no film; a mask in one piece too many shifts in the press.",
+        "Make the chamber larger or the bond narrower, so that the layer hangs together.",
+        ("chamber.diameter", "bond.width"),
+    ),
+    at_most=True,
+)

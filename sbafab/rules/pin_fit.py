@@ -16,12 +16,14 @@ from sbafab.laminate.base_plate import pin_deviations
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "pin-fit"
 
 
 class _Fit(NamedTuple):
-    """A layer's hole on a pin: its drawn diameter and the least that it may come out."""
+    """A hole on a pin: its drawn diameter and its least diameter as cut, mm."""
 
     pin: Pin
     layer: Layer
@@ -35,14 +37,15 @@ class _Fit(NamedTuple):
 
     @property
     def stretch(self) -> float:
-        """By what share of itself the hole must widen; endless where nothing may be left of it."""
+        """Share by which the hole must widen; infinite if cutting may close it."""
         if self.least <= 0:
             return math.inf
         return max(0.0, self.most / self.least - 1)
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """The most by which a film must stretch over a pin, against the share that is allowed."""
+def check(measures: Measures) -> list[Finding]:
+    """Return the largest stretch of a film over a pin, against the share that is allowed."""
+    laminate, limits = measures.laminate, measures.limits
     fits = list(_fits(laminate, limits))
     if not fits:
         message = "no pin holds a layer"
@@ -52,7 +55,7 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     good = worst.stretch <= limits.pin_stretch + 2 * TOLERANCE / max(worst.least, TOLERANCE)
     pin = worst.pin
     message = (
-        f"{_stretch_said(worst)}; {100 * limits.pin_stretch:.4g}% at most is allowed: the "
+        f"{_stretch_text(worst)}; {100 * limits.pin_stretch:.4g}% at most is allowed: the "
         f"{worst.drawn:.3f} mm hole of layer {worst.layer.index} ({worst.layer.name}) may come out "
         f"{max(worst.least, 0.0):.3f} mm wide, and the pin {pin.name} at {at(pin.centre)} up to "
         f"{worst.most:.3f} mm; {_threaded(laminate, pin)} films are threaded on this pin"
@@ -71,8 +74,21 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     ]
 
 
-def _stretch_said(fit: _Fit) -> str:
-    """What the film of a fit must do, in words."""
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every film goes on its pins with hole and pin at their worst: 30 % stretch at most",
+        "Holes come out narrower than drawn; a film stretched further over its pin tears.",
+        "Use a thinner pin, a wider bore, or registration.pin_clearance.",
+        ("registration.pin_stretch", "bore.clearance", "bore.pin_diameter"),
+    ),
+    at_most=True,
+)
+
+
+def _stretch_text(fit: _Fit) -> str:
+    """The stretch of a fit in words."""
     if math.isinf(fit.stretch):
         return "no hole may be left to go over a pin"
     if fit.stretch > 0:
@@ -82,14 +98,14 @@ def _stretch_said(fit: _Fit) -> str:
 
 def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
     """Every pin in every pattern that hangs on it in a step."""
-    seen = set()
+    visited = set()
     on_pins = limits.tolerances.on_pins(laminate)
     for step in assembly(laminate):
         for layer in distinct_layers(laminate, step.adds):
             for pin in step.pins:
-                if (layer.pattern, pin) in seen:
+                if (layer.pattern, pin) in visited:
                     continue
-                seen.add((layer.pattern, pin))
+                visited.add((layer.pattern, pin))
                 for hole in layer.profile.holes:
                     circle = hole.circle
                     if circle is None or math.dist(circle[0], pin.centre) >= LOOSE:
@@ -102,12 +118,12 @@ def _fits(laminate: Laminate, limits: Limits) -> Iterator[_Fit]:
 
 
 def most_on_a_pin(laminate: Laminate) -> int:
-    """How many layers at most are threaded on one pin in one step."""
+    """Return the greatest number of layers threaded on one pin in one step."""
     return max((_threaded(laminate, pin) for pin in laminate.pins), default=0)
 
 
 def _threaded(laminate: Laminate, pin: Pin) -> int:
-    """How many layers go on the pin in the step that lays most of them."""
+    """Number of layers on the pin in the step that lays most of them."""
     counts = [
         sum(pin in laminate.pins_holding(laminate.layer(index)) for index in step.adds)
         for step in assembly(laminate)

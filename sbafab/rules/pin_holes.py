@@ -10,9 +10,11 @@ from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.bridges import sheeted
-from sbafab.rules.channels import channels
+from sbafab.rules.channel_clear import channels
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits, at
+from sbafab.rules.limits import TOLERANCE, at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "pin-holes"
 
@@ -24,27 +26,40 @@ LOCATING = 2
 
 
 class _Miss(NamedTuple):
-    what: str
+    fault: str
     at: Point
     layers: tuple[int, ...]
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """How many pins miss a hole, meet film, or leave a layer that they should hold."""
-    del limits
+def check(measures: Measures) -> list[Finding]:
+    """Return the number of pins that miss a hole, meet film, or leave a layer loose."""
+    laminate = measures.laminate
     if laminate.panel is not None:
-        found = [*_sheets_off(laminate)]
+        misses = [*_sheets_off(laminate)]
     else:
-        found = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
-    if found:
-        first = found[0]
-        message = f"{first.what}; draw pins and holes from the same outline"
+        misses = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
+    if misses:
+        first = misses[0]
+        message = f"{first.fault}; draw pins and holes from the same outline"
         place = Place(None, first.layers, *first.at)
-        return [Finding(NAME, "fail", 0.0, float(len(found)), "misses", place, message)]
+        return [Finding(NAME, "fail", 0.0, float(len(misses)), "misses", place, message)]
     message = "every pin finds its holes, and no film stands in its way"
     if not laminate.pins:
         message = "no pin holds a layer"
     return [Finding(NAME, "pass", 0.0, 0.0, "misses", Place(), message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "every pin finds its holes, no film stands in its way, two pins hold what ears pin",
+        "A pin without a hole lifts the film; a film on one pin turns about it.",
+        "Use the registration method's own holes; see the place named.",
+        ("registration.method", "registration.pin_diameter"),
+    ),
+    at_most=True,
+)
 
 
 def _sheets_off(laminate: Laminate) -> Iterator[_Miss]:
@@ -54,12 +69,12 @@ def _sheets_off(laminate: Laminate) -> Iterator[_Miss]:
         for number, pin in enumerate(laminate.pins):
             radius = pin.diameter / 2
             free = 0.0 if sheet.contains(pin.centre) else sheet.distance_to_edge(pin.centre)
-            what = f"layer {layer.index} ({layer.name})"
+            subject = f"layer {layer.index} ({layer.name})"
             where = f"the pin {pin.name} at {at(pin.centre)}"
             if free < radius - TOLERANCE:
-                yield _Miss(f"{what} has no hole for {where}", pin.centre, (layer.index,))
+                yield _Miss(f"{subject} has no hole for {where}", pin.centre, (layer.index,))
             elif number < LOCATING and free > radius + TOLERANCE:
-                yield _Miss(f"{what} hangs loose on {where}", pin.centre, (layer.index,))
+                yield _Miss(f"{subject} hangs loose on {where}", pin.centre, (layer.index,))
 
 
 def _idle(laminate: Laminate) -> Iterator[_Miss]:
@@ -68,12 +83,12 @@ def _idle(laminate: Laminate) -> Iterator[_Miss]:
         if not any(
             pin in laminate.pins_holding(layers[0]) for layers in laminate.patterns.values()
         ):
-            what = f"the pin {pin.name} at {at(pin.centre)} finds a hole in no layer"
-            yield _Miss(what, pin.centre, ())
+            fault = f"the pin {pin.name} at {at(pin.centre)} finds a hole in no layer"
+            yield _Miss(fault, pin.centre, ())
 
 
 def _unholed(laminate: Laminate) -> Iterator[_Miss]:
-    """Layers without the hole that others of their kind have at a tooling pin."""
+    """Layers that lack a hole at a tooling pin where others of their kind have one."""
     for pin in _tooling_pins(laminate):
         for roles in ALIKE:
             holed: dict[bool, list[Layer]] = {True: [], False: []}
@@ -82,11 +97,11 @@ def _unholed(laminate: Laminate) -> Iterator[_Miss]:
                     holed[pin in laminate.pins_holding(layers[0])] += layers
             if holed[True]:
                 for layer in holed[False]:
-                    what = (
+                    fault = (
                         f"layer {layer.index} ({layer.name}) has no hole for the pin {pin.name} "
                         f"at {at(pin.centre)}, which holds layer {holed[True][0].index}"
                     )
-                    yield _Miss(what, pin.centre, (layer.index,))
+                    yield _Miss(fault, pin.centre, (layer.index,))
 
 
 def _loose(laminate: Laminate) -> Iterator[_Miss]:
@@ -103,28 +118,28 @@ def _loose(laminate: Laminate) -> Iterator[_Miss]:
                 if len(pins) < needed:
                     low_x, low_y, high_x, high_y = piece.bounds
                     middle = (low_x + high_x) / 2, (low_y + high_y) / 2
-                    what = (
+                    fault = (
                         f"layer {layer.index} ({layer.name}) hangs on {_listed(pins)} in step "
                         f"{step.number}, {at(middle)}, and needs {needed} to keep its place"
                     )
-                    yield _Miss(what, middle, (layer.index,))
+                    yield _Miss(fault, middle, (layer.index,))
 
 
 def _blocked(laminate: Laminate) -> Iterator[_Miss]:
-    """Tooling pins that film stands in the way of in a step that lays a layer on them.
+    """Tooling pins blocked by film in a step that lays a layer on them.
 
     The channels' pins have the channels' room, which channel-clear measures.
     """
     for step in assembly(laminate):
         added = distinct_layers(laminate, step.adds)
         for pin in _tooling_pins(laminate):
-            held = next((layer for layer in added if pin in laminate.pins_holding(layer)), None)
-            if held is not None or pin in step.pins:
-                yield from _in_the_way(pin, held, step, laminate)
+            laid = next((layer for layer in added if pin in laminate.pins_holding(layer)), None)
+            if laid is not None or pin in step.pins:
+                yield from _in_the_way(pin, laid, step, laminate)
 
 
 def _in_the_way(
-    pin: Pin, held: Layer | None, step: AssemblyStep, laminate: Laminate
+    pin: Pin, laid: Layer | None, step: AssemblyStep, laminate: Laminate
 ) -> Iterator[_Miss]:
     for layer in distinct_layers(laminate, step.layers):
         if pin in laminate.pins_holding(layer):
@@ -132,12 +147,12 @@ def _in_the_way(
         profile = layer.profile
         inside = profile.contains(pin.centre)
         if inside or profile.distance_to_edge(pin.centre) < pin.diameter / 2 - TOLERANCE:
-            whose = "" if held is None else f", which layer {held.index} is laid on"
-            what = (
+            whose = "" if laid is None else f", which layer {laid.index} is laid on"
+            fault = (
                 f"layer {layer.index} ({layer.name}) stands in the way of the pin {pin.name} at "
                 f"{at(pin.centre)}{whose} in step {step.number}"
             )
-            yield _Miss(what, pin.centre, (layer.index,))
+            yield _Miss(fault, pin.centre, (layer.index,))
 
 
 def _tooling_pins(laminate: Laminate) -> list[Pin]:

@@ -1,5 +1,7 @@
-"""press-fit: the laminate lies within the heated area; few enough balloons to be validated; press
-minutes that somebody stated for its films.
+"""press-fit: the laminate fits the heated area; a warning for untested heights and press minutes.
+
+Heights are untested above ``validated_balloons``; minutes where no kit or design states them for a
+film.
 """
 
 from __future__ import annotations
@@ -7,13 +9,16 @@ from __future__ import annotations
 from sbafab.laminate.films import unstated
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import TOLERANCE, Limits
+from sbafab.rules.limits import TOLERANCE
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "press-fit"
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
-    """How far the laminate, laid either way round, fills the platen; a warning on many balloons."""
+def check(measures: Measures) -> list[Finding]:
+    """Return the laminate's size against the platen, either way round, and the warnings."""
+    laminate, limits = measures.laminate, measures.limits
     panel = laminate.panel
     low_x, low_y, high_x, high_y = laminate.bounds if panel is None else panel.outline.bounds
     short, long = sorted((high_x - low_x, high_y - low_y))
@@ -21,8 +26,8 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     # The side with less room to spare decides.
     measured, limit = min(((short, narrow), (long, wide)), key=lambda side: side[1] - side[0])
     good = measured <= limit + TOLERANCE
-    what = "laminate" if panel is None else "registered sheet"
-    size = f"the {what} measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    subject = "laminate" if panel is None else "registered sheet"
+    size = f"the {subject} measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     platen = f"{limits.heated_width:g} x {limits.heated_length:g} mm"
     message = f"{size} and lies within the heated area of {platen}"
     place = Place()
@@ -33,14 +38,14 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
             key=lambda layer: _extent(layer.profile.bounds),
         )
         place = Place(None, (largest.index,), high_x, high_y)
-    found = [Finding(NAME, "pass" if good else "fail", limit, measured, "mm", place, message)]
+    findings = [Finding(NAME, "pass" if good else "fail", limit, measured, "mm", place, message)]
     if laminate.balloons > limits.validated_balloons:
         remedy = "press a test piece of this height first"
         message = (
             f"{remedy}: {laminate.balloons} balloons are more than the {limits.validated_balloons} "
             "that have been built and tested; heat may not reach the middle of the stack"
         )
-        found.append(
+        findings.append(
             Finding(
                 NAME,
                 "warn",
@@ -52,11 +57,31 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
                 remedy=remedy,
             )
         )
-    return found + _unstated(laminate, limits.minutes_for)
+    return findings + _unstated(laminate, limits.minutes_for)
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "the laminate lies in the heated area; more than 20 balloons, and films whose minutes "
+        "nobody stated, draw a warning",
+        "What lies outside the platen is not bonded; heat may not reach a tall stack's middle.",
+        "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer; try "
+        "another film on a sample and name it in press.minutes_for.",
+        (
+            "press.platen_width",
+            "press.platen_length",
+            "rules.validated_balloons",
+            "press.minutes_for",
+        ),
+    ),
+    at_most=True,
+)
 
 
 def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:
-    """A warning for films whose press minutes nobody stated."""
+    """A warning for films without stated press minutes."""
     films = unstated((layer.film for layer in laminate.layers), stated)
     if not films:
         return []

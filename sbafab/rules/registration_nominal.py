@@ -6,14 +6,15 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.geometry.remembered import remembered
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.alike import distinct_interfaces
-from sbafab.rules.channels import Channel, channels
+from sbafab.rules.channel_clear import Channel, channels
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Limits, at
+from sbafab.rules.limits import at
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-nominal"
 
@@ -25,11 +26,12 @@ class _Departure(NamedTuple):
     value: float
     at: Point
     layers: tuple[int, ...]
-    what: str
+    fault: str
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The largest departure of a hole from its axis or pin, or of an outline from its twin."""
+    laminate, limits = measures.laminate, measures.limits
     limit = limits.registration_tolerance
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
@@ -37,13 +39,25 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
         return [Finding(NAME, "pass", limit, None, "mm", Place(), message)]
     worst = max(departures, key=lambda departure: departure.value)
     good = worst.value <= limit + 1e-9
-    message = f"{worst.what} by {worst.value:.4f} mm, {at(worst.at)}"
+    message = f"{worst.fault} by {worst.value:.4f} mm, {at(worst.at)}"
     if good:
         message = f"bores are coaxial and outlines congruent to {max(worst.value, 1e-6):.6f} mm"
     else:
         message += f"; {limit:g} is allowed: draw both from the same edge"
     place = Place(None, worst.layers, *worst.at)
     return [Finding(NAME, "pass" if good else "fail", limit, worst.value, "mm", place, message)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "bores are coaxial and the two outlines of a balloon congruent, to 1 um",
+        "What is drawn off its place is off before any hand has touched it.",
+        "Draw both from the same edge.",
+    ),
+    at_most=True,
+)
 
 
 def _off_axis(laminate: Laminate) -> Iterator[_Departure]:
@@ -78,10 +92,10 @@ def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
             continue
         off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
         for roles in ON_ONE_PIN:
-            alike = [layer for layer in laminate.layers if layer.role in roles]
-            holed = sum(off[layer.pattern] < pin.diameter for layer in alike)
-            if 2 * holed > len(alike):
-                for layer in alike:
+            siblings = [layer for layer in laminate.layers if layer.role in roles]
+            holed = sum(off[layer.pattern] < pin.diameter for layer in siblings)
+            if 2 * holed > len(siblings):
+                for layer in siblings:
                     yield _Departure(
                         off[layer.pattern],
                         pin.centre,
@@ -91,18 +105,20 @@ def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
 
 
 def _off_pin(layer: Layer, pin: Pin) -> float:
-    """How far the nearest round hole lies from the pin, its diameter at most."""
+    """Distance of the nearest round hole from the pin, at most its diameter, mm."""
     circles = [hole.circle for hole in layer.profile.holes if hole.circle is not None]
     return min([pin.diameter, *(math.dist(centre, pin.centre) for centre, _ in circles)])
 
 
 def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
-    for alike in distinct_interfaces(laminate):
-        interface = alike.interface
+    for distinct in distinct_interfaces(laminate):
+        interface = distinct.interface
         if interface.kind != "chamber" or interface.below.pattern == interface.above.pattern:
             continue
-        below, above = (Region(one.profile.outers) for one in (interface.below, interface.above))
-        value, p = max(_farthest(below, above), _farthest(above, below), key=lambda one: one[0])
+        below, above = (
+            Region(layer.profile.outers) for layer in (interface.below, interface.above)
+        )
+        value, p = max(_farthest(below, above), _farthest(above, below), key=lambda entry: entry[0])
         yield _Departure(
             value,
             p,
@@ -112,11 +128,15 @@ def _off_outline(laminate: Laminate) -> Iterator[_Departure]:
         )
 
 
-@remembered
-def _farthest(one: Region, other: Region) -> tuple[float, Point]:
-    """How far the ends and middles of all edges of ``one`` lie from ``other``, and where most."""
+@cached
+def _farthest(region: Region, target: Region) -> tuple[float, Point]:
+    """Greatest distance of a region's edges (ends and middles) from ``target``, and where."""
     return max(
-        ((other.index.distance(p), p) for edge in one.edges for p in (edge.start, edge.at(0.5))),
-        key=lambda found: found[0],
+        (
+            (target.index.distance(p), p)
+            for edge in region.edges
+            for p in (edge.start, edge.at(0.5))
+        ),
+        key=lambda entry: entry[0],
         default=(0.0, (0.0, 0.0)),
     )

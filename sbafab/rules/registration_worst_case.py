@@ -1,7 +1,7 @@
-"""registration-worst-case: what is left of bond and overhang when every error is at its worst.
+"""registration-worst-case: bond and overhang that remain with every error at its worst.
 
-Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), what no pin
-holds by what a hand may misplace and turn it.
+Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
+without pins by the hand's placement and turn.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules.alike import Alike, interface_name
+from sbafab.geometry.on_demand import np
+from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom
-from sbafab.rules.limits import Limits, Tolerances, at, holds, least_held
+from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
 from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
-from sbafab.rules.measures import Measures
+from sbafab.rules.measures import DistinctInterface, Measures, interface_name
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-worst-case"
 
@@ -30,11 +30,11 @@ Cost = tuple[Freedom, float]
 
 
 class Remaining(NamedTuple):
-    """What is left at the worst margin of an interface, mm; it may be negative.
+    """Width that remains at the worst margin of an interface, mm; it may be negative.
 
-    ``pinned`` is the least that is left anywhere in it without what is laid by hand. Places that
-    are short as drawn do not count for it: bond-width and mask-overhang tell of those. ``number``
-    is the place of the margin in its ``group``.
+    ``pinned`` is the least that remains anywhere in it without the errors of the hand. Places that
+    are short as drawn do not count for it: bond-width and mask-overhang report those. ``number`` is
+    the place of the margin in its ``group``.
     """
 
     worst: float
@@ -52,26 +52,24 @@ class Remaining(NamedTuple):
         return self.group.interfaces
 
     @property
-    def alike(self) -> Alike:
-        return Alike(self.interfaces[0], len(self.interfaces))
+    def distinct(self) -> DistinctInterface:
+        return DistinctInterface(self.interfaces[0], len(self.interfaces))
 
 
 def least_remaining(
     laminate: Laminate, limits: Limits, measures: Measures | None = None
 ) -> list[Remaining]:
-    """The worst place of every interface (one of each that are alike) for bond and overhang."""
-    import numpy as np
-
+    """Return the worst place of every group of equal interfaces, for bond and overhang."""
     measures = measures or Measures(laminate, limits)
     forms = measures.forms
     begins = forms.begins[:-1]
     drawn = forms.by_quantity(
-        {"bond": least_held(limits.bond_width), "overhang": least_held(limits.mask_overhang)}
+        {"bond": least_passing(limits.bond_width), "overhang": least_passing(limits.mask_overhang)}
     )
     # Both edges are cut: two contours, or one that is off on either side.
     cut = forms.nominal - 2 * limits.tolerances.cutting
-    held = np.where(forms.nominal >= drawn, cut - forms.pinned_loss, math.inf)
-    pinned = np.minimum.reduceat(held, begins).tolist()
+    firm = np.where(forms.nominal >= drawn, cut - forms.pinned_loss, math.inf)
+    pinned = np.minimum.reduceat(firm, begins).tolist()
     worst = cut - forms.loss
     (near,) = (worst <= np.minimum.reduceat(worst, begins)[forms.run] + SAME).nonzero()
     values = worst[near].tolist()
@@ -85,37 +83,51 @@ def least_remaining(
     return [
         Remaining(
             float(worst[number]),
-            own,
+            least_pinned,
             run.quantity,
             measures.margins[run.group],
             run.first + number - begin,
         )
-        for run, begin, own, number in zip(forms.runs, begins.tolist(), pinned, first, strict=True)
+        for run, begin, least_pinned, number in zip(
+            forms.runs, begins.tolist(), pinned, first, strict=True
+        )
     ]
 
 
-def check(laminate: Laminate, limits: Limits, measures: Measures | None = None) -> list[Finding]:
-    """The least remaining bond and overhang, each with its place and the largest contribution."""
-    measures = measures or Measures(laminate, limits)
-    found = least_remaining(laminate, limits, measures)
+def check(measures: Measures) -> list[Finding]:
+    """The least remaining bond and overhang, each with its place and largest contribution."""
+    laminate, limits = measures.laminate, measures.limits
+    remaining = least_remaining(laminate, limits, measures)
     return [
-        _finding("bond", limits.worst_bond_width, found, measures, limits),
-        _finding("overhang", limits.worst_mask_overhang, found, measures, limits),
+        _finding("bond", limits.worst_bond_width, remaining, measures, limits),
+        _finding("overhang", limits.worst_mask_overhang, remaining, measures, limits),
     ]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
+        "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
+        'Lay up with care, set registration.method = "ears", or make bond and overhang larger.',
+        ("rules.worst_bond_width", "rules.worst_mask_overhang", "registration.hand_placement"),
+    ),
+)
 
 
 def _finding(
     quantity: Quantity,
     limit: float,
-    found: Iterable[Remaining],
+    remaining: Iterable[Remaining],
     measures: Measures,
     limits: Limits,
 ) -> Finding:
-    own = [place for place in found if place.quantity == quantity]
-    if not own:
+    places = [place for place in remaining if place.quantity == quantity]
+    if not places:
         return Finding(NAME, "pass", limit, None, "mm", Place(), f"no {WHAT[quantity]} to measure")
-    worst = min(own, key=lambda place: round(place.worst, 9))
-    least_pinned = min(own, key=lambda place: round(place.pinned, 9))
+    worst = min(places, key=lambda place: round(place.worst, 9))
+    least_pinned = min(places, key=lambda place: round(place.pinned, 9))
     verdict: Verdict = "pass"
     if not holds(least_pinned.pinned, limit):
         verdict = "fail"
@@ -133,22 +145,22 @@ def _finding(
             f"{REMEDY[quantity]} larger"
         )
     elif verdict == "warn":
-        short = sum(len(place.interfaces) for place in own if not holds(place.worst, limit))
+        short = sum(len(place.interfaces) for place in places if not holds(place.worst, limit))
         remedy = _remedy(quantity, dearest, measures.laminate)
         message = (
             f"{remedy}: {message}; that is short of {limit:g} at {short} "
             f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
     place = Place(interface.index, interface.layer_indices, *margin.middle)
-    left = max(0.0, worst.worst)
-    return Finding(NAME, verdict, limit, left, "mm", place, message, remedy=remedy)
+    value = max(0.0, worst.worst)
+    return Finding(NAME, verdict, limit, value, "mm", place, message, remedy=remedy)
 
 
 def _message(
     worst: Remaining, margin: Margin, dearest: Sequence[Cost], tolerances: Tolerances
 ) -> str:
     """The value, its place and the largest contribution there."""
-    where = f"{interface_name(worst.interfaces[0])}{worst.alike.others}"
+    where = f"{interface_name(worst.interfaces[0])}{worst.distinct.suffix}"
     text = (
         f"at worst {_mm(worst.worst)} is left of the {margin.nominal:.3f} mm "
         f"{WHAT[margin.quantity]} at {where}, {at(margin.middle)}"
@@ -159,10 +171,10 @@ def _message(
     return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
 
 
-def costs(found: Iterable[Push]) -> list[Cost]:
-    """What each body costs, shift and turn together, the dearest first."""
+def costs(acting: Iterable[Push]) -> list[Cost]:
+    """Return the cost of each body, shift and turn together, the largest first."""
     total: dict[tuple[int, int], tuple[Freedom, float]] = {}
-    for push in found:
+    for push in acting:
         key = push.freedom.step, push.freedom.body
         freedom, cost = total.get(key, (push.freedom, 0.0))
         total[key] = freedom, cost + push.cost
@@ -170,18 +182,22 @@ def costs(found: Iterable[Push]) -> list[Cost]:
 
 
 def _moved(freedom: Freedom) -> str:
-    """The layers that move."""
-    one = freedom.lowest == freedom.highest
-    return f"layer {freedom.lowest}" if one else f"layers {freedom.lowest} to {freedom.highest}"
+    """The layers of a freedom in words."""
+    is_single = freedom.lowest == freedom.highest
+    return (
+        f"layer {freedom.lowest}" if is_single else f"layers {freedom.lowest} to {freedom.highest}"
+    )
 
 
 def _source(freedom: Freedom) -> str:
-    """What may move which layers, and in which press step."""
-    what = _moved(freedom)
+    """Cause of a displacement, its layers and its press step in words."""
+    layers = _moved(freedom)
     if freedom.in_sheet:
-        return f"stretch or transfer of {what} in its sheet"
-    how = {0: "hand placement", 1: "turn about the only pin"}.get(freedom.pins, "play on the pins")
-    return f"{how} of {what} in step {freedom.step}"
+        return f"stretch or transfer of {layers} in its sheet"
+    cause = {0: "hand placement", 1: "turn about the only pin"}.get(
+        freedom.pins, "play on the pins"
+    )
+    return f"{cause} of {layers} in step {freedom.step}"
 
 
 def _why(pinned: float) -> str:
@@ -191,7 +207,7 @@ def _why(pinned: float) -> str:
 
 
 def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> str:
-    """What to do about what the hand may take."""
+    """Remedy for the hand's errors."""
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2), None)
     if loose is None:
         return f"make {REMEDY[quantity]} larger"

@@ -11,18 +11,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Edge, Line, Point
-from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.nanometres import nanometres
+from sbafab.geometry.contour import nanometres
+from sbafab.geometry.edges import Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import polygon, strip
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules.alike import distinct_interfaces
+from sbafab.geometry.region import Region, polygon, strip
+from sbafab.laminate.laminate import Inlet, Interface, Laminate
 from sbafab.rules.boundary import edges_along, outward_reach
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
+from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.rule import Explanation, Rule
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
@@ -32,11 +30,11 @@ ROOM = 1e-9
 
 
 class _Fit(NamedTuple):
-    """One measure of an inlet: what it is, its value and the least it may have."""
+    """One measure of an inlet: the feature, its value and its least value, mm."""
 
     inlet: Inlet
     interface: Interface | None
-    what: str
+    feature: str
     value: float
     limit: float
     at: Point
@@ -44,23 +42,24 @@ class _Fit(NamedTuple):
     drawn: float = 0.0
 
 
-def check(laminate: Laminate, limits: Limits) -> list[Finding]:
+def check(measures: Measures) -> list[Finding]:
     """The strip's width at the mouth and along its straight run, and the bond on both sides."""
+    laminate, limits = measures.laminate, measures.limits
     fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, limits)]
     if not fits:
         message = "the laminate has no inlet, so no tube can be fitted; give every chamber one"
         return [Finding(NAME, "fail", None, None, "mm", Place(), message)]
     short = [fit for fit in fits if not holds(fit.value, fit.limit)]
-    worst = min(short or [fit for fit in fits if fit.what != BOND], key=_margin)
+    worst = min(short or [fit for fit in fits if fit.feature != BOND], key=_margin)
     good = not short
-    if worst.what == BOND:
+    if worst.feature == BOND:
         message = (
-            f"{worst.what} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, {at(worst.at)}; "
-            f"to hold the tube it needs {worst.limit:.3f}"
+            f"{worst.feature} of {worst.inlet.chamber} is {worst.value:.3f} mm wide, "
+            f"{at(worst.at)}; to hold the tube it needs {worst.limit:.3f}"
         )
     else:
         message = (
-            f"{worst.what} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
+            f"{worst.feature} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
             f"{at(worst.at)}, and cut {worst.value:.3f} at worst "
             f"({_lost_to(worst.interface, limits)}); a tube of "
             f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
@@ -75,9 +74,21 @@ def check(laminate: Laminate, limits: Limits) -> list[Finding]:
     ]
 
 
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "the inlet strip, cut at its narrowest, opens to the tube and its own film",
+        "A flat channel opens to half the perimeter of what goes in; less, and the tube tears it.",
+        "Leave inlet.width out, so that it follows the tube, or use a thinner tube.",
+        ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
+    ),
+)
+
+
 def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
-    for alike in distinct_interfaces(laminate):
-        interface = alike.interface
+    for distinct in distinct_interfaces(laminate):
+        interface = distinct.interface
         if interface.kind != "chamber":
             continue
         needed = _needed(inlet, interface)
@@ -104,8 +115,8 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     dx, dy = inlet.direction
     inner = (x - dx * inlet.length, y - dy * inlet.length)
     beside = strip(inner, inlet.mouth, 2 * inlet.width)
-    near = [one for one in interface.unbonded.pieces if boxes_meet(one.bounds, beside.bounds)]
-    every = Region(tuple(contour for one in near for contour in one.contours))
+    near = [piece for piece in interface.unbonded.pieces if boxes_meet(piece.bounds, beside.bounds)]
+    every = Region(tuple(contour for piece in near for contour in piece.contours))
     run = _straight_run(every, inlet, beside) or every & beside
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
     widths = [
@@ -113,23 +124,23 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
         for edge in sides
     ]
     bonds = [outward_reach(edge, interface.contact.index) for edge in sides]
-    found = []
-    for reaches, what, limit, remedy in (
+    fits = []
+    for reaches, feature, limit, remedy in (
         (widths, "the strip", needed, REMEDY),
         (bonds, BOND, limits.bond_width, "raise bond.width, which makes the tab wider"),
     ):
         least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
         if least is not None:
-            cut = least.value if what == BOND else max(0.0, least.value - _lost(interface, limits))
-            fit = _Fit(inlet, interface, what, cut, limit, least.at, remedy, least.value)
-            found.append(fit)
-    return found
+            cut = (
+                least.value if feature == BOND else max(0.0, least.value - _lost(interface, limits))
+            )
+            fit = _Fit(inlet, interface, feature, cut, limit, least.at, remedy, least.value)
+            fits.append(fit)
+    return fits
 
 
 def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | None:
-    """What lies beside the inlet's run, where that is a strip between two straight edges, and
-    nothing else comes near; None where it is not.
-    """
+    """Inlet's run if it is a strip between two straight edges with nothing else near, or None."""
     sides: list[Edge] = []
     for edge in unbonded.edges:
         if not boxes_meet(widened(edge.bounds, ROOM), beside.bounds) or _is_off(edge, inlet):
@@ -155,8 +166,8 @@ def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | No
     crossed = []
     for edge in (out, back):
         # In the order, and so with the rounding, in which booleans ask where edges meet.
-        one, other = sorted((edge, inner), key=lambda one: one.bounds[0])
-        crossed += meeting_points(one, other)
+        edge_a, edge_b = sorted((edge, inner), key=lambda edge_a: edge_a.bounds[0])
+        crossed += meeting_points(edge_a, edge_b)
     if len(crossed) != 2:
         return None
     begin, end = crossed
@@ -167,7 +178,7 @@ def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | No
 
 
 def _is_off(edge: Edge, inlet: Inlet) -> bool:
-    """Whether an edge lies deeper than the run, or beside what is looked at."""
+    """Return True if an edge lies deeper than the run, or outside the examined width."""
     (dx, dy), mouth = inlet.direction, inlet.mouth
     if -edge.farthest_along(mouth, (dx, dy)) > inlet.length + ROOM:
         return True
@@ -182,12 +193,13 @@ def _needed(inlet: Inlet, interface: Interface) -> float:
 
 
 def _lost(interface: Interface, limits: Limits) -> float:
-    """By how much a strip may be cut narrower than drawn: the kerf is known or it is not."""
+    """Width by which a strip may be cut narrower than drawn, mm."""
     unknown = 0.0 if _is_measured(interface, limits) else limits.unknown_kerf
     return 2 * limits.tolerances.cutting + unknown
 
 
 def _lost_to(interface: Interface | None, limits: Limits) -> str:
+    """The causes of that loss in words."""
     edges = f"{limits.tolerances.cutting:g} on each edge"
     if _is_measured(interface, limits):
         return edges
@@ -195,7 +207,7 @@ def _lost_to(interface: Interface | None, limits: Limits) -> str:
 
 
 def _is_measured(interface: Interface | None, limits: Limits) -> bool:
-    """Whether the kerf in the masks, which makes strips narrower, is known."""
+    """Return True if the kerf in the masks, which makes strips narrower, is measured."""
     masks = interface.masks if interface is not None else ()
     return bool(masks) and all(mask.film.material in limits.kerf for mask in masks)
 
@@ -205,13 +217,13 @@ def _margin(fit: _Fit) -> float:
 
 
 def _is_side(edge: Edge, inlet: Inlet) -> bool:
-    """Whether an edge of the run is one of the strip's sides, not an end of the run."""
+    """Return True if an edge of the run is one of the strip's sides, not an end of the run."""
     depth = _depth(inlet, edge.at(0.5))
     return TOLERANCE < depth < inlet.length - TOLERANCE
 
 
 def _depth(inlet: Inlet, p: Point) -> float:
-    """How far inside the mouth ``p`` lies."""
+    """Depth of ``p`` inside the mouth, mm."""
     dx, dy = inlet.direction
     return (inlet.mouth[0] - p[0]) * dx + (inlet.mouth[1] - p[1]) * dy
 

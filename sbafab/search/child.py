@@ -15,7 +15,7 @@ import threading
 from typing import IO, Any
 
 from sbafab.process import prepare
-from sbafab.search.fingerprint import fingerprint
+from sbafab.search.measure import fingerprint
 
 
 def main() -> None:
@@ -51,8 +51,8 @@ def _answer(job: dict[str, Any]) -> dict[str, Any]:
 
         row = measured(**job)
     except Exception as error:
-        said = " ".join(str(error).split())
-        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {said}"}
+        message = " ".join(str(error).split())
+        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}"}
     row["seconds"] = round(time.perf_counter() - began, 4)
     return row
 

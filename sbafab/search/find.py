@@ -1,44 +1,67 @@
-"""The design that meets requirements and is best in one thing, found by trying.
+"""Search for the design that meets requirements and is best in one quantity.
 
-All designs where they are few; else a coarse grid and walks from its best, or Optuna, then steps
-from the best that was found. Rules are asked of what would become the best.
+All designs are evaluated where they are few; else a coarse grid and local searches from its best
+points, or Optuna, then steps from the best candidate. Rules are checked only for what would become
+the best. The result says which constraints bind, and can be written as a design file.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
-from sbafab.design.form import Free
-from sbafab.design.records import Design
-from sbafab.design.writing import keys_of
-from sbafab.errors import DesignError
-from sbafab.models.counterparts import Counterpart
-from sbafab.progress import Progress, unheard
-from sbafab.search.quantities import Subject, refuse_unknown_key
-from sbafab.search.requirements import Goal, Requirement
-from sbafab.search.space import SearchSpace
-from sbafab.search.told import (
-    Binding,
-    RangeEnd,
-    Spare,
-    bindings,
-    pareto_front,
-    range_ends,
-    without_room,
+import tomli_w
+
+from sbafab.design.files import (
+    KIT,
+    OUTLINE,
+    changed_keys,
+    design_path,
+    kit_names,
+    override,
+    read_toml,
+    suggest_from_user_folder,
 )
-from sbafab.search.trial import Trial, Wanted, broken_rules, misses
-from sbafab.search.walks import every_design, explored, refined
-from sbafab.search.widening import widened
+from sbafab.design.records import Design, Free, keys_of
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.paper import Counterpart
+from sbafab.process import Progress, ignore_progress
+from sbafab.rules.finding import Place
+from sbafab.search.page import front
+from sbafab.search.quantities import Subject, refuse_unknown_key, shown_value
+from sbafab.search.strategies import (
+    explore,
+    neighbours,
+    refine,
+    try_every_design,
+    widen_ranges,
+    with_optuna,
+)
+from sbafab.search.trial import (
+    Goal,
+    GridPoint,
+    Requirement,
+    SearchProblem,
+    SearchSpace,
+    Trial,
+    broken_rules,
+    keys_said,
+    misses,
+)
 
 TRIES, LEAST_TRIES = 240, 4
 
 
 @dataclass(frozen=True)
 class FindRequest:
-    """What is looked for, from which design; ``free`` keys in place of the family's own, if any.
+    """Requirements and goal of a search, and the design it starts from.
 
-    ``optuna`` searches with it, ``storage`` is its database, in which a search goes on.
+    ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
+    with Optuna; ``storage`` is Optuna's database, in which a search resumes.
     """
 
     design: Design
@@ -52,14 +75,14 @@ class FindRequest:
 
 @dataclass(frozen=True)
 class FoundDesign:
-    """What a search ends with: the ``best`` design, or where it does not hold the nearest miss.
+    """Result of a search: the ``best`` design, or the nearest miss where none holds.
 
-    ``front``: designs that hold and that none of those tried betters in the goal and in every
+    ``front``: passing designs that none of those tried improves on in the goal and in every
     requirement; some of all ``on_front`` that there are. ``ends``: keys that only their range
     stops. ``is_cut_short``: more tries might have led to a better one.
     """
 
-    wanted: Wanted
+    problem: SearchProblem
     best: Trial
     binds: tuple[Binding, ...]
     ends: tuple[RangeEnd, ...]
@@ -71,7 +94,7 @@ class FoundDesign:
 
     @property
     def holds(self) -> bool:
-        """Whether the best design meets all and every rule passes."""
+        """True if the best design meets all requirements and every rule passes."""
         return self.best.holds
 
     @property
@@ -81,17 +104,20 @@ class FoundDesign:
 
     @property
     def missed(self) -> list[str]:
-        """What the best design breaks, a sentence each; empty where it holds."""
-        return misses(self.wanted, self.best)
+        """Requirements and rules that the best design breaks, a sentence each."""
+        return misses(self.problem, self.best)
 
     @property
     def measured(self) -> dict[str, Counterpart]:
-        """What the paper measured, by quantity, where its model is off by more than a quarter."""
+        """Measured values of the paper, by quantity, where its model is off by over a quarter."""
         if self.best.laminate is None:
             return {}
         subject = self._subject
-        found = {one.said: subject.counterpart(one) for one in self.wanted.quantities}
-        return {name: one for name, one in found.items() if one is not None}
+        return {
+            quantity.label: counterpart
+            for quantity in self.problem.quantities
+            if (counterpart := subject.counterpart(quantity)) is not None
+        }
 
     @property
     def full_stroke(self) -> float | None:
@@ -106,43 +132,44 @@ class FoundDesign:
     @property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
-        return Subject(self.wanted.design.with_(dict(self.best.values)), self.best.laminate)
+        return Subject(self.problem.design.with_(dict(self.best.values)), self.best.laminate)
 
     @property
     def broken_rules(self) -> list[str]:
-        """The rules among these."""
+        """The broken ones among the rules."""
         return broken_rules(self.best)
 
 
 def free_keys(request: FindRequest) -> tuple[Free, ...]:
-    """The keys that may change, within what the requirements say of them.
+    """Return the keys that may change, within what the requirements say of them.
 
-    Raises DesignError, also where a quantity is none of the design.
+    Raises DesignError, also where the design has no such quantity.
     """
-    for quantity in Wanted(request.design, request.requirements, request.goal).quantities:
+    quantities = SearchProblem(request.design, request.requirements, request.goal).quantities
+    for quantity in quantities:
         refuse_unknown_key(quantity, request.design)
     keys = {key: value for key, value, _ in keys_of(request.design)}
-    asked = {one.quantity.name for one in request.requirements} | {request.goal.quantity.name}
+    names = {quantity.name for quantity in quantities}
     every = request.design.free if request.free is None else request.free
-    own = [one for one in every if not one.asked or one.asked in asked]
-    for one in request.requirements:
-        _refuse_fixed(one, keys, own)
-    found = [_within(one, request.requirements) for one in own]
-    if not found:
+    free = [key for key in every if not key.asked or key.asked in names]
+    for requirement in request.requirements:
+        _refuse_fixed(requirement, keys, free)
+    narrowed = [_within(key, request.requirements) for key in free]
+    if not narrowed:
         raise DesignError(
-            f"no key of {request.design.name} is left that a search may change; name one with "
+            f"the search may change no key of {request.design.name}; name one with "
             "--free KEY=LOW:HIGH:STEP"
         )
-    return tuple(found)
+    return tuple(narrowed)
 
 
 def _refuse_fixed(
-    requirement: Requirement, keys: Mapping[str, object], own: Sequence[Free]
+    requirement: Requirement, keys: Mapping[str, object], free: Sequence[Free]
 ) -> None:
     """Raises DesignError for a key that is asked to be what it is not, and may not change."""
     key = requirement.quantity.key
     value = keys.get(key or "")
-    if key in [one.key for one in own] or not isinstance(value, int | float):
+    if key in [free_key.key for free_key in free] or not isinstance(value, int | float):
         return
     if not requirement.holds(value):
         raise DesignError(
@@ -153,54 +180,310 @@ def _refuse_fixed(
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
     """The range within what requirements say of the key itself. Raises DesignError for none."""
-    for one in requirements:
-        if one.quantity.key != free.key:
+    for requirement in requirements:
+        if requirement.quantity.key != free.key:
             continue
-        is_beyond = one.limit > free.high if one.at_least else one.limit < free.low
+        is_beyond = (
+            requirement.limit > free.high if requirement.at_least else requirement.limit < free.low
+        )
         if is_beyond and not free.widens:
             raise DesignError(
-                f"{free.key} must be {one.bound}, and its range is {free.low:g} to {free.high:g}; "
+                f"{free.key} must be {requirement.bound}, and its range is {free.low:g} to "
+                f"{free.high:g}; "
                 f"give it another one with --free {free.key}=LOW:HIGH:STEP"
             )
-        if one.at_least:
-            low = max(free.low, one.limit)
+        if requirement.at_least:
+            low = max(free.low, requirement.limit)
             free = replace(free, low=low, high=max(free.high, low))
         else:
-            high = min(free.high, one.limit)
+            high = min(free.high, requirement.limit)
             free = replace(free, low=min(free.low, high), high=high)
     return free
 
 
-def find(request: FindRequest, tell: Progress = unheard) -> FoundDesign:
-    """The best design, or the nearest miss. Raises DesignError for what cannot be asked."""
+def find(request: FindRequest, tell: Progress = ignore_progress) -> FoundDesign:
+    """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
     if request.storage is not None and not request.optuna:
         raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
-    wanted = Wanted(request.design, request.requirements, request.goal)
-    space = SearchSpace(wanted, free_keys(request), request.tries, tell)
+    problem = SearchProblem(request.design, request.requirements, request.goal)
+    space = SearchSpace(problem, free_keys(request), request.tries, tell)
     if request.optuna:
-        from sbafab.search.optimiser import with_optuna
-
         with_optuna(space, request.storage)
     elif space.size <= request.tries:
-        every_design(space)
+        try_every_design(space)
     else:
-        explored(space)
-    refined(space)
-    widened(space)
-    place, best = space.best()
+        explore(space)
+    refine(space)
+    widen_ranges(space)
+    point, best = space.best()
     if best.refused:
         raise DesignError(f"no design could be made: {best.refused}")
     shown, count = pareto_front(space, best) if best.holds else ([], 0)
     return FoundDesign(
-        wanted,
+        problem,
         best,
-        tuple(bindings(space, place, best)),
-        tuple(range_ends(space, place, best)),
+        tuple(bindings(space, point, best)),
+        tuple(range_ends(space, point, best)),
         tuple(shown),
         count,
         len(space.trials),
         request.tries <= len(space.trials) < space.size,
         space.free,
     )
+
+
+# The diagnosis of a search: binding constraints, tight rules, range ends, the Pareto front.
+
+
+SHOWN = 8
+"""Designs of the Pareto front that are shown."""
+TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", "pin-fit")
+"""Rules whose margins a design can be changed to widen."""
+LITTLE = 0.005
+"""Share of a limit that is nothing to spare."""
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A step of one key that would be better, and what it breaks."""
+
+    key: str
+    value: Any
+    breaks: str
+
+
+@dataclass(frozen=True)
+class Spare:
+    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and where."""
+
+    rule: str
+    measured: float
+    unit: str
+    place: str
+
+
+@dataclass(frozen=True)
+class RangeEnd:
+    """A key at the end of its range that would be better beyond: ``low`` to ``high`` in steps of
+    ``step``, mm or a number of balloons, as the key is.
+    """
+
+    key: str
+    value: Any
+    low: float
+    high: float
+    step: float
+
+
+def without_room(best: Trial) -> list[Spare]:
+    """Return the rules on lengths that pass without margin."""
+    laminate = best.laminate
+    return [
+        Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(laminate, rule.where))
+        for rule in (best.rules or {}).values()
+        if laminate is not None
+        and rule.verdict == "pass"
+        and rule.rule in TIGHT
+        and rule.share is not None
+        and abs(rule.share) < LITTLE
+    ]
+
+
+def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> list[Binding]:
+    """Return the binding constraints: what each single step that would improve the design breaks.
+
+    Of the nearest miss: the steps to designs that cannot be made, or that no model knows.
+    """
+    constraints = []
+    for axis, neighbour in _steps(point):
+        if not space.lows[axis] <= neighbour[axis] <= space.highs[axis]:
+            continue
+        trial = space.peek(neighbour)
+        if _is_nearer(space, point, neighbour, trial, best):
+            broken = misses(space.problem, space.with_rules(trial))
+            if broken:
+                key = space.free[axis].key
+                constraints.append(Binding(key, trial.values[key], "; ".join(broken)))
+    return constraints
+
+
+def _is_nearer(
+    space: SearchSpace, point: GridPoint, neighbour: GridPoint, trial: Trial, best: Trial
+) -> bool:
+    """Return True if a step improves the design; a refused one is judged by the step back."""
+    if not trial.refused:
+        return best.holds and trial.cost < best.cost
+    if not best.holds:
+        return True
+    back = space.peek(tuple(2 * at - to for at, to in zip(point, neighbour, strict=True)))
+    return not back.refused and back.cost > best.cost
+
+
+def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeEnd]:
+    """Return the keys whose range alone stops a better design, or a nearer miss."""
+    ends = []
+    for axis, neighbour in _steps(point):
+        if space.lows[axis] <= neighbour[axis] <= space.highs[axis] or space.is_excluded(
+            axis, neighbour
+        ):
+            continue
+        if space.with_rules(space.peek(neighbour)).rank < best.rank:
+            free = space.free[axis]
+            low, high = (
+                round(free.low + step * free.step, 6)
+                for step in (space.lows[axis], space.highs[axis])
+            )
+            ends.append(RangeEnd(free.key, space.number(axis, point), low, high, free.step))
+    return ends
+
+
+def _steps(point: GridPoint) -> list[tuple[int, GridPoint]]:
+    """The places a step of one key away, each with the key's number."""
+    count = len(point)
+    return [
+        (
+            next(axis for axis, by in enumerate(move) if by),
+            tuple(at + by for at, by in zip(point, move, strict=True)),
+        )
+        for move in neighbours([1] * count)[: 2 * count]
+    ]
+
+
+def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
+    """Return passing designs, rules included, that none of those tried improves on in everything.
+
+    The best first, also where another one equals it in the goal, then in the order of the goal;
+    where they are many the ends and some between. With it how many there are.
+    """
+    problem = space.problem
+    sides = [
+        requirement
+        for requirement in problem.requirements
+        if requirement.quantity.key is None and requirement.quantity != problem.goal.quantity
+    ]
+    passing = [trial for trial in space.trials.values() if trial.holds]
+    first = passing.index(best)
+    more = [False, *(requirement.at_least for requirement in sides)]
+    while True:
+        rows = [
+            [trial.cost, *(trial.value(requirement) for requirement in sides)] for trial in passing
+        ]
+        numbers = sorted({first, *front(rows, more)}, key=lambda number: passing[number].rank)
+        chosen = _spread(numbers)
+        checked = {number: space.with_rules(passing[number]) for number in chosen}
+        failed = [number for number, trial in checked.items() if not trial.holds]
+        if not failed:
+            return [checked[number] for number in chosen], len(numbers)
+        first -= sum(number < first for number in failed)
+        passing = [
+            checked.get(number, trial)
+            for number, trial in enumerate(passing)
+            if number not in failed
+        ]
+
+
+def _spread(numbers: list[int]) -> list[int]:
+    """Some of them, evenly, the first and the last among them."""
+    if len(numbers) <= SHOWN:
+        return numbers
+    return [numbers[round(at * (len(numbers) - 1) / (SHOWN - 1))] for at in range(SHOWN)]
+
+
+# The place of a finding in an actuator, in words.
+
+
+RING = 1.0
+"""mm round a bore or the lumen that still belong to it: a bond and its mask."""
+
+
+def place_text(laminate: Laminate, where: Place) -> str:
+    """For example "at the lumen", "at the inlet tab of chamber2"; empty where nothing is known."""
+    if where.x is None or where.y is None:
+        return ""
+    x, y = where.x, where.y
+    if laminate.lumen is not None and math.hypot(x, y) <= laminate.lumen / 2 + RING:
+        return "at the lumen"
+    for bore in laminate.bores:
+        if math.dist((x, y), bore.centre) <= bore.diameter / 2 + RING:
+            return f"at the bore of {bore.chamber}"
+    for inlet in laminate.inlets:
+        mouth, along = inlet.mouth, inlet.direction
+        back = (mouth[0] - x) * along[0] + (mouth[1] - y) * along[1]
+        aside = abs((mouth[0] - x) * along[1] - (mouth[1] - y) * along[0])
+        if -RING <= back <= inlet.length and aside <= inlet.width / 2 + RING:
+            return f"at the inlet tab of {inlet.chamber}"
+    return "at the rim"
+
+
+# The design file of the result: that of the starting design with the new values.
+
+
+FOUND = "found.toml"
+"""The file in a folder that ``-o`` names."""
+
+
+def found_file(out: Path) -> Path:
+    """Return the file that ``-o`` asks for: itself where it ends in .toml, else one in the folder.
+
+    Raises DesignError where no file can come to be: nobody's design is overwritten.
+    """
+    is_file = out.suffix.lower() == ".toml"
+    if is_file and not out.parent.is_dir():
+        raise DesignError(f"{out.parent} is no folder; make it first, or name another with -o")
+    if not is_file and out.exists() and not out.is_dir():
+        raise DesignError(f"{out} is a file; name a folder with -o, or a .toml file with --to")
+    target = out if is_file else out / FOUND
+    if target.exists():
+        raise DesignError(
+            f"{target} exists and is not overwritten; name another folder with -o or file with "
+            "--to, or remove it first"
+        )
+    return target
+
+
+def found_toml(
+    source: str | Path, assignments: Sequence[str], name: str, result: FoundDesign
+) -> str:
+    """Return the design file of a result, its figures as comments."""
+    path = design_path(source)
+    data = override(read_toml(path), [*assignments, dict(result.best.values), {"name": name}])
+    suggest_from_user_folder(data, assignments)
+    _from_anywhere(data, path.parent, set(changed_keys(assignments)))
+    first = {key: value for key, value in data.items() if not isinstance(value, dict)}
+    tables = {key: value for key, value in data.items() if isinstance(value, dict)}
+    limits = []
+    for requirement in result.problem.requirements:
+        value = shown_value(requirement.quantity, result.best.value(requirement))
+        limits.append(f"# {requirement.quantity.label} = {value} ({requirement.bound})")
+    goal = result.problem.goal
+    value = shown_value(goal.quantity, result.best.value(goal))
+    best = f"# {goal.quantity.label} = {value} (the goal)"
+    keys = keys_said(result.best.values)
+    measured = [f"# {name}: {value.sentence()}" for name, value in result.measured.items()]
+    head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *limits, best, *measured]
+    return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
+
+
+def _from_anywhere(data: dict[str, Any], folder: Path, assigned: set[str]) -> None:
+    """Make paths of the starting file absolute: the new file may lie elsewhere."""
+    chamber: Any = data.get("chamber")
+    if OUTLINE not in assigned and isinstance(chamber, Mapping) and "outline" in chamber:
+        chamber = dict(chamber)
+        chamber["outline"] = str((folder / str(chamber["outline"])).absolute())
+        data["chamber"] = chamber
+    if KIT not in assigned and KIT in data and data[KIT] not in kit_names():
+        data[KIT] = str((folder / str(data[KIT])).absolute())
+
+
+def write_found(text: str, target: Path) -> None:
+    """Raises OutputError where it cannot be written, also where a file came to be meanwhile."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("x", encoding="utf-8", newline="\n") as opened:
+            opened.write(text)
+    except OSError as error:
+        raise OutputError(
+            f"{target} cannot be written: {error.strerror or error}; name another folder with -o"
+        ) from None

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
+import sbafab
 from sbafab.actuators import records
-from sbafab.design.reading import checked as checked_record
-from sbafab.design.records import Design
-from sbafab.design.writing import design_sha256, keys_of
+from sbafab.design.files import checked as checked_record
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, keys_of
 from sbafab.errors import SbafabError
-from sbafab.models.figures import Asked, Figure
+from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.output.checking import check, refuse_undoable
-from sbafab.output.planned import Checked
-from sbafab.search.margins import margins
+from sbafab.output.checked import check, refuse_undoable
+from sbafab.rules.deck import AT_MOST
+from sbafab.rules.finding import Finding, Place, Verdict
 
 SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 """Every rule holds; a rule failed; no such design can be made; its process died; or took too long.
@@ -31,7 +33,7 @@ there; ``sha256``, ``keys``, ``rules``, ``figures`` where the design could be me
 def measured(
     tables: Mapping[str, Any], folder: str, values: Mapping[str, Any], pressures: Sequence[float]
 ) -> SweepRow:
-    """The row of the design that ``tables`` say, with ``values`` set; never raises a SbafabError.
+    """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
 
     ``folder`` is where relative paths start, ``pressures`` kPa are those of forces and strokes.
     """
@@ -49,26 +51,25 @@ def measured(
 @lru_cache(maxsize=4)
 def _base(tables: str, folder: str) -> Design:
     data = json.loads(tables)
-    known = records()
-    return checked_record(known[data["family"]], data, known).placed(Path(folder))
+    families = records()
+    return checked_record(families[data["family"]], data, families).placed(Path(folder))
 
 
 def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
-    laminate, findings = check(design)
-    found = margins(findings)
+    checked = check(design)
+    worst = margins(checked.findings)
     row["rules"] = {
-        name: [one.verdict, one.margin, one.measured, one.limit, one.unit]
-        for name, one in found.items()
+        name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
+        for name, rule in worst.items()
     }
-    prediction = predict(design, Asked(tuple(pressures)), laminate)
+    prediction = predict(design, PredictionRequest(tuple(pressures)), checked.laminate)
     row["figures"] = named_figures(prediction.figures)
-    one = Checked(design, laminate, findings)
-    if one.failed:
-        failed = [rule for rule in found.values() if rule.verdict == "fail"]
+    if checked.failed:
+        failed = [rule for rule in worst.values() if rule.verdict == "fail"]
         row["outcome"] = "fails"
         row["reason"] = " | ".join(f"{rule.rule}: {rule.message}" for rule in failed)
         return
-    refuse_undoable([one])
+    refuse_undoable([checked])
     row["outcome"] = "passes"
 
 
@@ -80,3 +81,82 @@ def named_figures(figures: Sequence[Figure]) -> dict[str, float]:
         f"[{figure.unit}]": figure.as_dict()["value"]
         for figure in figures
     }
+
+
+# The margin of each rule: its findings as one verdict and one margin.
+
+
+ORDER: tuple[Verdict, ...] = ("fail", "waived", "warn", "pass")
+
+
+class RuleMargin(NamedTuple):
+    """A rule's worst verdict, and by how much the worst value keeps its limit: below 0 it does not.
+
+    ``margin`` is None where nothing was measured, or where there is no limit.
+    """
+
+    rule: str
+    verdict: Verdict
+    margin: float | None
+    measured: float | None
+    limit: float | None
+    unit: str
+    where: Place
+    message: str
+
+    @property
+    def share(self) -> float | None:
+        """The margin as a share of the limit, where that is not 0."""
+        if self.margin is None:
+            return None
+        return self.margin / self.limit if self.limit else self.margin
+
+
+def margin_of(finding: Finding) -> float | None:
+    """By how much a finding keeps its limit, in its unit."""
+    if finding.measured is None or finding.limit is None:
+        return None
+    more = finding.measured - finding.limit
+    return round(-more if finding.rule in AT_MOST else more, 6)
+
+
+def margins(findings: Iterable[Finding]) -> dict[str, RuleMargin]:
+    """The worst of each rule, in the deck's order; what a rule waives by itself counts for none."""
+    worst: dict[str, RuleMargin] = {}
+    for finding in findings:
+        if finding.verdict == "waived" and not finding.by_user:
+            continue
+        margin = RuleMargin(
+            finding.rule,
+            finding.verdict,
+            margin_of(finding),
+            finding.measured,
+            finding.limit,
+            finding.unit,
+            finding.where,
+            finding.message,
+        )
+        before = worst.get(finding.rule)
+        if before is None or _severity(margin) < _severity(before):
+            worst[finding.rule] = margin
+    return worst
+
+
+def _severity(margin: RuleMargin) -> tuple[int, float]:
+    """Sort key of a margin: the worse, the smaller."""
+    share = margin.share
+    return ORDER.index(margin.verdict), share if share is not None else 0.0
+
+
+# The version of the program to the last line: rows of different versions are never mixed.
+
+
+@cache
+def fingerprint() -> str:
+    """The version, and a hash of the package's source."""
+    root = Path(sbafab.__file__).parent
+    total = hashlib.sha256()
+    for path in sorted(root.rglob("*.py")):
+        total.update(path.relative_to(root).as_posix().encode())
+        total.update(path.read_bytes())
+    return f"{sbafab.__version__}+{total.hexdigest()[:12]}"

@@ -1,4 +1,4 @@
-"""What a requirement may be about: sizes, mass, yield, stroke, bend, force, and a design's keys.
+"""Quantities of requirements: sizes, mass, yield, stroke, bend, force, and a design's keys.
 
 Each is the figure that ``predict`` has, from the same function: a stroke without a pressure is its
 full stroke, one at a pressure its free stroke; bends and forces are those of the elastic stack.
@@ -16,28 +16,23 @@ from typing import Any
 
 import numpy as np
 
-from sbafab.design.form import Slots
-from sbafab.design.messages import key_paths, listed, shown
+from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.pressure_units import KILOPASCALS
-from sbafab.design.records import Design
+from sbafab.design.records import Design, Slots, keys_of
 from sbafab.design.units import millimetres
-from sbafab.design.writing import keys_of
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import film_mass
-from sbafab.laminate.laminate import Laminate
-from sbafab.models.actuator import NO_OUTLINE, Actuator, actuator
+from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.counterparts import BALLOON as ELASTIC_BALLOON
-from sbafab.models.counterparts import FLAT_HEIGHT_OF_FILMS, Counterpart, counterpart
-from sbafab.models.counterparts import STACK as ELASTIC_STACK
+from sbafab.models.elastic import blocked_force
 from sbafab.models.figures import Factors
-from sbafab.models.force import force
-from sbafab.models.paper import HEIGHTS
-from sbafab.models.rippled import pressed, risen
-from sbafab.models.series import blocked
-from sbafab.models.sizes import sizes
+from sbafab.models.formulas import force, sizes
+from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
+from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
+from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, counterpart
+from sbafab.models.paper import STACK as ELASTIC_STACK
+from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.search.quantity_names import QUANTITIES
 
@@ -45,9 +40,9 @@ SHARES = np.linspace(0.1, 1.0, 10)
 """Of the pressure asked for: tried until the film would be longer than MOST_STRETCH."""
 USUAL_KPA = 10.0
 _PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
-AT = {one.name: one.unit for one in QUANTITIES if "@" in one.written}
-"""Quantities that are told at a pressure."""
-PLAIN = {one.name: one.unit for one in QUANTITIES if one.name not in AT}
+AT_PRESSURE = {row.name: row.unit for row in QUANTITIES if "@" in row.written}
+"""Units of the quantities that take a pressure."""
+UNPRESSURED = {row.name: row.unit for row in QUANTITIES if row.name not in AT_PRESSURE}
 UNITS = {
     "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
     "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
@@ -68,9 +63,9 @@ HOW = (
 
 
 @dataclass(frozen=True)
-class AskedQuantity:
-    """One of the names above or a dotted key; force and stroke with their pressure in kPa, force
-    with the stroke in mm at which it is wanted.
+class RequestedQuantity:
+    """A quantity by name or dotted key; force and stroke with their pressure in kPa, force with its
+    stroke in mm.
     """
 
     name: str
@@ -80,46 +75,44 @@ class AskedQuantity:
 
     @property
     def is_full_stroke(self) -> bool:
-        """Whether it is the stroke that belongs to no pressure."""
+        """True for the stroke without a pressure."""
         return self.name == "stroke" and self.kpa is None
 
     @property
-    def said(self) -> str:
+    def label(self) -> str:
         at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
         return f"{self.name}{at}{f'@{self.kpa:g}kPa' if self.kpa is not None else ''}"
 
     @property
     def key(self) -> str | None:
-        """The key that it is, if it is one."""
+        """The design key that the quantity stands for, or None."""
         return self.name if "." in self.name else KEYS.get(self.name)
 
 
-def read_quantity(text: str, kpa: float | None = None) -> AskedQuantity:
+def read_quantity(text: str, kpa: float | None = None) -> RequestedQuantity:
     """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
-    if name in AT:
-        return _at(name, places, text, kpa)
+    if name in AT_PRESSURE:
+        return _with_pressure(name, places, text, kpa)
     if places:
-        raise DesignError(
-            f"{shown(text)}: only stroke, bend and force are told at a pressure; {HOW}"
-        )
-    if name not in PLAIN and "." not in name:
-        known = list(dict.fromkeys(one.name for one in QUANTITIES))
-        near = difflib.get_close_matches(name, known, 1)
-        mends = f"did you mean {near[0]}?" if near else f"there are {listed(known)} and any key"
-        raise DesignError(f"{shown(text)} is no quantity; {mends}")
-    return AskedQuantity(name, PLAIN.get(name, ""))
+        raise DesignError(f"{shown(text)}: only stroke, bend and force take a pressure; {HOW}")
+    if name not in UNPRESSURED and "." not in name:
+        names = list(dict.fromkeys(row.name for row in QUANTITIES))
+        near = difflib.get_close_matches(name, names, 1)
+        mends = f"did you mean {near[0]}?" if near else f"there are {listed(names)} and any key"
+        raise DesignError(f"{shown(text)} is not a quantity; {mends}")
+    return RequestedQuantity(name, UNPRESSURED.get(name, ""))
 
 
-def safer(quantity: AskedQuantity, at_least: bool) -> AskedQuantity:
+def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
     """The quantity to hold a limit against: of the inflated diameters the one that is safer."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
     return replace(quantity, name=REACHED if at_least else WIDEST)
 
 
-def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuantity:
+def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
     pressure: float | None = None
     stroke: float | None = None
     for place in places:
@@ -142,21 +135,20 @@ def _at(name: str, places: list[str], text: str, kpa: float | None) -> AskedQuan
             ) from None
     if (name == "force") != (stroke is not None):
         raise DesignError(
-            f"{shown(text)}: a force is told at a stroke, {'a stroke' if name != 'bend' else name} "
-            f"is not; {HOW}"
+            f"{shown(text)}: a force needs a stroke, and only a force takes one; {HOW}"
         )
     if pressure is None and name == "stroke":
-        return AskedQuantity(name, AT[name])
+        return RequestedQuantity(name, AT_PRESSURE[name])
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
-    return AskedQuantity(name, AT[name], pressure, stroke)
+    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke)
 
 
 def named_pressure(texts: list[str]) -> float | None:
     """The highest pressure that any of the quantities names, kPa."""
     places = [place for text in texts for place in text.split("@")[1:]]
-    named = [one for place in places if (one := _kilopascals(place)) is not None]
+    named = [kilopascals for place in places if (kilopascals := _kilopascals(place)) is not None]
     return max(named, default=None)
 
 
@@ -165,17 +157,17 @@ def _kilopascals(place: str) -> float | None:
 
     MPa and mPa are not the same: a unit that is written like another one is none.
     """
-    found = _PRESSURE.fullmatch(place)
-    if found is None:
+    match = _PRESSURE.fullmatch(place)
+    if match is None:
         return None
-    units = [one for one in KILOPASCALS if one.lower() == found[2].lower()]
-    if len(units) != 1 or (found[2] != units[0] and units[0] == "MPa"):
+    units = [unit for unit in KILOPASCALS if unit.lower() == match[2].lower()]
+    if len(units) != 1 or (match[2] != units[0] and units[0] == "MPa"):
         return None
-    return float(found[1]) * KILOPASCALS[units[0]]
+    return float(match[1]) * KILOPASCALS[units[0]]
 
 
-def read_limit(quantity: AskedQuantity, text: str) -> float:
-    """What a quantity must keep, in its unit. Raises ValueError with the end of a sentence."""
+def read_limit(quantity: RequestedQuantity, text: str) -> float:
+    """Return the limit of a quantity, in its unit. Raises ValueError with the end of a sentence."""
     if quantity.name == "yield":
         return _share(text)
     if quantity.unit in UNITS:
@@ -193,23 +185,23 @@ def read_limit(quantity: AskedQuantity, text: str) -> float:
 
 
 def _measured(unit: str, text: str) -> float:
-    found = _VALUE.fullmatch(text)
-    if found is None or (found[2] or unit) not in UNITS[unit]:
+    match = _VALUE.fullmatch(text)
+    if match is None or (match[2] or unit) not in UNITS[unit]:
         raise ValueError(f"must be a number, in {unit} or with one of {', '.join(UNITS[unit])}")
-    return float(found[1]) * UNITS[unit][found[2] or unit]
+    return float(match[1]) * UNITS[unit][match[2] or unit]
 
 
 def _share(text: str) -> float:
-    found = _VALUE.fullmatch(text)
-    if found is None or found[2] not in ("", "%"):
+    match = _VALUE.fullmatch(text)
+    if match is None or match[2] not in ("", "%"):
         raise ValueError("must be a share such as 0.95 or 95%")
-    limit = float(found[1]) / (100 if found[2] else 1)
+    limit = float(match[1]) / (100 if match[2] else 1)
     if not 0 <= limit <= 1:
         raise ValueError("must be a share from 0 to 1, such as 0.95 or 95%")
     return limit
 
 
-def shown_value(quantity: AskedQuantity, value: float) -> str:
+def shown_value(quantity: RequestedQuantity, value: float) -> str:
     """A figure with its unit, as people read it."""
     if quantity.name == "force" and value < 0:
         return "none, it does not rise that far"
@@ -218,7 +210,7 @@ def shown_value(quantity: AskedQuantity, value: float) -> str:
 
 @dataclass(frozen=True)
 class Subject:
-    """A design of which quantities are asked; each is worked out once."""
+    """A design whose quantities are evaluated; each is computed once."""
 
     design: Design
     laminate: Laminate
@@ -231,26 +223,26 @@ class Subject:
     def _keys(self) -> Mapping[str, Any]:
         return {key: value for key, value, _ in keys_of(self.design)}
 
-    def value(self, quantity: AskedQuantity, share_of_good: Callable[[], float]) -> float:
+    def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
-        if quantity.name in AT:
+        if quantity.name in AT_PRESSURE:
             return self._moved(quantity)
         if quantity.name == "mass":
             return film_mass(self.laminate)
         if quantity.name == "height":
             return self.laminate.thickness
-        found: Any = self._sizes.get(quantity.name)
+        value: Any = self._sizes.get(quantity.name)
         if quantity.name == "lumen":
-            found = self.design.form.lumen
+            value = self.design.form.lumen
         elif "." in quantity.name:
-            found = self._keys.get(quantity.name)
-        if isinstance(found, int | float):
-            return float(found)
+            value = self._keys.get(quantity.name)
+        if isinstance(value, int | float):
+            return float(value)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
-    def _moved(self, quantity: AskedQuantity) -> float:
+    def _moved(self, quantity: RequestedQuantity) -> float:
         """A stroke, bend or force."""
         kpa = quantity.kpa
         if kpa is None:
@@ -271,7 +263,7 @@ class Subject:
 
     @property
     def full_stroke(self) -> float:
-        """What ``predict`` calls the full stroke, mm. Raises DesignError where no model has one."""
+        """Full stroke as in ``predict``, mm. Raises DesignError where no model has one."""
         if not self._actuator.kinematics:
             raise DesignError(NO_OUTLINE)
         return self._actuator.full_stroke
@@ -295,7 +287,7 @@ class Subject:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
         kinds = balloons_of(self.design, self.laminate)
-        push = float(blocked(self._stack, kpa, stroke))
+        push = float(blocked_force(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps
             free = sum(float(maps[level].free_height(kpa)) for level in self._stack.levels)
@@ -305,12 +297,12 @@ class Subject:
         _refuse_stretched(kinds, kpa, stroke)
         return form.pushing * push
 
-    def counterpart(self, quantity: AskedQuantity) -> Counterpart | None:
-        """What the paper measured beside a quantity whose model is off by more than a quarter."""
+    def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
+        """Return the paper's measured value where the model is off by over a quarter, or None."""
         name, model = self._figure(quantity)
         return counterpart(self.design.form, name, model)
 
-    def _figure(self, quantity: AskedQuantity) -> tuple[str, str]:
+    def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
         """The name of the figure in ``predict``, and that of its model."""
         at = f"at {quantity.kpa or 0.0:g} kPa"
         if quantity.name == "height":
@@ -324,7 +316,7 @@ class Subject:
         if quantity.name == "force":
             # Of the three heights at which forces were measured the nearest.
             share = (quantity.stroke or 0.0) / self.full_stroke
-            near = min(HEIGHTS, key=lambda one: abs(one - share))
+            near = min(HEIGHTS, key=lambda height: abs(height - share))
             where = f"at {100 * near:g} % of full stroke" if near else "flat"
             return f"blocked force {at}, {where}", ELASTIC_STACK
         return "", ""
@@ -336,18 +328,18 @@ def free_height(kind: Balloon, kpa: float) -> float:
 
     The latter is less than it would rise by.
     """
-    shape = risen(kind, [kpa])
+    shape = free_shapes(kind, [kpa])
     if float(stretch(kind, shape)[0]) <= MOST_STRETCH:
         return float(shape.height[0])
-    shapes = risen(kind, SHARES * kpa)
+    shapes = free_shapes(kind, SHARES * kpa)
     return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
 
 
 def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> None:
     """Raises DesignError where a film would be stretched too far at a stroke in mm."""
     for kind in dict.fromkeys(kinds):
-        height = stroke * kind.pocket / sum(one.pocket for one in kinds)
-        longer = float(stretch(kind, pressed(kind, [kpa], [max(height, 1e-3)]))[0])
+        height = stroke * kind.pocket / sum(balloon.pocket for balloon in kinds)
+        longer = float(stretch(kind, compressed_shapes(kind, [kpa], [max(height, 1e-3)]))[0])
         if longer > MOST_STRETCH:
             raise DesignError(
                 f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
@@ -356,7 +348,7 @@ def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> No
             )
 
 
-def refuse_unknown_key(quantity: AskedQuantity, design: Design) -> None:
+def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:
     """Raises DesignError for a key that the design does not have, with the one that is meant."""
     if "." in quantity.name and quantity.name not in key_paths(type(design)):
         design.with_({quantity.name: 1})

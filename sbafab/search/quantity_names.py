@@ -1,6 +1,6 @@
-"""The quantities that a requirement may name, with their units: for what reads them, and for help.
+"""The quantities that a requirement may name, with their units.
 
-It loads nothing, for the help of ``sbafab find``.
+Nothing else is loaded, so that ``sbafab find --help`` stays quick.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class QuantityName(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name without what it is told at."""
+        """The name without stroke and pressure."""
         return self.written.partition("@")[0]
 
 
@@ -43,6 +43,9 @@ QUANTITIES = (
 
 def quantity_lines() -> str:
     """Return the table as lines for the help of a command."""
-    width = max(len(one.written) for one in QUANTITIES)
-    rows = [f"{one.written:{width}}  {one.unit:3}  {one.meaning}".rstrip() for one in QUANTITIES]
+    width = max(len(quantity.written) for quantity in QUANTITIES)
+    rows = [
+        f"{quantity.written:{width}}  {quantity.unit:3}  {quantity.meaning}".rstrip()
+        for quantity in QUANTITIES
+    ]
     return "\n".join([*rows, f"{'KEY':{width}}  {'':3}  any key of the design, chamber.diameter"])

@@ -4,31 +4,34 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from filelock import FileLock, Timeout
 
-from sbafab.design.reading import KIT, OUTLINE
-from sbafab.design.records import Design
-from sbafab.design.templates import kit_names
-from sbafab.design.writing import design_sha256, plain_tables
+from sbafab.design.files import KIT, OUTLINE, kit_names
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, plain_tables
 from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
-from sbafab.progress import Progress, unheard
-from sbafab.search.earlier import no_longer_asked, refuse_foreign
-from sbafab.search.fingerprint import fingerprint
-from sbafab.search.journal import Journal
-from sbafab.search.measure import SweepOutcome, SweepRow
+from sbafab.process import Progress, ignore_progress
+from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
 from sbafab.search.page import sweep_html
-from sbafab.search.pool import dask_pool, local_pool, run_jobs
-from sbafab.search.table import Table, write_csv, write_parquet, write_times
+from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
+from sbafab.search.table import (
+    Table,
+    refuse_foreign,
+    stale_designs,
+    write_csv,
+    write_parquet,
+    write_times,
+)
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
-from sbafab.search.worker import MeasureJob
 
 JOURNAL, CSV = "journal.jsonl", "sweep.csv"
 SECONDS = 300.0
@@ -38,7 +41,7 @@ MEASURED = "measuring designs"
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What is swept and how: ``samples`` drawn by Latin hypercube, or the whole grid.
+    """Designs and settings of a sweep: ``samples`` drawn by Latin hypercube, or the whole grid.
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
     ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule
@@ -58,7 +61,7 @@ class SweepRequest:
 
 @dataclass(frozen=True)
 class SweptDesigns:
-    """What a sweep made: its folder, how many designs of each outcome, how many measured now.
+    """Result of a sweep: its folder, number of designs by outcome, number measured in this run.
 
     ``no_longer_asked`` designs of an earlier sweep stood in the tables that it has replaced.
     """
@@ -80,24 +83,24 @@ class SweepStopped(KeyboardInterrupt):
         self.designs = designs
 
 
-def trials(request: SweepRequest) -> list[Values]:
+def designs_of(request: SweepRequest) -> list[Values]:
     """The values of every design, in the tables' order. Raises DesignError."""
-    varied = [_from_here(one) for one in request.varied]
+    varied = [_from_here(varied_key) for varied_key in request.varied]
     refuse_unknown(request.design, varied)
     if request.samples is None:
         return list(grid(varied))
     return list(latin_hypercube(varied, request.samples, request.seed))
 
 
-def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDesigns:
+def sweep(request: SweepRequest, out: Path, tell: Progress = ignore_progress) -> SweptDesigns:
     """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
 
     What an earlier run measured there counts, as long as design, values and program are the same.
     Raises DesignError for bad input, OutputError where nothing can be written or no worker answers.
     """
-    values = trials(request)
+    values = designs_of(request)
     folder = out / f"{request.design.name}-sweep"
-    with _held(folder):
+    with _locked(folder):
         refuse_foreign(folder / CSV)
         journal = Journal(folder / JOURNAL, request.seconds)
         try:
@@ -113,7 +116,7 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = unheard) -> SweptDe
         table = Table(
             lambda: journal.rows(iter(keys)), values, request.pressures_kpa, request.all_columns
         )
-        gone = no_longer_asked(folder / CSV, table)
+        gone = stale_designs(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
     return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, gone)
@@ -155,9 +158,10 @@ def _measure(
 
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
     """A hash of each design and of what is asked of it, by this program."""
-    asked = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
+    question = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
     return [
-        hashlib.sha256(json.dumps([*asked, _contents(one)]).encode()).hexdigest() for one in values
+        hashlib.sha256(json.dumps([*question, _contents(design_values)]).encode()).hexdigest()
+        for design_values in values
     ]
 
 
@@ -176,8 +180,8 @@ def _from_here(varied: Varied) -> Varied:
     if varied.key not in (OUTLINE, KIT):
         return varied
     paths = tuple(
-        one if varied.key == KIT and one in kit_names() else str(Path(str(one)).absolute())
-        for one in varied.values
+        path if varied.key == KIT and path in kit_names() else str(Path(str(path)).absolute())
+        for path in varied.values
     )
     return Varied(varied.key, paths)
 
@@ -195,8 +199,8 @@ def _write(folder: Path, request: SweepRequest, table: Table) -> tuple[str, ...]
 
 
 @contextmanager
-def _held(folder: Path) -> Iterator[None]:
-    """The folder, there and ours alone. Raises OutputError."""
+def _locked(folder: Path) -> Iterator[None]:
+    """Create and lock the folder. Raises OutputError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / MANIFEST).exists():
@@ -216,3 +220,76 @@ def _held(folder: Path) -> Iterator[None]:
         raise OutputError(
             f"{folder} cannot be written: {error.strerror or error}; choose another folder with -o"
         ) from None
+
+
+# The journal: a line a measured design, only appended, from which a sweep resumes.
+
+
+class Journal:
+    """Rows of measured designs in a file, by the hash of design and request; read where needed.
+
+    A line that a killed run left unfinished is passed over, and its design measured again; so is
+    one that took too long in less than ``seconds``. Raises OutputError where the file cannot be
+    written.
+    """
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        self.path = path
+        self._seconds = seconds
+        self._places: dict[str, int] = {}
+        try:
+            self._file: IO[bytes] = path.open("a+b")
+            self._read()
+        except OSError as error:
+            raise OutputError(
+                f"{path} cannot be written: {error.strerror or error}; choose another folder "
+                "with -o"
+            ) from None
+
+    def _read(self) -> None:
+        self._file.seek(0)
+        at, line = 0, b""
+        for line in self._file:
+            key = self._key(line)
+            if key is not None:
+                self._places[key] = at
+            at += len(line)
+        if line and not line.endswith(b"\n"):
+            self._file.write(b"\n")
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._places
+
+    def add(self, key: str, row: SweepRow) -> None:
+        """Writes a row, unless there is one already."""
+        if key in self._places:
+            return
+        line = json.dumps({"key": key, "row": row}, ensure_ascii=False, separators=(",", ":"))
+        self._file.seek(0, os.SEEK_END)
+        self._places[key] = self._file.tell()
+        self._file.write(line.encode() + b"\n")
+        self._file.flush()
+
+    def rows(self, keys: Iterator[str]) -> Iterator[SweepRow]:
+        """The rows of these keys, in their order, one in memory at a time."""
+        with self.path.open("rb") as opened:
+            for key in keys:
+                opened.seek(self._places[key])
+                yield json.loads(opened.readline())["row"]
+
+    def close(self) -> None:
+        """Has what was written reach the disk."""
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+    def _key(self, line: bytes) -> str | None:
+        """The key of a whole line that need not be measured again."""
+        try:
+            entry = json.loads(line)
+            key, row = entry["key"], entry["row"]
+            was_short = row["outcome"] == "too long" and row["seconds"] < self._seconds
+        except (ValueError, KeyError, TypeError):
+            return None
+        is_whole = line.endswith(b"\n") and isinstance(key, str)
+        return key if is_whole and not was_short else None

@@ -6,6 +6,7 @@ took is in a file of its own.
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +15,7 @@ from itertools import chain
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+from sbafab.errors import OutputError
 from sbafab.rules.deck import rule_names
 from sbafab.search.measure import SweepRow
 from sbafab.search.vary import Values
@@ -50,7 +52,7 @@ class Column(NamedTuple):
 
 
 class Table:
-    """Rows that are read anew each time, so that as many fit as the disk holds.
+    """Rows of a sweep, read again each time, so that as many fit as the disk holds.
 
     Files get the columns that a reader looks for first; ``is_whole``: all of them.
     """
@@ -72,7 +74,7 @@ class Table:
 
     @cached_property
     def columns(self) -> tuple[Column, ...]:
-        """Those of all rows: keys, the varied ones first, then rules, then figures.
+        """Columns of all rows: keys, the varied ones first, then rules, then figures.
 
         A column with a text in any row holds texts.
         """
@@ -90,25 +92,23 @@ class Table:
 
     @cached_property
     def written(self) -> tuple[Column, ...]:
-        """The columns of the files: what was varied, what was asked for, and rules that bind; then
-        all others, where they were asked for.
-        """
-        known = {column.name: column for column in self.columns}
+        """Columns of the files: varied keys, leading figures, binding rules; or all."""
+        by_name = {column.name: column for column in self.columns}
         varied = [name for values in self.values for name in values]
-        first = [*HEAD, *varied, *self._asked(list(known)), *self._binding()]
-        rest = known if self.is_whole else ()
-        return tuple(known[name] for name in dict.fromkeys([*first, *rest]) if name in known)
+        first = [*HEAD, *varied, *self._leading(list(by_name)), *self._binding()]
+        rest = by_name if self.is_whole else ()
+        return tuple(by_name[name] for name in dict.fromkeys([*first, *rest]) if name in by_name)
 
-    def _asked(self, names: Sequence[str]) -> Iterator[str]:
-        """Of each figure that is looked for first the column by the model to design with."""
-        each = [f"{what} at {kpa:g} kPa" for kpa in self.pressures_kpa for what in MOVED]
+    def _leading(self, names: Sequence[str]) -> Iterator[str]:
+        """Yield each leading figure's first column, by the model to design with."""
+        each = [f"{figure} at {kpa:g} kPa" for kpa in self.pressures_kpa for figure in MOVED]
         for begins in (*FIRST, *each):
             yield from [name for name in names if name.startswith(begins)][:1]
         yield YIELD
 
     def _binding(self) -> Iterator[str]:
-        """Verdict and margin of the rules that fail, warn or have nothing to spare anywhere."""
-        found = {
+        """Yield verdict and margin of the rules that fail, warn or pass without margin anywhere."""
+        not_passing = {
             name
             for row in self.rows()
             for name, (verdict, margin, _, limit, _) in row.get("rules", {}).items()
@@ -116,15 +116,15 @@ class Table:
             or (margin is not None and limit and abs(margin) < LITTLE * abs(limit))
         }
         for name in rule_names():
-            if name in found:
+            if name in not_passing:
                 yield from (f"{name}.verdict", f"{name}.margin")
 
     def cells(self, columns: Sequence[Column] | None = None) -> Iterator[list[Any]]:
         """The cells of every row in these columns, or in all; None where there is nothing."""
-        wanted = self.columns if columns is None else columns
+        chosen = self.columns if columns is None else columns
         for row in self._flat():
             every = {name: cell for part in row for name, cell in part.items()}
-            yield [_cell(every.get(name), is_number) for name, is_number in wanted]
+            yield [_cell(every.get(name), is_number) for name, is_number in chosen]
 
     def _flat(self) -> Iterator[tuple[dict[str, Any], ...]]:
         for number, (row, values) in enumerate(zip(self.rows(), self.values, strict=True), 1):
@@ -144,11 +144,11 @@ class Table:
 
 
 def _rules(row: SweepRow) -> dict[str, Any]:
-    found = row.get("rules", {})
+    rules = row.get("rules", {})
     return {
-        f"{name}.{part}": found[name][place]
+        f"{name}.{part}": rules[name][place]
         for name in rule_names()
-        if name in found
+        if name in rules
         for part, place in PARTS
     }
 
@@ -207,3 +207,29 @@ def _batches(rows: Iterator[list[Any]]) -> Iterator[list[list[Any]]]:
             batch = []
     if batch:
         yield batch
+
+
+# The tables of an earlier sweep in the folder.
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raises OutputError where a table stands that no sweep has written."""
+    if not path.exists():
+        return
+    with path.open(newline="", encoding="utf-8", errors="replace") as opened:
+        first = opened.readline(200)
+    if not first.startswith(",".join(HEAD)):
+        raise OutputError(
+            f"{path} was not written by sbafab sweep; move it away, or choose another folder "
+            "with -o"
+        )
+
+
+def stale_designs(path: Path, table: Table) -> int:
+    """Return the number of designs in the CSV file at the path that are not in the table."""
+    if not path.exists():
+        return 0
+    now = {row.get("sha256", "") for row in table.rows()}
+    with path.open(newline="", encoding="utf-8") as opened:
+        before = {row.get("sha256", "") for row in csv.DictReader(opened)}
+    return len(before - now - {""})

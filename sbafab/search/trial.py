@@ -1,39 +1,143 @@
-"""One design tried: its figures against the requirements, its rules by their margins."""
+"""Requirements, the search space of a design's free keys, and candidates evaluated once each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from sbafab.actuators import build
-from sbafab.design.records import Design
-from sbafab.errors import DesignError
-from sbafab.geometry.inconsistent import GeometryError
-from sbafab.laminate.extent import film_mass
-from sbafab.laminate.laminate import Laminate
-from sbafab.output.checking import refuse_undoable
-from sbafab.output.planned import Checked
-from sbafab.output.settings import limits
+from sbafab.design.files import shown
+from sbafab.design.records import Design, Free, keys_of
+from sbafab.errors import DesignError, GeometryError
+from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.output.checked import Checked, limits, refuse_undoable
+from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
-from sbafab.search.margins import RuleMargin, margins
-from sbafab.search.quantities import AskedQuantity, Subject, shown_value
-from sbafab.search.requirements import CLOSE, Goal, Requirement
+from sbafab.search.measure import RuleMargin, margins
+from sbafab.search.quantities import (
+    RequestedQuantity,
+    Subject,
+    named_pressure,
+    read_limit,
+    read_quantity,
+    safer,
+    shown_value,
+)
+
+CLOSE = 1e-9
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A quantity with its lower or upper limit."""
+
+    quantity: RequestedQuantity
+    limit: float
+    at_least: bool
+
+    def margin(self, value: float) -> float:
+        """Return by what share of the limit a value keeps it; below 0 it does not."""
+        more = value - self.limit if self.at_least else self.limit - value
+        return more / (abs(self.limit) or 1.0)
+
+    def holds(self, value: float) -> bool:
+        return self.margin(value) >= -CLOSE
+
+    @property
+    def bound(self) -> str:
+        """For example "at least 3 N"."""
+        most = "at least" if self.at_least else "at most"
+        return f"{most} {self.limit:.10g} {self.quantity.unit}".strip()
+
+    @property
+    def label(self) -> str:
+        return f"{self.quantity.label} {self.bound}"
+
+
+@dataclass(frozen=True)
+class Goal:
+    """The quantity to maximise (``more``) or minimise."""
+
+    quantity: RequestedQuantity
+    more: bool
+
+    def cost(self, value: float) -> float:
+        return -value if self.more else value
+
+    @property
+    def label(self) -> str:
+        return f"{'most' if self.more else 'least'} {self.quantity.label}"
+
+
+GOOD_IF_MORE = ("stroke", "bend", "force", "yield", "lumen")
+"""Of these as much as can be is best, of all others as little."""
+
+
+def read_all(
+    least: Sequence[str], most: Sequence[str], best: str
+) -> tuple[tuple[Requirement, ...], Goal]:
+    """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
+
+    A bend or a force without a pressure is one at the highest that any of them names; a stroke
+    without one is the full stroke.
+    """
+    pairs = [(text, True) for text in least] + [(text, False) for text in most]
+    kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
+    requirements = tuple(_read(text, at_least, kpa) for text, at_least in pairs)
+    _refuse_contradictions(requirements, [text for text, _ in pairs])
+    quantity = read_quantity(best, kpa)
+    return requirements, Goal(quantity, quantity.name in GOOD_IF_MORE)
+
+
+def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
+    option = "--min" if at_least else "--max"
+    name, equals, value = text.partition("=")
+    if not equals or not value.strip():
+        raise DesignError(
+            f"{option} {shown(text)} is not QUANTITY=VALUE; write for example {option} "
+            f"{'stroke@50kPa=25' if at_least else 'overall_diameter=20'}"
+        )
+    quantity = safer(read_quantity(name, kpa), at_least)
+    try:
+        limit = read_limit(quantity, value)
+    except ValueError as error:
+        raise DesignError(f"{option} {shown(text)}: the value {error}") from None
+    return Requirement(quantity, limit, at_least)
+
+
+def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
+    """Raises DesignError where one quantity must be more than it may be."""
+    for least, least_text in zip(requirements, texts, strict=True):
+        for most, most_text in zip(requirements, texts, strict=True):
+            if not least.at_least or most.at_least or least.limit <= most.limit:
+                continue
+            # The inflated diameter that must reach is never more than the one that must not touch.
+            if least.quantity == safer(most.quantity, at_least=True):
+                raise DesignError(
+                    f"--min {shown(least_text)} and --max {shown(most_text)} contradict each "
+                    "other; no design can meet both, so change one"
+                )
+
+
+# One candidate: its figures against the requirements, its rules by their margins.
+
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
 """By how much a design that cannot be made misses: by more than any that can."""
-Steps = tuple[int, ...]
+GridPoint = tuple[int, ...]
 """A design by the step at which each free key stands."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A design with what was found of it. ``rules`` is None where they were not asked.
+    """An evaluated candidate. ``rules`` is None where they were not checked.
 
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
-    ``cost``, in the unit of what is best, is the less the better; ``mass`` is in g. ``refused``
+    ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
     says why no such design can be made.
     """
 
@@ -48,58 +152,59 @@ class Trial:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is missed and it can be made."""
+        """True if nothing is missed and the design can be made."""
         return self.missed == 0.0 and not self.refused
 
     @property
     def rank(self) -> tuple[float, float, float]:
-        """What is missed as a share, then the cost, of equals the mass; the less, the better."""
+        """Sort key, best first: share missed, then cost, then mass."""
         return self.missed, self.cost, self.mass
 
     def value(self, requirement: Requirement | Goal) -> float:
         """The figure that a requirement or the goal is about, in its unit."""
-        return self.figures[requirement.quantity.said]
+        return self.figures[requirement.quantity.label]
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """All that is asked: requirements, the goal, and the design whose keys change."""
+class SearchProblem:
+    """Requirements, the goal, and the design whose keys change."""
 
     design: Design
     requirements: tuple[Requirement, ...]
     goal: Goal
 
     @property
-    def asks_for_yield(self) -> bool:
+    def needs_yield(self) -> bool:
         return any(quantity.name == "yield" for quantity in self.quantities)
 
     @property
-    def quantities(self) -> list[AskedQuantity]:
-        """All that figures are asked of: requirements first, then the goal."""
-        return [*(one.quantity for one in self.requirements), self.goal.quantity]
+    def quantities(self) -> list[RequestedQuantity]:
+        """The quantities to evaluate: those of the requirements first, then the goal's."""
+        return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
 
-def tried(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
-    """The trial of a design; without rules only requirements count, which is much quicker."""
+def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    """Return the candidate with these values; without rules, only requirements count: quicker."""
     try:
-        design = wanted.design.with_(dict(values))
+        design = problem.design.with_(dict(values))
         laminate = build(design)
         rules = None
-        if with_rules or wanted.asks_for_yield:
+        if with_rules or problem.needs_yield:
             findings = run_deck(laminate, limits(design))
             rules = margins(findings)
             checked = Checked(design, laminate, findings)
             if not checked.failed:
                 refuse_undoable([checked])
-        figures = _figures(wanted, Subject(design, laminate), rules)
+        figures = _figures(problem, Subject(design, laminate), rules)
     except (DesignError, GeometryError) as error:
-        said = " ".join(str(error).split())
-        return Trial(values, missed=IMPOSSIBLE, refused=said)
+        message = " ".join(str(error).split())
+        return Trial(values, missed=IMPOSSIBLE, refused=message)
     missed = sum(
-        -min(0.0, one.margin(figures[one.quantity.said]) + CLOSE) for one in wanted.requirements
+        -min(0.0, requirement.margin(figures[requirement.quantity.label]) + CLOSE)
+        for requirement in problem.requirements
     )
-    missed += sum(_short(one) for one in (rules or {}).values())
-    cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
+    missed += sum(_short(requirement) for requirement in (rules or {}).values())
+    cost = problem.goal.cost(figures[problem.goal.quantity.label])
     return Trial(values, figures, rules, missed, cost, _mass(laminate), laminate=laminate)
 
 
@@ -112,34 +217,36 @@ def _mass(laminate: Laminate) -> float:
 
 
 def _short(rule: RuleMargin) -> float:
-    """By what share a rule that fails misses its limit."""
+    """Return by what share a failing rule misses its limit."""
     if rule.verdict != "fail":
         return 0.0
     return max(1e-3, -(rule.share or 0.0))
 
 
 def _figures(
-    wanted: Wanted, subject: Subject, rules: Mapping[str, RuleMargin] | None
+    problem: SearchProblem, subject: Subject, rules: Mapping[str, RuleMargin] | None
 ) -> dict[str, float]:
     def share_of_good() -> float:
-        found = (rules or {}).get(YIELD)
-        if found is None or found.measured is None:
-            raise DesignError(f"no yield of {subject.design.name} can be counted")
-        return found.measured
+        yield_margin = (rules or {}).get(YIELD)
+        if yield_margin is None or yield_margin.measured is None:
+            raise DesignError(f"the yield of {subject.design.name} cannot be computed")
+        return yield_margin.measured
 
-    return {quantity.said: subject.value(quantity, share_of_good) for quantity in wanted.quantities}
+    return {
+        quantity.label: subject.value(quantity, share_of_good) for quantity in problem.quantities
+    }
 
 
-def misses(wanted: Wanted, trial: Trial) -> list[str]:
-    """What a design breaks, a sentence each: requirements, then rules."""
+def misses(problem: SearchProblem, trial: Trial) -> list[str]:
+    """Return what a candidate breaks, a sentence each: requirements, then rules."""
     if trial.refused:
         return [trial.refused]
-    said = [
-        f"{one.quantity.said} {shown_value(one.quantity, trial.value(one))}, not {one.bound}"
-        for one in wanted.requirements
-        if not one.holds(trial.value(one))
+    broken = [
+        f"{row.quantity.label} {shown_value(row.quantity, trial.value(row))}, not {row.bound}"
+        for row in problem.requirements
+        if not row.holds(trial.value(row))
     ]
-    return [*said, *broken_rules(trial)]
+    return [*broken, *broken_rules(trial)]
 
 
 def value_said(value: Any) -> str:
@@ -153,6 +260,137 @@ def keys_said(values: Mapping[str, Any]) -> str:
 
 
 def broken_rules(trial: Trial) -> list[str]:
-    """The rules that a design breaks, a sentence each."""
-    failed = [one for one in (trial.rules or {}).values() if one.verdict == "fail"]
-    return [f"{one.rule}: {one.message}" for one in failed]
+    """Return the rules that a candidate breaks, a sentence each."""
+    failed = [margin for margin in (trial.rules or {}).values() if margin.verdict == "fail"]
+    return [f"{margin.rule}: {margin.message}" for margin in failed]
+
+
+# The search space: steps of the free keys, each evaluated once.
+
+
+PROGRESS_LABEL = "trying designs"
+
+
+def numbers_of(value: Any) -> list[float]:
+    """The numbers of a key that lists some, such as one diameter a balloon; else none."""
+    return list(map(float, value)) if isinstance(value, list | tuple) and value else []
+
+
+class SearchSpace:
+    """The candidates evaluated so far, each once, by the steps of their free keys.
+
+    ``lows`` and ``highs`` are the least and the largest step of each key. No more than ``tries``
+    candidates are evaluated; ``limit`` is where the stage that runs now has to end.
+    """
+
+    def __init__(
+        self, problem: SearchProblem, free: tuple[Free, ...], tries: int, tell: Progress
+    ) -> None:
+        self.problem = problem
+        self.free = free
+        self.tries = self.limit = tries
+        self.lows = [0] * len(free)
+        self.highs = [int(round((axis.high - axis.low) / axis.step, 6)) for axis in free]
+        self.trials: dict[GridPoint, Trial] = {}
+        self._tell = tell
+        self._keys: dict[str, Any] = {key: value for key, value, _ in keys_of(problem.design)}
+
+    @property
+    def is_over(self) -> bool:
+        return len(self.trials) >= min(self.limit, self.size)
+
+    @property
+    def size(self) -> int:
+        """Number of designs in the space."""
+        return math.prod(self.counts) if self.counts else 0
+
+    @property
+    def counts(self) -> list[int]:
+        """Number of values of each key."""
+        return [high - low + 1 for low, high in zip(self.lows, self.highs, strict=True)]
+
+    def number(self, axis: int, point: GridPoint) -> float:
+        """The value of a key at a place; of a list its largest number."""
+        return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
+
+    def values(self, point: GridPoint) -> Mapping[str, Any]:
+        """The keys' values at a place, whole numbers where low and step are.
+
+        A list, such as the diameters of a tapered stack, is scaled as a whole.
+        """
+        values: dict[str, Any] = {}
+        for axis, free in enumerate(self.free):
+            value = self.number(axis, point)
+            is_whole = free.low == int(free.low) and free.step == int(free.step)
+            listed = numbers_of(self._keys.get(free.key))
+            if listed:
+                values[free.key] = [round(value * number / max(listed), 2) for number in listed]
+            else:
+                values[free.key] = int(value) if is_whole else value
+        return values
+
+    def nearest(self) -> GridPoint:
+        """Return the point of the starting design, or the nearest to it in the space."""
+        steps = []
+        for free in self.free:
+            value: Any = self._keys.get(free.key)
+            listed = numbers_of(value)
+            at = max(listed) if listed else value
+            at = at if isinstance(at, int | float) else (free.low + free.high) / 2
+            steps.append(round((at - free.low) / free.step))
+        return self.inside(steps)
+
+    def inside(self, steps: list[int]) -> GridPoint:
+        """Return the point, or the nearest to it within the keys' ranges."""
+        return tuple(
+            min(max(at, low), high)
+            for at, low, high in zip(steps, self.lows, self.highs, strict=True)
+        )
+
+    def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
+        """Return the candidate at a point; one that would be the best so far has its rules checked.
+
+        Without ``checks_rules`` it has not: rules take most of the time.
+        """
+        if point not in self.trials:
+            self._tell(PROGRESS_LABEL, len(self.trials), self.tries)
+            candidate = evaluated(self.problem, self.values(point))
+            so_far = min(
+                (trial.rank for trial in self.trials.values() if trial.rules), default=None
+            )
+            if (
+                checks_rules
+                and not candidate.refused
+                and (so_far is None or candidate.rank < so_far)
+            ):
+                candidate = self.with_rules(candidate)
+            self.trials[point] = candidate
+        return self.trials[point]
+
+    def peek(self, point: GridPoint) -> Trial:
+        """Return the candidate at a point, also out of range; it does not count as a try."""
+        return self.trials.get(point) or evaluated(self.problem, self.values(point))
+
+    def is_excluded(self, axis: int, point: GridPoint) -> bool:
+        """Return True if a requirement on the key itself excludes its value at the point."""
+        key = self.free[axis].key
+        at = self.number(axis, point)
+        return any(
+            requirement.quantity.key == key and not requirement.holds(at)
+            for requirement in self.problem.requirements
+        )
+
+    def with_rules(self, trial: Trial) -> Trial:
+        """Return the candidate with its rules checked, unless they are known or it was refused."""
+        if trial.rules is not None or trial.refused:
+            return trial
+        return evaluated(self.problem, trial.values, with_rules=True)
+
+    def best(self) -> tuple[GridPoint, Trial]:
+        """Return the best candidate, rules checked; where they make it worse, the next is tried."""
+        while True:
+            best = min(self.trials, key=lambda point: self.trials[point].rank)
+            trial = self.trials[best]
+            if trial.rules is not None or trial.refused:
+                return best, trial
+            self.trials[best] = self.with_rules(trial)

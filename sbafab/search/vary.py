@@ -1,19 +1,19 @@
-"""Which keys are varied over which values, and the designs that come of it."""
+"""Keys varied over values: grids and Latin hypercubes of designs, and the free keys of a search."""
 
 from __future__ import annotations
 
 import itertools
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
-from sbafab.design.messages import key_paths, shown
-from sbafab.design.reading import override
-from sbafab.design.records import Design
+from sbafab.design.files import key_paths, override, shown
+from sbafab.design.records import Design, Free, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
+from sbafab.search.trial import numbers_of
 
 MOST_DESIGNS = 100_000
 MOST_VALUES = 10_000
@@ -39,22 +39,22 @@ class Varied:
 
 def read_varied(text: str, option: str = "--vary") -> Varied:
     """``KEY=START:STOP:STEP``, ``KEY=START:STOP`` or ``KEY=a,b,c``. Raises DesignError."""
-    key, equals, said = text.partition("=")
+    key, equals, values = text.partition("=")
     key = key.strip()
-    if not equals or not key or not said.strip():
-        raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_how(option)}")
-    if ":" in said:
-        return _range(key, said.split(":"), text, option)
+    if not equals or not key or not values.strip():
+        raise DesignError(f"{option} {shown(text)} is not KEY=VALUES; {_example(option)}")
+    if ":" in values:
+        return _range(key, values.split(":"), text, option)
     # A list in brackets is one value; what else a comma parts are several.
-    table = override({}, [f"values=[{said}]"])["values"]
+    table = override({}, [f"values=[{values}]"])["values"]
     if not isinstance(table, list):
-        table = [override({}, [f"value={one.strip()}"])["value"] for one in said.split(",")]
-    if any(isinstance(one, float) for one in table):
-        table = [float(one) if type(one) is int else one for one in table]
+        table = [override({}, [f"value={value.strip()}"])["value"] for value in values.split(",")]
+    if any(isinstance(value, float) for value in table):
+        table = [float(value) if type(value) is int else value for value in table]
     return _distinct(Varied(key, tuple(table)), text, option)
 
 
-def _how(option: str) -> str:
+def _example(option: str) -> str:
     more = " or --vary stack.balloons=3,6,9" if option == "--vary" else ""
     return f"write for example {option} chamber.diameter=4:8:0.5{more}"
 
@@ -65,7 +65,7 @@ def _range(key: str, parts: Sequence[str], text: str, option: str) -> Varied:
     except ValueError as error:
         raise DesignError(f"{option} {shown(text)}: START, STOP and STEP {error}") from None
     if len(ends) not in (2, 3):
-        raise DesignError(f"{option} {shown(text)} is not START:STOP:STEP; {_how(option)}")
+        raise DesignError(f"{option} {shown(text)} is not START:STOP:STEP; {_example(option)}")
     start, stop = ends[:2]
     if stop < start:
         raise DesignError(
@@ -83,8 +83,8 @@ def _range(key: str, parts: Sequence[str], text: str, option: str) -> Varied:
             "allowed; make STEP larger"
         )
     steps = [start + number * step for number in range(count)]
-    is_whole = all(one == one.to_integral_value() for one in (start, step))
-    return Varied(key, tuple(int(one) if is_whole else float(one) for one in steps))
+    is_whole = start == int(start) and step == int(step)
+    return Varied(key, tuple(int(value) if is_whole else float(value) for value in steps))
 
 
 def _exact(text: str) -> Decimal:
@@ -93,27 +93,31 @@ def _exact(text: str) -> Decimal:
 
 
 def _distinct(varied: Varied, text: str, option: str) -> Varied:
-    seen: list[Any] = []
+    distinct: list[Any] = []
     for value in varied.values:
-        if value in seen:
+        if value in distinct:
             raise DesignError(f"{option} {shown(text)} names {shown(value)} twice; once is enough")
-        seen.append(value)
+        distinct.append(value)
     return varied
 
 
 def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--vary") -> None:
     """Raises DesignError for a key that the design does not know, and for one varied twice."""
-    keys = [one.key for one in varied]
-    for one in varied:
-        if keys.count(one.key) > 1:
-            raise DesignError(f"{option} {one.key} is given twice; put all its values into one")
-        if one.key not in key_paths(type(design)):
+    keys = [varied_key.key for varied_key in varied]
+    for varied_key in varied:
+        if keys.count(varied_key.key) > 1:
+            raise DesignError(
+                f"{option} {varied_key.key} is given twice; put all its values into one"
+            )
+        if varied_key.key not in key_paths(type(design)):
             # Says which key may be meant.
-            design.with_({one.key: one.values[0] if one.values else one.low})
+            design.with_(
+                {varied_key.key: varied_key.values[0] if varied_key.values else varied_key.low}
+            )
         problems = []
-        for value in one.values or (one.low, one.high):
+        for value in varied_key.values or (varied_key.low, varied_key.high):
             try:
-                design.with_({one.key: value})
+                design.with_({varied_key.key: value})
             except DesignError as error:
                 problems.append(error)
             else:
@@ -124,22 +128,22 @@ def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--va
 
 def grid(varied: Sequence[Varied]) -> Iterator[Values]:
     """Every value of every key with every other's, the last key the fastest. Raises DesignError."""
-    for one in varied:
-        if one.is_continuous:
+    for varied_key in varied:
+        if varied_key.is_continuous:
+            option = f"--vary {varied_key.key}={varied_key.low:g}:{varied_key.high:g}"
             raise DesignError(
-                f"--vary {one.key}={one.low:g}:{one.high:g} has no step; add one, "
-                f"--vary {one.key}={one.low:g}:{one.high:g}:STEP, or draw from it with --samples N"
+                f"{option} has no step; add one, {option}:STEP, or draw from it with --samples N"
             )
     count = 1
-    for one in varied:
-        count *= len(one.values)
+    for varied_key in varied:
+        count *= len(varied_key.values)
     if count > MOST_DESIGNS:
         raise DesignError(
             f"the grid has {count:,} designs, and at most {MOST_DESIGNS:,} are allowed; take "
             "fewer values, or --samples N"
         )
-    names = [one.key for one in varied]
-    every = itertools.product(*(one.values for one in varied))
+    names = [varied_key.key for varied_key in varied]
+    every = itertools.product(*(varied_key.values for varied_key in varied))
     return (dict(zip(names, values, strict=True)) for values in every)
 
 
@@ -152,16 +156,16 @@ def latin_hypercube(varied: Sequence[Varied], samples: int, seed: int) -> Iterat
         raise DesignError(f"--samples {samples:,} must be at most {MOST_DESIGNS:,}")
     dice = random.Random(seed)
     columns = []
-    for one in varied:
+    for varied_key in varied:
         order = list(range(samples))
         dice.shuffle(order)
-        columns.append([_at(one, (place + dice.random()) / samples) for place in order])
-    names = [one.key for one in varied]
-    seen = set()
+        columns.append([_at(varied_key, (place + dice.random()) / samples) for place in order])
+    names = [varied_key.key for varied_key in varied]
+    drawn = set()
     for values in zip(*columns, strict=True):
         # Few values leave few combinations: each is one design.
-        if repr(values) not in seen:
-            seen.add(repr(values))
+        if repr(values) not in drawn:
+            drawn.add(repr(values))
             yield dict(zip(names, values, strict=True))
 
 
@@ -169,3 +173,54 @@ def _at(varied: Varied, share: float) -> Any:
     if varied.is_continuous:
         return round(varied.low + share * (varied.high - varied.low), DIGITS)
     return varied.values[int(share * len(varied.values))]
+
+
+# The keys that a search may change: ``KEY=LOW:HIGH:STEP``.
+
+
+def read_free(
+    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
+) -> tuple[Free, ...]:
+    """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
+
+    Keys that are ``given`` by hand stay as they are, but for lists, which are scaled as a whole;
+    what the design must fit gives its chamber. Raises DesignError.
+    """
+    keys = {key: value for key, value, _ in keys_of(design)}
+    assigned = [key for key in assigned if not numbers_of(keys.get(key))]
+    varied = [_stepped(text) for text in texts]
+    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
+    free = {free_key.key: free_key for free_key in design.free}
+    if any(key.startswith("fits.") for key in assigned):
+        free.pop("chamber.diameter", None)
+    for key in assigned:
+        free.pop(key, None)
+    for key in dict.fromkeys(fixed):
+        if key in assigned:
+            continue
+        if key not in free:
+            raise DesignError(
+                f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
+            )
+        del free[key]
+    # What is named is free whatever the requirements name.
+    free |= {free_key.key: free_key for free_key in varied}
+    if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
+        raise DesignError(
+            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
+            "search scales that list; leave it out, or give one diameter"
+        )
+    return tuple(free.values())
+
+
+def _stepped(text: str) -> Free:
+    stepped = read_varied(text, "--free")
+    numbers = [value for value in stepped.values if isinstance(value, int | float)]
+    parts = text.partition("=")[2].split(":")
+    if len(parts) != 3 or len(numbers) != len(stepped.values):
+        raise DesignError(
+            f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
+            "--free chamber.diameter=3:12:0.1"
+        )
+    step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
+    return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))

@@ -1,17 +1,23 @@
-"""What any simulator is asked for and gives back, and where to find it."""
+"""The interface of a simulator, its requests and results, and the processes that run it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal, Protocol, cast
+from typing import Any, Literal, NamedTuple, Protocol, cast
 
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
+from sbafab.meshing.surface import Vector
+from sbafab.process import Progress
 
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
@@ -22,11 +28,11 @@ MOST_PRESSURE = 1000.0
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What a simulator is asked for; None where its own default will do.
+class SimulationRequest:
+    """Settings of a simulation; None where the simulator's default will do.
 
     ``pressure`` in kPa for every chamber that ``chambers`` does not name; ``minutes`` is the most
-    real time a run may take. Which of the rest counts is said by each simulator's ``USES``:
+    real time a run may take. Each simulator's ``USES`` names the others that it reads:
     ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber.
     """
 
@@ -41,17 +47,17 @@ class Wish:
     volumes: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def given(self) -> list[str]:
-        """Names of the fields that not every simulator knows and that were said."""
+    def specific_fields(self) -> list[str]:
+        """Names of the set fields that not every simulator reads."""
         names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
         return [name for name in names if getattr(self, name) not in (None, {})]
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a run found: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
+    """Result of a run: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
 
-    ``stopped`` is one sentence if it ended early; what it found until then holds.
+    ``stopped`` is one sentence if it ended early; the results until then are valid.
     """
 
     rows: tuple[tuple[str, float, str], ...]
@@ -60,47 +66,51 @@ class Result:
 
 
 class Simulator(Protocol):
-    """The module ``simulator`` of a simulator's folder."""
+    """The module ``run`` of a simulator's folder."""
 
     USES: tuple[str, ...]
 
     def why_not(self, laminate: Laminate) -> str | None:
-        """The reason why there can be no input for a laminate, None if there can."""
+        """Return the reason why there can be no input for a laminate, or None."""
 
-    def export(self, laminate: Laminate, wish: Wish, folder: Path) -> None:
-        """Writes what the simulator reads, with all that it loads."""
+    def export(self, laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
+        """Write the simulator's input, with all that it loads."""
 
-    def run(self, laminate: Laminate, wish: Wish, folder: Path, tell: Progress) -> Result:
-        """Writes it, runs it, and reads back what it found."""
+    def run(
+        self, laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress
+    ) -> Result:
+        """Write the input, run it, and read the results back."""
 
 
 def simulator(name: Name) -> Simulator:
-    """The simulator of that name; what it imports is loaded only now."""
-    return cast(Simulator, import_module(f"sbafab.simulators.{name}.simulator"))
+    """Return the simulator of that name; its imports are loaded only now."""
+    return cast(Simulator, import_module(f"sbafab.simulators.{name}.run"))
 
 
 def users(field_name: str) -> list[str]:
-    """The simulators that use a field of a wish."""
+    """Return the simulators that use a field of a request."""
     return [name for name in NAMES if field_name in simulator(name).USES]
 
 
 def chamber_pressures(
-    names: Sequence[str], wish: Wish, usual: float, most: float = MOST_PRESSURE
+    names: Sequence[str], request: SimulationRequest, default: float, most: float = MOST_PRESSURE
 ) -> dict[str, float]:
-    """Pressure in kPa of every chamber: those named, and ``wish.pressure`` in the others.
+    """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 
-    With nothing said it is the ``usual`` one in all of them; with single ones only, 0 in the
-    others. Raises DesignError for a chamber that is not there and a pressure out of range.
+    Without any it is the ``default`` in all of them; with single ones only, 0 in the others. Raises
+    DesignError for a chamber that is not there and a pressure out of range.
     """
-    refuse_unknown(names, wish.chambers, "pressure")
-    in_all = (0.0 if wish.chambers else usual) if wish.pressure is None else wish.pressure
-    found = {name: wish.chambers.get(name, in_all) for name in names}
-    for name, value in found.items():
+    refuse_unknown(names, request.chambers, "pressure")
+    in_all = (
+        (0.0 if request.chambers else default) if request.pressure is None else request.pressure
+    )
+    pressures = {name: request.chambers.get(name, in_all) for name in names}
+    for name, value in pressures.items():
         if not (math.isfinite(value) and 0 <= value <= most):
             raise DesignError(f"pressure of {name} = {value:g} kPa must be from 0 to {most:g} kPa")
-    if not any(found.values()):
+    if not any(pressures.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
-    return found
+    return pressures
 
 
 def refuse_time(seconds: float, least: float) -> None:
@@ -111,11 +121,123 @@ def refuse_time(seconds: float, least: float) -> None:
         )
 
 
-def refuse_unknown(names: Sequence[str], given: Mapping[str, float], what: str) -> None:
+def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantity: str) -> None:
     """Raises DesignError for a chamber that is not there."""
-    unknown = next((name for name in given if name not in names), None)
+    unknown = next((name for name in requested if name not in names), None)
     if unknown is not None:
         raise DesignError(
-            f"{what} names chamber {unknown}, which is not there; "
+            f"{quantity} names chamber {unknown}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
+
+
+# A program started, watched, and stopped after its time or on an interrupt.
+
+
+LOOK_EVERY = 0.1
+"""s between two looks at how far a run is."""
+STOP_WITHIN = 10.0
+"""s that a program has to end by itself before it is killed."""
+INTERRUPTED = "it was interrupted"
+OUT_OF_TIME = "it was stopped after"
+
+
+class Ended(NamedTuple):
+    """End of a program: its exit code, and why it was stopped, None if it ended by itself."""
+
+    code: int
+    stopped: str | None
+
+
+def program_path(name: str, install: str) -> str:
+    """Path of an installed program. Raises OutputError that says how to ``install`` it."""
+    path = shutil.which(name)
+    if path is None:
+        raise OutputError(f"{name} was not found; {install}")
+    return path
+
+
+def run_program(
+    command: Sequence[str],
+    log: Path,
+    limit: float | None,
+    look: Callable[[], None],
+) -> Ended:
+    """Run a command in the folder of its ``log``, which takes what it prints.
+
+    ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
+    stop the run, not the program that started it, so that partial results can be kept. One
+    thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError where it cannot be started.
+    """
+    began = time.monotonic()
+    stopped: str | None = None
+    with log.open("wb") as opened:
+        try:
+            # In a session of its own: the command may be a script that starts the real program.
+            process = subprocess.Popen(
+                command,
+                cwd=log.parent,
+                stdin=subprocess.DEVNULL,
+                stdout=opened,
+                stderr=subprocess.STDOUT,
+                env={"OMP_NUM_THREADS": "1", **os.environ},
+                start_new_session=True,
+            )
+        except OSError as reason:
+            raise OutputError(
+                f"{command[0]} could not be started ({reason.strerror}); see whether it is a "
+                "program that runs on this machine"
+            ) from reason
+        try:
+            while stopped is None:
+                try:
+                    process.wait(LOOK_EVERY)
+                    break
+                except subprocess.TimeoutExpired:
+                    look()
+                if limit is not None and time.monotonic() - began >= limit:
+                    stopped = f"{OUT_OF_TIME} {limit / 60:g} minutes"
+        except KeyboardInterrupt:
+            # Hours of computing are not thrown away with the rest of them.
+            stopped = INTERRUPTED
+        finally:
+            _end(process)
+    return Ended(process.returncode, stopped)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ends the program and what it started."""
+    for number in (signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)):
+        if process.poll() is not None:
+            return
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, number)
+        else:
+            process.terminate()
+        try:
+            process.wait(STOP_WITHIN)
+        except subprocess.TimeoutExpired:
+            continue
+
+
+# Place and lean of the tip, from the nodes that mark it.
+
+
+@dataclass(frozen=True)
+class Tip:
+    """The tip at a time in s: its place in mm, and how far it leans off the axis in degrees."""
+
+    time: float
+    place: Vector
+    tilt: float
+
+
+def tip_at(time: float, points: Sequence[Vector]) -> Tip:
+    """The mean of points that go round it, and the lean of their polygon's normal."""
+    x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True))
+    nx = ny = nz = 0.0
+    for (ax, ay, az), (bx, by, bz) in zip(points, [*points[1:], points[0]], strict=True):
+        nx += ay * bz - az * by
+        ny += az * bx - ax * bz
+        nz += ax * by - ay * bx
+    return Tip(time, (x, y, z), math.degrees(math.atan2(math.hypot(nx, ny), nz)))

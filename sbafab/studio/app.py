@@ -1,17 +1,28 @@
-"""The studio's routes."""
+"""The studio's web server: guard, routes, links with designs, and its start.
+
+It listens on this machine only. A page of another site cannot read its answers: Host must be this
+machine by number or name (so a name that is rebound to it is refused), Origin must be its own, and
+all that knows of designs takes the token of the link in a header, which no form or image can send.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import binascii
 import contextlib
+import hmac
 import json
 import secrets
 import shutil
+import socket
 import tempfile
-from collections.abc import AsyncIterator
+import zlib
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from urllib.parse import parse_qs, urlsplit
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -19,15 +30,157 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sbafab import api
-from sbafab.errors import SbafabError
+from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
 from sbafab.process import processors
-from sbafab.studio import places, requested
-from sbafab.studio.guard import Guard, TooLongError, no_room
-from sbafab.studio.made import Made, zipped
+from sbafab.studio import forms, places
+from sbafab.studio.places import RunFolder, zipped
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
+
+HERE = ("127.0.0.1", "localhost", "[::1]")
+TOKEN_HEADER = b"x-sbafab-token"
+MOST_BODY = 2_000_000
+MOST_AT_ONCE = 64
+"""Requests that are read and answered at a time: at most 128 MB of them."""
+PAGE_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+    "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+MADE_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src 'self' "
+    "data:; sandbox allow-scripts allow-modals; frame-ancestors 'self'; base-uri 'none'; "
+    "form-action 'none'"
+)
+"""For pages that a run wrote: alone in a box, with no way to the studio or to any host."""
+
+
+class Guard:
+    """Refuses what does not come from the studio's own page, and bounds what it may send."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self.app, self.token = app, token.encode()
+        self.at_once = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+        refused = self.refusal(scope)
+        if refused is not None:
+            status, why = refused
+            await JSONResponse({"kind": "refused", "message": why}, status)(scope, receive, send)
+            return
+        if self.at_once >= MOST_AT_ONCE:
+            await no_room()(scope, receive, send)
+            return
+        policy = MADE_POLICY if scope["path"].startswith("/made/") else PAGE_POLICY
+        self.at_once += 1
+        try:
+            await self.app(scope, _bounded(receive), _with_headers(send, policy))
+        finally:
+            self.at_once -= 1
+
+    def refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """Status and reason why a request is not answered."""
+        headers: dict[bytes, bytes] = dict(scope["headers"])
+        host = headers.get(b"host", b"").decode("latin-1")
+        if host.rpartition(":")[0] not in HERE and host not in HERE:
+            return 403, f"the studio answers to {HERE[0]} only; open the link that it printed"
+        origin = headers.get(b"origin")
+        if origin is not None and urlsplit(origin.decode("latin-1")).netloc != host:
+            return 403, "this request comes from another site"
+        if headers.get(b"sec-fetch-site", b"same-origin") == b"cross-site" and _is_call(scope):
+            return 403, "this request comes from another site"
+        if _is_call(scope) and not hmac.compare_digest(headers.get(TOKEN_HEADER, b""), self.token):
+            return 401, "the link is not this studio's; open the one that sbafab studio printed"
+        length = headers.get(b"content-length", b"0")
+        if not length.isdigit() or int(length) > MOST_BODY:
+            return 413, f"a request holds at most {MOST_BODY:,} bytes"
+        return None
+
+
+def no_room() -> JSONResponse:
+    """The answer where too much is asked at once; it is given before any other has begun."""
+    message = "too many requests at once; wait a moment, or close some tabs of the studio"
+    return JSONResponse({"kind": "error", "message": message}, 503, {"retry-after": "1"})
+
+
+def _is_call(scope: Scope) -> bool:
+    return str(scope["path"]).startswith("/api/")
+
+
+class TooLongError(Exception):
+    """A body without a length that grew past the limit."""
+
+
+def _bounded(receive: Receive) -> Receive:
+    total = 0
+
+    async def bounded() -> Message:
+        nonlocal total
+        message = await receive()
+        total += len(message.get("body", b""))
+        if total > MOST_BODY:
+            raise TooLongError
+        return message
+
+    return bounded
+
+
+def _with_headers(send: Send, policy: str) -> Send:
+    security = (
+        (b"content-security-policy", policy.encode()),
+        (b"x-content-type-options", b"nosniff"),
+        (b"referrer-policy", b"no-referrer"),
+        (b"cross-origin-opener-policy", b"same-origin"),
+        (b"cross-origin-resource-policy", b"same-origin"),
+        (b"cache-control", b"no-store"),
+    )
+
+    async def with_headers(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message = {**message, "headers": [*message["headers"], *security]}
+        await send(message)
+
+    return with_headers
+
+
+# Links with a design: its text, packed into the fragment.
+
+
+MOST = 1_000_000
+
+
+def design_in(link: str) -> str:
+    """The design's text in a link. Raises DesignError where there is none."""
+    packed = parse_qs(urlsplit(link).fragment).get("design", [""])[0]
+    try:
+        raw = base64.b64decode(packed + "=" * (-len(packed) % 4), b"-_", validate=True)
+        reader = zlib.decompressobj(-zlib.MAX_WBITS)
+        text = reader.decompress(raw, MOST)
+        if not packed or reader.unconsumed_tail or reader.unused_data or not reader.eof:
+            raise ValueError("cut off")
+        return text.decode("utf-8")
+    except (ValueError, binascii.Error, zlib.error):
+        raise DesignError(
+            "the link holds no design; copy it whole, up to its last letter"
+        ) from None
+
+
+def packed(text: str) -> str:
+    """Return the text as it follows ``design=`` in a link."""
+    squeezer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    raw = squeezer.compress(text.encode("utf-8")) + squeezer.flush()
+    return base64.urlsafe_b64encode(raw).decode("ascii").rstrip("=")
+
+
+# The studio's routes.
+
 
 STATIC = Path(__file__).parent / "static"
 LIVE_SECONDS, MAKE_SECONDS = 60.0, 900.0
@@ -39,7 +192,7 @@ MOST_MADE = 6
 
 @dataclass
 class Studio:
-    """What the routes share: the chosen folder, the workers and the folders that runs wrote."""
+    """State that the routes share: the chosen folder, the workers and the folders of runs."""
 
     folder: Path
     token: str
@@ -55,7 +208,7 @@ class Studio:
     maker: WorkerPool = field(
         default_factory=lambda: WorkerPool(MAKE_SECONDS, _processes(), False, MAKE_SECONDS)
     )
-    made: dict[str, Made] = field(default_factory=dict)
+    made: dict[str, RunFolder] = field(default_factory=dict)
     scratch: Path = field(default_factory=lambda: Path(tempfile.mkdtemp(prefix="sbafab-studio-")))
 
     @contextlib.asynccontextmanager
@@ -90,14 +243,14 @@ def app(studio: Studio) -> Starlette:
         Route("/made/{key}/{path:path}", made_file),
         Mount("/", StaticFiles(directory=STATIC, html=True)),
     ]
-    made = Starlette(
+    application = Starlette(
         routes=routes,
         middleware=[Middleware(Guard, token=studio.token)],
         exception_handlers={SbafabError: _refused, BusyError: _busy, TooLongError: _too_long},
         lifespan=studio.lifespan,
     )
-    made.state.studio = studio
-    return made
+    application.state.studio = studio
+    return application
 
 
 def _studio(request: Request) -> Studio:
@@ -119,9 +272,7 @@ async def _too_long(_: Request, __: Exception) -> Response:
 
 async def start(request: Request) -> Response:
     studio = _studio(request)
-    return JSONResponse(
-        requested.started(studio.folder, studio.opened, studio.text, studio.template)
-    )
+    return JSONResponse(forms.started(studio.folder, studio.opened, studio.text, studio.template))
 
 
 async def template(request: Request) -> Response:
@@ -135,10 +286,10 @@ async def opened_file(request: Request) -> Response:
 
 
 async def save(request: Request) -> Response:
-    asked = await _asked(request)
-    path = places.design_file(_studio(request).folder, str(asked.get("name", "")))
-    seen = asked.get("seen")
-    sha = places.save(path, str(asked.get("text", "")), None if seen is None else str(seen))
+    table = await _request_table(request)
+    path = places.design_file(_studio(request).folder, str(table.get("name", "")))
+    expected = table.get("seen")
+    sha = places.save(path, str(table.get("text", "")), None if expected is None else str(expected))
     return JSONResponse({"sha": sha})
 
 
@@ -158,39 +309,39 @@ async def watch(request: Request) -> Response:
 
 
 async def live(request: Request) -> Response:
-    return await _worked(request, _studio(request).live, "live")
+    return await _answered(request, _studio(request).live, "live")
 
 
 async def elastic(request: Request) -> Response:
-    return await _worked(request, _studio(request).mover, "elastic")
+    return await _answered(request, _studio(request).mover, "elastic")
 
 
 async def motion(request: Request) -> Response:
-    return await _worked(request, _studio(request).mover, "motion")
+    return await _answered(request, _studio(request).mover, "motion")
 
 
 async def generate(request: Request) -> Response:
     """Runs generate, into the chosen folder's ``out`` or into a folder of the studio's own."""
-    studio, asked = _studio(request), await _asked(request)
+    studio, table = _studio(request), await _request_table(request)
     key = secrets.token_urlsafe(16)
-    out = studio.folder / "out" if asked.get("keep") else studio.scratch / key
-    job = {**requested.job(studio.folder, asked), "do": "generate", "out": str(out)}
-    wish = studio.maker.ask((job["tab"], "generate"), job)
+    out = studio.folder / "out" if table.get("keep") else studio.scratch / key
+    job = {**forms.job(studio.folder, table), "do": "generate", "out": str(out)}
+    waiting = studio.maker.ask((job["tab"], "generate"), job)
 
-    async def told() -> AsyncIterator[bytes]:
-        async for line in wish.lines():
+    async def lines() -> AsyncIterator[bytes]:
+        async for line in waiting.lines():
             answer = json.loads(line)
             if answer["kind"] == "made":
-                _keep(studio, key, Made(out / answer["name"], answer["name"]))
+                _remember(studio, key, RunFolder(out / answer["name"], answer["name"]))
                 yield json.dumps({**answer, "key": key}).encode() + b"\n"
             else:
                 yield line + b"\n"
 
-    return _Lines(told(), studio.maker, wish)
+    return _Lines(lines(), studio.maker, waiting)
 
 
-def _keep(studio: Studio, key: str, made: Made) -> None:
-    studio.made[key] = made
+def _remember(studio: Studio, key: str, run: RunFolder) -> None:
+    studio.made[key] = run
     while len(studio.made) > MOST_MADE:
         oldest = next(iter(studio.made))
         folder = studio.made.pop(oldest).folder
@@ -199,30 +350,30 @@ def _keep(studio: Studio, key: str, made: Made) -> None:
 
 
 async def made_file(request: Request) -> Response:
-    made = _studio(request).made.get(request.path_params["key"])
-    path = made.file(request.path_params["path"]) if made else None
+    run = _studio(request).made.get(request.path_params["key"])
+    path = run.file(request.path_params["path"]) if run else None
     return FileResponse(path) if path else Response(status_code=404)
 
 
 async def made_zip(request: Request) -> Response:
-    made = _studio(request).made.get(request.path_params["key"])
-    if made is None:
+    run = _studio(request).made.get(request.path_params["key"])
+    if run is None:
         return Response(status_code=404)
-    content = await asyncio.to_thread(zipped, made)
-    headers = {"content-disposition": f'attachment; filename="{made.name}.zip"'}
+    content = await asyncio.to_thread(zipped, run)
+    headers = {"content-disposition": f'attachment; filename="{run.name}.zip"'}
     return Response(content, media_type="application/zip", headers=headers)
 
 
-async def _worked(request: Request, pool: WorkerPool, do: str) -> Response:
-    studio, asked = _studio(request), await _asked(request)
-    job = {**requested.job(studio.folder, asked), "do": do}
-    wish = pool.ask((job["tab"], do), job)
+async def _answered(request: Request, pool: WorkerPool, do: str) -> Response:
+    studio, table = _studio(request), await _request_table(request)
+    job = {**forms.job(studio.folder, table), "do": do}
+    waiting = pool.ask((job["tab"], do), job)
 
     async def lines() -> AsyncIterator[bytes]:
-        async for answer in wish.lines():
+        async for answer in waiting.lines():
             yield answer + b"\n"
 
-    return _Lines(lines(), pool, wish)
+    return _Lines(lines(), pool, waiting)
 
 
 class _Lines(StreamingResponse):
@@ -234,19 +385,111 @@ class _Lines(StreamingResponse):
         self,
         content: AsyncIterator[bytes],
         pool: WorkerPool | None = None,
-        wish: WaitingJob | None = None,
+        job: WaitingJob | None = None,
     ) -> None:
         super().__init__(content)
-        self.pool, self.wish = pool, wish
+        self.pool, self.job = pool, job
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
         finally:
             # Also where the reader was gone before the first line was asked for.
-            if self.pool is not None and self.wish is not None:
-                self.pool.forget(self.wish)
+            if self.pool is not None and self.job is not None:
+                self.pool.forget(self.job)
 
 
-async def _asked(request: Request) -> dict[str, Any]:
-    return requested.table(await request.body())
+async def _request_table(request: Request) -> dict[str, Any]:
+    return forms.table(await request.body())
+
+
+# Start of the studio: design, port and link.
+
+
+ADDRESS = "127.0.0.1"
+PORT = 8417
+"""Tried first, so that a link that was kept finds the studio again."""
+
+
+class StudioStart(NamedTuple):
+    """The folder that the studio is for, and the design that it opens with, if one was named."""
+
+    folder: Path
+    file: str | None = None
+    """A design file of the folder."""
+    text: str | None = None
+    """A design from a link."""
+    template: str | None = None
+
+
+def opened(source: str | None) -> StudioStart:
+    """Return the folder and design that the studio opens.
+
+    ``source`` is a file, a folder, a template's name, a link that holds a design, or None for the
+    current folder. Raises DesignError.
+    """
+    if source is None:
+        return StudioStart(Path.cwd())
+    if source.startswith(("http://", "https://")):
+        return StudioStart(Path.cwd(), text=design_in(source))
+    if source in api.templates():
+        return StudioStart(Path.cwd(), template=source)
+    path = Path(source)
+    if path.is_dir():
+        return StudioStart(path.resolve())
+    if not path.is_file():
+        raise DesignError(
+            f"{source} is not a design file, folder, template or link; the templates are "
+            f"{', '.join(api.templates())}"
+        )
+    folder = path.resolve().parent
+    return StudioStart(folder, places.design_file(folder, path.name).name)
+
+
+def listening(port: int | None) -> socket.socket:
+    """A socket on this machine alone, at the port or, if none is asked for, at a free one."""
+    for number in (PORT, 0) if port is None else (port,):
+        # Only of a socket whose protocol is named does asyncio send small answers at once; others
+        # wait 40 ms for the browser to acknowledge what came before.
+        sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            sock.bind((ADDRESS, number))
+            # From now on a browser waits for the server, which is not up yet.
+            sock.listen(64)
+            return sock
+        except OSError as error:
+            sock.close()
+            reason = error.strerror
+    raise OutputError(f"port {port} cannot be used ({reason}); leave out --port to take a free one")
+
+
+def serve(source: str | None, port: int | None, announce: Callable[[str], None]) -> None:
+    """Serves the studio until Ctrl-C; ``announce`` gets the link.
+
+    Raises DesignError, OutputError, and Stopped at the end.
+    """
+    try:
+        import uvicorn
+
+    except ImportError as error:
+        raise DesignError(
+            f'{error.name} is not installed; add it with pip install "sbafab[studio]"'
+        ) from None
+    folder, name, text, template = opened(source)
+    studio = Studio(folder, secrets.token_urlsafe(24), name, text, template)
+    sock = listening(port)
+    announce(f"http://{ADDRESS}:{sock.getsockname()[1]}/#token={studio.token}")
+    config = uvicorn.Config(
+        app(studio),
+        log_level="warning",
+        ws="none",
+        server_header=False,
+        lifespan="on",
+        timeout_graceful_shutdown=1,
+    )
+    try:
+        # It ends in order at a signal and then raises it once more.
+        uvicorn.Server(config).run(sockets=[sock])
+    except KeyboardInterrupt as stop:
+        raise Stopped("the studio has stopped", *stop.args) from None

@@ -43,22 +43,22 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
 
 
 def _has_table(table: Any, parts: list[str]) -> bool:
-    """Whether the table that the key goes into is there already."""
+    """Return True if the table of the key exists."""
     for part in parts[:-1]:
         table = table.get(part) if isinstance(table, MutableMapping) else None
     return isinstance(table, MutableMapping)
 
 
 def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:
-    """Whether the text that the document writes says what the document does at the key."""
+    """Return True if the written text has the document's value at the key."""
     try:
         written: Any = tomllib.loads(tomlkit.dumps(document))
-        meant: Any = document.unwrap()
+        intended: Any = document.unwrap()
         for part in parts:
-            written, meant = written[part], meant[part]
+            written, intended = written[part], intended[part]
     except (tomllib.TOMLDecodeError, KeyError, TypeError):
         return False
-    return bool(written == meant)
+    return bool(written == intended)
 
 
 def _value(key: str, text: str) -> Any:

@@ -1,10 +1,16 @@
-"""The form of a family from the JSON schema: one flat list of fields, in the file's order."""
+"""The form of each family from the JSON schema, and the requests of the page."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
+
+from sbafab import __version__, api
+from sbafab.errors import SbafabError
+from sbafab.studio import places
 
 PLACING = ("on", "at", "angle", "turn", "along", "offset", "glue", "note")
 """Keys of a part that say where it sits; its form ends with them."""
@@ -43,7 +49,7 @@ UNITS = (
 
 def families(schema: JsonSchema) -> dict[str, list[Field]]:
     """The fields of every family of single designs."""
-    found = {}
+    fields_of = {}
     for record in schema["oneOf"]:
         table = _named(record["$ref"], schema)
         name = (
@@ -51,14 +57,14 @@ def families(schema: JsonSchema) -> dict[str, list[Field]]:
         )
         if name != "assembly":
             fields = list(_fields(table, schema, ""))
-            found[name] = sorted(fields, key=_rank)
-    return found
+            fields_of[name] = sorted(fields, key=_rank)
+    return fields_of
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
     """The fields of an assembly, and by kind those of a part, whose keys start at its table."""
     table = _named("Assembly", schema)
-    own = sorted(_fields(table, schema, ""), key=_rank)
+    assembly_fields = sorted(_fields(table, schema, ""), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
     kinds = {}
     for kind, reference in parts["discriminator"]["mapping"].items():
@@ -70,12 +76,12 @@ def assembly(schema: JsonSchema) -> dict[str, Any]:
             "fields": sorted(fields, key=lambda field: field["key"] in PLACING),
             "needs": [field["key"] for field in fields if field["key"] in needed],
         }
-    return {"fields": own, "kinds": kinds}
+    return {"fields": assembly_fields, "kinds": kinds}
 
 
 def keys(schema: JsonSchema) -> set[str]:
     """Every dotted key of any family, and those of an assembly itself."""
-    fields = [field for own in families(schema).values() for field in own]
+    fields = [field for group in families(schema).values() for field in group]
     return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
 
@@ -87,28 +93,28 @@ def _rank(field: Field) -> int:
 
 
 def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Field]:
-    for name, own in table["properties"].items():
-        reference = own.get("$ref") or _single(own) or _optional(own)
+    for name, rule in table["properties"].items():
+        reference = rule.get("$ref") or _single(rule) or _optional(rule)
         if reference is not None:
             inner = _named(reference, schema)
             if "properties" in inner:
                 yield from _fields(inner, schema, f"{prefix}{name}.")
             continue
         key = prefix + name
-        if key != "family" and own.get("type") != "object":
-            yield _field(key, own)
+        if key != "family" and rule.get("type") != "object":
+            yield _field(key, rule)
 
 
-def _field(key: str, own: JsonSchema) -> Field:
-    ways = own.get("anyOf", [own])
+def _field(key: str, rule: JsonSchema) -> Field:
+    ways = rule.get("anyOf", [rule])
     kinds = [way.get("type") for way in ways]
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
     is_length = number is not None and any("pattern" in way for way in ways)
     choices = next((way["enum"] for way in ways if "enum" in way), None)
     field: Field = {
         "key": key,
-        "meaning": " ".join(own.get("description", "").split()),
-        "default": own.get("default"),
+        "meaning": " ".join(rule.get("description", "").split()),
+        "default": rule.get("default"),
         "unit": "mm" if is_length else _unit(key),
         "kind": _kind(kinds, choices),
         "list": "array" in kinds,
@@ -116,8 +122,8 @@ def _field(key: str, own: JsonSchema) -> Field:
     }
     if choices:
         field["choices"] = choices
-    if "items" in own and "enum" in own["items"]:
-        field["choices"], field["kind"] = own["items"]["enum"], "set"
+    if "items" in rule and "enum" in rule["items"]:
+        field["choices"], field["kind"] = rule["items"]["enum"], "set"
     if number is not None:
         field["least"] = number.get("minimum", number.get("exclusiveMinimum"))
         field["most"] = number.get("maximum", number.get("exclusiveMaximum"))
@@ -142,18 +148,108 @@ def _unit(key: str) -> str:
     return next((unit for pattern, unit in UNITS if pattern.search(key)), "")
 
 
-def _single(own: JsonSchema) -> str | None:
+def _single(rule: JsonSchema) -> str | None:
     """The reference of a key that is one table, whatever stands beside it."""
-    ways = own.get("allOf") or []
+    ways = rule.get("allOf") or []
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
-def _optional(own: JsonSchema) -> str | None:
+def _optional(rule: JsonSchema) -> str | None:
     """The reference of a table that may be left out whole."""
-    ways = [way for way in own.get("anyOf") or [] if way.get("type") != "null"]
+    ways = [way for way in rule.get("anyOf") or [] if way.get("type") != "null"]
     return ways[0].get("$ref") if len(ways) == 1 else None
 
 
 def _named(reference: str, schema: JsonSchema) -> JsonSchema:
-    found: JsonSchema = schema["$defs"][reference.rpartition("/")[2]]
-    return found
+    definition: JsonSchema = schema["$defs"][reference.rpartition("/")[2]]
+    return definition
+
+
+# Requests of the page, answered by a server or by Python in the page.
+
+
+SURROGATE = re.compile("[\ud800-\udfff]")
+"""Half of a character as JSON may write it alone; no file in UTF-8 can hold it."""
+
+
+def started(
+    folder: Path | None,
+    opened: str | None = None,
+    text: str | None = None,
+    template: str | None = None,
+) -> Any:
+    """Return the first answer to the page; without ``folder`` there is no disk to read from.
+
+    ``opened`` names a file of the folder, ``text`` is a link's design, ``template`` a template.
+    """
+    schema = api.schema()
+    return {
+        "version": __version__,
+        "folder": str(folder or ""),
+        "opened": opened,
+        "text": text,
+        "template": template,
+        "files": places.listed(folder) if folder else [],
+        "templates": api.templates(),
+        "families": families(schema),
+        "assembly": assembly(schema),
+    }
+
+
+def table(body: bytes | str) -> dict[str, Any]:
+    """The table that a request holds. Raises SbafabError where it is none."""
+    try:
+        parsed = json.loads(body)
+    except (ValueError, RecursionError):
+        parsed = None
+    if not isinstance(parsed, dict):
+        raise SbafabError("the request is not a table in JSON")
+    _refuse_surrogates(parsed)
+    return parsed
+
+
+def _refuse_surrogates(parsed: dict[str, Any]) -> None:
+    text = parsed.get("text")
+    half = SURROGATE.search(text) if isinstance(text, str) else None
+    if half is not None:
+        line = half.string.count("\n", 0, half.start()) + 1
+        raise SbafabError(
+            f"line {line} of the text holds half a character (U+{ord(half[0]):04X}), which no file "
+            "can; delete it and type it again"
+        )
+    try:
+        json.dumps(parsed, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise SbafabError(
+            f"the request holds half a character (U+{ord(error.object[error.start]):04X}), which "
+            "no file can; delete it and type it again"
+        ) from None
+
+
+def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
+    """Return the job of a request: design text, edits, and places that the page cannot choose.
+
+    Raises SbafabError.
+    """
+    edits = request.get("edits") or []
+    good = isinstance(edits, list) and all(
+        isinstance(edit, list)
+        and len(edit) == 2
+        and isinstance(edit[0], str)
+        and (edit[1] is None or isinstance(edit[1], str))
+        for edit in edits
+    )
+    if not good or not isinstance(request.get("text"), str):
+        raise SbafabError("a request holds a text, and edits as [key, value]")
+    name = request.get("name")
+    path = name if isinstance(name, str) and name.endswith(".toml") and "/" not in name else None
+    has = request.get("has") or []
+    return {
+        "tab": str(request.get("tab", ""))[:40],
+        "text": request["text"],
+        "edits": [(key, value) for key, value in edits],
+        "has": [key for key in has if isinstance(key, str)] if isinstance(has, list) else [],
+        "folder": str(folder),
+        "path": path or "design.toml",
+        "pose": request.get("pose"),
+    }

@@ -17,8 +17,8 @@ from typing import Any
 
 from sbafab import api
 from sbafab.errors import SbafabError
-from sbafab.studio import answering, requested
-from sbafab.studio.made import Made, zipped
+from sbafab.studio import forms, jobs
+from sbafab.studio.places import RunFolder, zipped
 
 FOLDER = Path("/studio")
 """Where a design would lie; there is nothing in it that one could refer to."""
@@ -29,9 +29,9 @@ JOBS = {
     "/api/generate": "cut",
 }
 """Paths that are answered line by line; what generate writes beside cut files takes a computer."""
-WISHED = ("numpy",)
+OPTIONAL = ("numpy",)
 """Modules that the page may have been made without."""
-_MADE: dict[str, Made] = {}
+_RUNS: dict[str, RunFolder] = {}
 
 
 def answers(
@@ -45,43 +45,43 @@ def answers(
         for answer in _answered(path, body, tell):
             yield json.dumps(answer, separators=(",", ":"))
     except SbafabError as error:
-        yield json.dumps(answering.refusal(str(error)))
+        yield json.dumps(jobs.refusal(str(error)))
 
 
 def _answered(path: str, body: str, tell: Callable[[str], None] | None) -> Iterator[dict[str, Any]]:
     if path == "/api/start":
-        lacks = [name for name in WISHED if importlib.util.find_spec(name) is None]
-        yield {**requested.started(None), "lacks": lacks}
+        lacks = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
+        yield {**forms.started(None), "lacks": lacks}
     elif path.startswith("/api/template/"):
         yield {"text": api.template(path.rpartition("/")[2])}
     elif path in JOBS:
         FOLDER.mkdir(exist_ok=True)
-        job = {**requested.job(FOLDER, requested.table(body)), "do": JOBS[path]}
+        job = {**forms.job(FOLDER, forms.table(body)), "do": JOBS[path]}
         if tell is not None:
             job["tell"] = lambda answer: tell(json.dumps(answer))
-        yield from _cut(job) if path == "/api/generate" else answering.answers(job, _never)
+        yield from _cut(job) if path == "/api/generate" else jobs.answers(job, _never)
     else:
         raise SbafabError(f"a page without a server does not answer {path}")
 
 
 def _cut(job: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The answers of a cut; what an earlier one wrote is gone."""
-    _MADE.clear()
+    _RUNS.clear()
     # The page's memory has no file locks; nobody else writes there.
     warnings.filterwarnings("ignore", "only soft file lock")
     shutil.rmtree(OUT, ignore_errors=True)
-    for answer in answering.answers({**job, "out": str(OUT)}, _never):
+    for answer in jobs.answers({**job, "out": str(OUT)}, _never):
         if answer["kind"] == "made":
             key = secrets.token_hex(8)
-            _MADE[key] = Made(OUT / answer["name"], answer["name"])
+            _RUNS[key] = RunFolder(OUT / answer["name"], answer["name"])
             answer["key"] = key
         yield answer
 
 
-def made(path: str) -> bytes | None:
+def made_bytes(path: str) -> bytes | None:
     """A file of the last run, or all of it as ``KEY.zip``; None for any other path."""
     key, _, name = path.removeprefix("/made/").partition("/")
-    run = _MADE.get(key.removesuffix(".zip"))
+    run = _RUNS.get(key.removesuffix(".zip"))
     if run is None:
         return None
     if not name:

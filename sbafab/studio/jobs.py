@@ -1,11 +1,13 @@
-"""What the page asks for, worked out in a process of its own: each job yields its answers.
+"""The jobs of the page: each yields its answers.
 
-A job is a table with ``do`` and the text of a design; ``beat`` raises where the answer is no longer
-wanted. Files are looked for in ``folder`` alone.
+A job is a table with ``do`` and the text of a design; ``pause`` raises where the answer is no
+longer needed. Files are looked for in ``folder`` alone.
 """
 
 from __future__ import annotations
 
+import sys
+import traceback
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -15,17 +17,24 @@ from sbafab import api
 from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
-from sbafab.studio.model import Beat, finding_model, laminate_model
-from sbafab.studio.moving import Filling, poses, stack_model, stack_of
-from sbafab.studio.moving_parts import moving_parts, part_poses, whole_prediction
-from sbafab.studio.parts import parts_model
+from sbafab.studio.forms import keys
+from sbafab.studio.model import CancelCheck, finding_model, laminate_model, parts_model
+from sbafab.studio.moving import (
+    Filling,
+    moving_parts,
+    part_poses,
+    poses,
+    stack_model,
+    stack_of,
+    whole_prediction,
+)
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
-    from sbafab.output.run import Run
+    from sbafab.runs.run import Run
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
@@ -34,34 +43,34 @@ MOST_FILLINGS = 8
 """Tabs whose actuators fill at the same time."""
 
 
-def live(job: StudioJob, beat: Beat) -> Iterator[Answer]:
+def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     """Text after the edits and design, then what is seen, in the order in which it is known.
 
     Laminate and prediction come before the rules; the yield is the last of those.
     """
     text = _text(job)
     yield {"kind": "text", "text": text}
-    known = _known(text, job)
-    found = _read(known)
-    if found.family == "assembly":
-        yield from _assembly(known, job, beat)
+    source = _source(text, job)
+    design = _read(source)
+    if design.family == "assembly":
+        yield from _assembly(source, job, pause)
         return
-    yield {"kind": "design", "name": found.name, "family": found.family, **_values(found)}
-    beat()
-    laminate = _laminate(known)
+    yield {"kind": "design", "name": design.name, "family": design.family, **_values(design)}
+    pause()
+    laminate = _laminate(source)
     yield laminate_model(laminate, frozenset(job.get("has", ())))
-    beat()
-    yield _prediction(found, laminate)
-    beat()
+    pause()
+    yield _prediction(design, laminate)
+    pause()
     try:
-        for number, (rule, findings) in enumerate(api.checking(found, laminate, beat), 1):
+        for number, (rule, findings) in enumerate(api.checking(design, laminate, pause), 1):
             yield {
                 "kind": "rule",
                 "rule": rule,
                 "number": number,
                 "findings": [finding_model(finding) for finding in findings],
             }
-            beat()
+            pause()
     except ModuleNotFoundError as error:
         # Without a server numpy may be missing; only the registration rules, the last ones, ask it.
         yield {
@@ -76,18 +85,18 @@ def _values(design: Design | Assembly) -> Answer:
     return {"values": api.resolved(design)}
 
 
-def _assembly(known: _Known, job: StudioJob, beat: Beat) -> Iterator[Answer]:
+def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     """An assembly's keys, its parts in place, and what the rules find in and between them."""
-    assembly = _read(known)
+    assembly = _read(source)
     yield {"kind": "assembly", "name": assembly.name, **_values(assembly)}
-    beat()
-    assembled = _assembled(known)
+    pause()
+    assembled = _assembled(source)
     yield parts_model(assembled, frozenset(job.get("has", ())))
-    beat()
+    pause()
     # What the whole does takes seconds, and is asked for when the hand rests.
     yield {"kind": "prediction", "quick": True, "figures": [], "left_out": []}
-    designs = {made.design.name for made in assembled.designs}
-    checked = api.check(assembly, progress=lambda *_: beat())
+    designs = {actuator.design.name for actuator in assembled.designs}
+    checked = api.check(assembly, progress=lambda *_: pause())
     findings = [finding_model(finding) for finding in checked]
     for finding in findings:
         of, _, rest = finding["message"].partition(": ")
@@ -100,52 +109,54 @@ def _assembly(known: _Known, job: StudioJob, beat: Beat) -> Iterator[Answer]:
 def _prediction(design: Design, laminate: Laminate) -> Answer:
     """Figures by closed formulas; why there are none, where that is so."""
     try:
-        found = api.predict(design, quick=True, laminate=laminate)
+        prediction = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
         return {"kind": "unpredicted", "message": str(error)}
     except ModuleNotFoundError as error:
         return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
-    return {"kind": "prediction", "quick": True, **found.as_dict()}
+    return {"kind": "prediction", "quick": True, **prediction.as_dict()}
 
 
-def elastic(job: StudioJob, beat: Beat) -> Iterator[Answer]:
+def elastic(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     """All figures, with those of the elastic stack, which take seconds."""
-    known = _known(_text(job), job)
-    found = _read(known)
-    beat()
-    if found.family == "assembly":
-        yield whole_prediction(_assembled(known), job.get("pose") or {}, beat)
+    source = _source(_text(job), job)
+    design = _read(source)
+    pause()
+    if design.family == "assembly":
+        yield whole_prediction(_assembled(source), job.get("pose") or {}, pause)
     else:
-        yield {"kind": "prediction", **api.predict(found).as_dict()}
+        yield {"kind": "prediction", **api.predict(design).as_dict()}
 
 
-def generate(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """Writes the folder of a design into ``out``; every step is told, the last answer names it."""
-    yield _made(
-        api.generate(_read(_known(_text(job), job)), out=job["out"], progress=_told(job, beat))
+def generate(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
+    """Write the folder of a design into ``out`` with progress; the last answer names it."""
+    yield _run_answer(
+        api.generate(
+            _read(_source(_text(job), job)), out=job["out"], progress=_progress(job, pause)
+        )
     )
 
 
-def cut(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """The same with cut files and film sheets alone, which a page can write without a server."""
-    design = _read(_known(_text(job), job))
+def cut(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
+    """Write cut files and film sheets alone, which a page can do without a server."""
+    design = _read(_source(_text(job), job))
     if design.family == "assembly":
         raise DesignError(f"{design.name} is an assembly; cut it with sbafab generate")
-    yield _made(api.cut(design, out=job["out"], progress=_told(job, beat)))
+    yield _run_answer(api.cut(design, out=job["out"], progress=_progress(job, pause)))
 
 
-def _told(job: StudioJob, beat: Beat) -> Callable[[str, int, int], None]:
+def _progress(job: StudioJob, pause: CancelCheck) -> Callable[[str, int, int], None]:
     steps: list[Answer] = []
     tell: Callable[[Answer], None] = job.get("tell", steps.append)
 
-    def progress(what: str, done: int, total: int) -> None:
-        beat()
-        tell({"kind": "progress", "what": what, "done": done, "total": total})
+    def progress(stage: str, done: int, total: int) -> None:
+        pause()
+        tell({"kind": "progress", "what": stage, "done": done, "total": total})
 
     return progress
 
 
-def _made(run: Run) -> Answer:
+def _run_answer(run: Run) -> Answer:
     return {
         "kind": "made",
         "name": run.folder.name,
@@ -158,33 +169,33 @@ def _made(run: Run) -> Answer:
     }
 
 
-def motion(job: StudioJob, beat: Beat) -> Iterator[Answer]:
-    """The actuator as the fast stack has it, and how it moves as its pressures grow together.
+def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
+    """The actuator as fast stack, and its poses as its pressures grow together.
 
-    The pose asks for ``pressures``, or gives none for what the page has to know beforehand; of an
+    The pose asks for ``pressures``, or has none for the data that the page needs beforehand; of an
     assembly for ``parts``, the pressures of each.
     """
-    known, asked = _known(_text(job), job), job.get("pose") or {}
-    design = _read(known)
+    source, pose = _source(_text(job), job), job.get("pose") or {}
+    design = _read(source)
     if design.family == "assembly":
-        assembled = _assembled(known)
-        beat()
-        yield part_poses(assembled, asked) if "parts" in asked else moving_parts(assembled)
+        assembled = _assembled(source)
+        pause()
+        yield part_poses(assembled, pose) if "parts" in pose else moving_parts(assembled)
         return
     stack = stack_of(design)
-    beat()
-    if "pressures" not in asked:
+    pause()
+    if "pressures" not in pose:
         yield stack_model(design.name, stack)
         return
-    if asked.get("tube"):
+    if pose.get("tube"):
         filling = _FILLINGS.setdefault(job["tab"], Filling())
         while len(_FILLINGS) > MOST_FILLINGS:
             del _FILLINGS[next(iter(_FILLINGS))]
-        yield filling.step(stack, asked)
+        yield filling.step(stack, pose)
         return
-    for pose in poses(stack, asked):
-        yield pose
-        beat()
+    for answer in poses(stack, pose):
+        yield answer
+        pause()
 
 
 def _text(job: StudioJob) -> str:
@@ -195,39 +206,93 @@ def _text(job: StudioJob) -> str:
     return edited(job["text"], edits) if edits else str(job["text"])
 
 
-class _Known(NamedTuple):
-    """A design's text, where its file would lie, and the states of the files that it names."""
+class _Source(NamedTuple):
+    """A design's text, its path, and the states of the files that it names."""
 
     text: str
     path: Path
     files: tuple[str, ...]
 
 
-def _known(text: str, job: StudioJob) -> _Known:
+def _source(text: str, job: StudioJob) -> _Source:
     """Raises DesignError for a file outside the folder."""
     folder = Path(job["folder"])
-    return _Known(text, folder / job["path"], places.named_files(text, folder))
+    return _Source(text, folder / job["path"], places.named_files(text, folder))
 
 
 @lru_cache(maxsize=4)
-def _read(known: _Known) -> Any:
-    return api.loads(known.text, known.path)
+def _read(source: _Source) -> Any:
+    return api.loads(source.text, source.path)
 
 
 @lru_cache(maxsize=2)
-def _laminate(known: _Known) -> Laminate:
-    return api.build(_read(known))
+def _laminate(source: _Source) -> Laminate:
+    return api.build(_read(source))
 
 
 @lru_cache(maxsize=2)
-def _assembled(known: _Known) -> Assembled:
-    return api.assemble(_read(known))
+def _assembled(source: _Source) -> Assembled:
+    return api.assemble(_read(source))
 
 
-JOBS: dict[str, Callable[[StudioJob, Beat], Iterator[Answer]]] = {
+JOBS: dict[str, Callable[[StudioJob, CancelCheck], Iterator[Answer]]] = {
     "live": live,
     "elastic": elastic,
     "generate": generate,
     "cut": cut,
     "motion": motion,
 }
+
+
+# The answers of a job, run by a worker process or by Python in the page.
+#
+# Errors are answers too: bad input in the command line's words, anything else as a defect.
+
+
+class SupersededError(Exception):
+    """Nobody waits for this answer any more."""
+
+
+def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
+    """Yield the job's answers; where it fails, the last one says why."""
+    try:
+        for answer in JOBS[job["do"]](job, pause):
+            yield answer
+            pause()
+    except SupersededError:
+        yield {"kind": "superseded"}
+    except SbafabError as error:
+        yield refusal(str(error))
+    except ModuleNotFoundError as error:
+        yield {"kind": "error", "message": f"this needs {error.name}, which is not installed here"}
+    except MemoryError:
+        yield {"kind": "error", "message": "the design takes more memory than there is"}
+    except Exception:
+        traceback.print_exc(file=sys.stderr)
+        yield {"kind": "defect", "message": _defect()}
+
+
+def refusal(sentence: str) -> Answer:
+    """The answer that refuses, with the key of a design file that the sentence names first."""
+    words = (word.strip(",;:()[]'\"") for word in sentence.split())
+    field = next((word for word in words if _is_key(word)), None)
+    return {"kind": "error", "message": sentence, **({"field": field} if field else {})}
+
+
+def _is_key(word: str) -> bool:
+    return word.startswith("parts.") or word in design_keys()
+
+
+@lru_cache(maxsize=1)
+def design_keys() -> frozenset[str]:
+    """Every dotted key that a design file may have."""
+    return frozenset(keys(api.schema()))
+
+
+def _defect() -> str:
+    kind, error = sys.exc_info()[:2]
+    name = kind.__name__ if kind else "error"
+    return (
+        f"this is a defect of sbafab ({name}: {' '.join(str(error).split())[:200]}); go back with "
+        "Undo, and report the design file"
+    )

@@ -1,4 +1,4 @@
-"""What the page draws of a laminate: numbers and words, no pictures.
+"""Laminates, findings and assemblies as the page draws them: numbers and words, no pictures.
 
 A contour is a flat list of x, y and bulge (mm; the DXF convention), so arcs stay arcs on screen. A
 shape is sent under its key once, and not again to a page that says it has it.
@@ -6,6 +6,8 @@ shape is sent under its key once, and not again to a page that says it has it.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -13,12 +15,14 @@ from typing import TYPE_CHECKING, Any
 from sbafab import api
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.build import Assembled, PlacedPart
     from sbafab.geometry.region import Region
     from sbafab.laminate.laminate import Laminate, Layer
+    from sbafab.meshing.surface import Surface
     from sbafab.rules.finding import Finding
 
-Beat = Callable[[], None]
-"""Called between steps of work; raises where nobody waits for it any more."""
+CancelCheck = Callable[[], None]
+"""Called between steps of work; raises where the answer is no longer needed."""
 
 
 @dataclass
@@ -47,7 +51,9 @@ def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
     """Layers, patterns and what lies at which place; plan, section and solid are drawn from it."""
     shapes = AnswerShapes(has)
     layers = [_layer(layer) for layer in laminate.layers]
-    patterns = {name: _pattern(laminate, own, shapes) for name, own in laminate.patterns.items()}
+    patterns = {
+        name: _pattern(laminate, group, shapes) for name, group in laminate.patterns.items()
+    }
     return {
         "kind": "laminate",
         "name": laminate.name,
@@ -96,3 +102,81 @@ def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: AnswerShapes
 def finding_model(finding: Finding) -> dict[str, Any]:
     """A finding as ``checks.json`` has it."""
     return {**finding.as_dict(), "by_user": finding.by_user}
+
+
+# Assemblies: the surface of each part once, and its place.
+#
+# A surface is sent under its key once, in the part's own frame, and not again to a page that says
+# it has it: a part that is moved costs nothing but its place.
+
+
+PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "set"}
+"""Keys of a part that do not change its own surface; of an actuator its laminate does."""
+
+
+def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
+    """Parts with their places, each after what it is fixed on, and surfaces the page lacks."""
+    surfaces: dict[str, dict[str, str]] = {}
+    parts = []
+    for placed in assembled.parts:
+        key = _key(placed)
+        if key not in has and key not in surfaces:
+            surfaces[key] = _surface(placed, key)
+        parts.append({**_part(placed), "surface": key})
+    return {"kind": "parts", "parts": parts, "surfaces": surfaces}
+
+
+def _part(placed: PlacedPart) -> dict[str, Any]:
+    part, actuator = placed.part, placed.made
+    design = None
+    if actuator is not None:
+        design = {
+            "name": actuator.design.name,
+            "family": actuator.design.family,
+            "values": api.resolved(actuator.design),
+        }
+    return {
+        "name": placed.name,
+        "kind": part.kind,
+        "on": part.on,
+        "at": part.at,
+        "design": design,
+        "rows": [list(row) for row in placed.pose.rows],
+        "shift": list(placed.pose.shift),
+    }
+
+
+def _key(placed: PlacedPart) -> str:
+    """Names a surface by all that decides it."""
+    decisive: list[Any] = [placed.turn, placed.radius]
+    if placed.made is None:
+        decisive.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))
+    else:
+        layers = placed.made.laminate.layers
+        decisive += [
+            (layer.profile.key, layer.z, layer.film.thickness, layer.is_mask) for layer in layers
+        ]
+    return hashlib.sha256(repr(decisive).encode()).hexdigest()[:24]
+
+
+def _surface(placed: PlacedPart, key: str) -> dict[str, str]:
+    surface = _SURFACES.get(key)
+    if surface is None:
+        surface = _SURFACES[key] = packed(api.solid(placed))
+        while len(_SURFACES) > MOST_SURFACES:
+            del _SURFACES[next(iter(_SURFACES))]
+    return surface
+
+
+def packed(surface: Surface) -> dict[str, str]:
+    """Points and faces of a surface as the page unpacks them."""
+    return {"points": _words(surface.points, "<f4"), "faces": _words(surface.faces, "<u4")}
+
+
+def _words(numbers: Any, kind: str) -> str:
+    return base64.b64encode(numbers.astype(kind).tobytes()).decode("ascii")
+
+
+_SURFACES: dict[str, dict[str, str]] = {}
+MOST_SURFACES = 24
+"""Surfaces that a worker keeps, so that a page that lost one is answered at once."""

@@ -1,19 +1,20 @@
-"""Poses of the fast stack, as the page asks for them and draws them."""
+"""Poses of the fast stack of a design, and of the actuators of an assembly, for the page."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
 from sbafab.errors import DesignError
+from sbafab.studio.model import flat, packed
 
 if TYPE_CHECKING:
+    from sbafab.assemblies.build import Assembled, PlacedPart
     from sbafab.design.records import Design
-    from sbafab.models.motion import Motion
-    from sbafab.models.stack import Pose, Stack
+    from sbafab.models.stack import Motion, Pose, Stack
 
 CURVE = 25
 """Points of the curves beside the view."""
@@ -27,8 +28,8 @@ MOST_LOAD = 0.5
 
 def stack_of(design: Design) -> Stack:
     """The stack of a design, kept for the next pose. Raises DesignError where there is none."""
-    own = {**api.resolved(design), "name": None, "order": None}
-    key = json.dumps(own, sort_keys=True, default=str)
+    resolved = {**api.resolved(design), "name": None, "order": None}
+    key = json.dumps(resolved, sort_keys=True, default=str)
     if key not in _STACKS:
         _STACKS[key] = api.stack(design)
         while len(_STACKS) > MOST_STACKS:
@@ -37,7 +38,7 @@ def stack_of(design: Design) -> Stack:
 
 
 def stack_model(name: str, stack: Stack) -> dict[str, Any]:
-    """What the page draws balloons from: radii, axes, pitch, and how far pressures may go."""
+    """Return radii, axes, pitch, and the highest pressure."""
     return {
         "kind": "stack",
         "name": name,
@@ -48,36 +49,36 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
         "levels": [int(level) for level in stack.levels],
         "balloons": [
             {
-                "neck": one.balloon.neck,
-                "pocket": one.balloon.pocket,
-                "ring": one.balloon.ring,
-                "thickness": one.balloon.thickness,
+                "neck": balloon_map.balloon.neck,
+                "pocket": balloon_map.balloon.pocket,
+                "ring": balloon_map.balloon.ring,
+                "thickness": balloon_map.balloon.thickness,
             }
-            for one in stack.maps
+            for balloon_map in stack.maps
         ],
-        "most_pressure": min(one.most_pressure for one in stack.maps),
+        "most_pressure": min(balloon_map.most_pressure for balloon_map in stack.maps),
         "measured": stack.counterparts,
     }
 
 
-def poses(stack: Stack, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The pose asked for; with ``curves``, also those on the way to it, as lists of figures.
 
     Raises DesignError for what is out of the model's range.
     """
-    pressures = asked_numbers(asked.get("pressures"), stack.chambers, "pressures")
-    yield pose_model(stack.pose(pressures, **_loads(asked)))
-    if not asked.get("curves"):
+    pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
+    yield pose_model(stack.pose(pressures, **_loads(request)))
+    if not request.get("curves"):
         return
     most = max(pressures) or 1.0
     rows = []
     for number in range(CURVE):
         share = number / (CURVE - 1)
         try:
-            one = stack.pose([share * p for p in pressures], gravity=bool(asked.get("gravity")))
+            pose = stack.pose([share * p for p in pressures], gravity=bool(request.get("gravity")))
         except DesignError:
             break
-        rows.append((share * most, one.height, one.bend, float(sum(one.volumes))))
+        rows.append((share * most, pose.height, pose.bend, float(sum(pose.volumes))))
     names = ("pressure", "height", "bend", "volume")
     columns = zip(*rows, strict=True)
     yield {"kind": "curves", **{name: numbers(c) for name, c in zip(names, columns, strict=False)}}
@@ -87,37 +88,37 @@ class Filling:
     """A motion through the tubes of one tab: the state from which its next step starts."""
 
     def __init__(self) -> None:
-        self.known: tuple[object, ...] = ()
+        self.setting: tuple[object, ...] = ()
         self.motion: Motion | None = None
 
-    def step(self, stack: Stack, asked: dict[str, Any]) -> dict[str, Any]:
+    def step(self, stack: Stack, request: dict[str, Any]) -> dict[str, Any]:
         """The pose ``dt`` s on, with pressures in kPa at the valves. Raises DesignError.
 
         It starts anew, vented, with another stack, tube or load, and where ``restart`` is asked.
         """
-        tube = asked["tube"] if isinstance(asked.get("tube"), dict) else {}
-        pressures = asked_numbers(asked.get("pressures"), stack.chambers, "pressures")
-        length, diameter, dt = asked_numbers(
+        tube = request["tube"] if isinstance(request.get("tube"), dict) else {}
+        pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
+        length, diameter, dt = finite_numbers(
             [tube.get("length"), tube.get("diameter"), tube.get("dt")], 3, "tube"
         )
-        load = _loads(asked)
-        known = (id(stack), length, diameter, repr(load))
-        if self.motion is None or known != self.known or tube.get("restart"):
-            self.known = known
+        load = _loads(request)
+        setting = (id(stack), length, diameter, repr(load))
+        if self.motion is None or setting != self.setting or tube.get("restart"):
+            self.setting = setting
             self.motion = api.motion(stack, length=length, diameter=diameter, **load)
         pose = self.motion.step(min(max(dt, 1e-4), LONGEST_STEP), pressures=pressures)
         return {**pose_model(pose), "valves": pressures, "time": round(self.motion.time, 4)}
 
 
-def _loads(asked: dict[str, Any]) -> dict[str, Any]:
-    """What acts on the tip: a pull, weight, an outer plate."""
-    load = asked_numbers(asked.get("load") or [0, 0, 0], 3, "load")
+def _loads(request: dict[str, Any]) -> dict[str, Any]:
+    """Return the loads on the tip: a pull, weight, an outer plate."""
+    load = finite_numbers(request.get("load") or [0, 0, 0], 3, "load")
     size = math.hypot(*load)
     if size > MOST_LOAD:
         load = [part * MOST_LOAD / size for part in load]
-    plate = asked.get("plate")
+    plate = request.get("plate")
     height = float(plate) if isinstance(plate, int | float) else None
-    return {"tip_load": load, "gravity": bool(asked.get("gravity")), "plate": height}
+    return {"tip_load": load, "gravity": bool(request.get("gravity")), "plate": height}
 
 
 def pose_model(pose: Pose) -> dict[str, Any]:
@@ -137,10 +138,10 @@ def pose_model(pose: Pose) -> dict[str, Any]:
     }
 
 
-def asked_numbers(values: Any, count: int, what: str) -> list[float]:
+def finite_numbers(values: Any, count: int, name: str) -> list[float]:
     good = isinstance(values, list) and len(values) == count
     if not good or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
-        raise DesignError(f"{what} must be {count} finite numbers")
+        raise DesignError(f"{name} must be {count} finite numbers")
     return [float(value) for value in values]
 
 
@@ -151,3 +152,113 @@ def numbers(values: Any) -> Any:
     if isinstance(values, Sequence):
         return [numbers(value) for value in values]
     return round(float(values), 5)
+
+
+# Assemblies: poses of the actuators, and the prediction of the whole.
+#
+# Each actuator is a fast stack by itself; the page carries along what stands on its top. Where
+# parts meet, and what hangs on tips, is the prediction's.
+
+
+PRESSURE_KPA, LOAD_G = 10.0, 1.2
+"""What the prediction is asked for, unless the page says otherwise: the command's own defaults."""
+MOST_PRESSURE, MOST_LOAD_G = 110.0, 1000.0
+
+
+def moving_parts(assembled: Assembled) -> dict[str, Any]:
+    """Return the stack or the grip of each actuator, or the reason why it stays still."""
+    return {"kind": "movers", "movers": list(_movers(assembled))}
+
+
+def _movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
+    for placed in assembled.parts:
+        if placed.made is None:
+            continue
+        laminate = placed.made.laminate
+        chambers = [chamber.name for chamber in laminate.chambers]
+        actuator = {"part": placed.name, "chambers": chambers}
+        gripper = api.grip(assembled, placed.name)
+        if gripper is not None:
+            grip, surface = gripper
+            yield {
+                **actuator,
+                "is": "grip",
+                **grip._asdict(),
+                "surface": packed(surface),
+            }
+            continue
+        try:
+            stack = stack_of(placed.made.design)
+        except DesignError as error:
+            yield {**actuator, "is": "still", "message": str(error)}
+            continue
+        walls = [layers for layers in laminate.patterns.values() if layers[0].role == "wall"]
+        wall = max(walls, key=len)[0].profile if walls else laminate.outline
+        yield {
+            **stack_model(placed.made.design.name, stack),
+            **actuator,
+            "is": "stack",
+            "frame": numbers(_frame(placed)),
+            "wall": [flat(contour.vertices) for contour in wall.contours],
+            "lumen": laminate.lumen,
+        }
+
+
+def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
+    """The pose of each actuator whose pressures in kPa are asked for. Raises DesignError."""
+    pressures_of = request["parts"] if isinstance(request["parts"], dict) else {}
+    poses_of = {}
+    for placed in assembled.parts:
+        if placed.made is None or placed.name not in pressures_of:
+            continue
+        stack: Stack = stack_of(placed.made.design)
+        pressures = finite_numbers(pressures_of[placed.name], stack.chambers, "pressures")
+        poses_of[placed.name] = pose_model(stack.pose(pressures))
+    return {"kind": "poses", "poses": poses_of}
+
+
+def whole_prediction(
+    assembled: Assembled, request: dict[str, Any], pause: Callable[[], None]
+) -> dict[str, Any]:
+    """The figures of ``sbafab predict`` for an assembly, in the words of a design's prediction."""
+    pressure = _within(request.get("pressure_kpa", PRESSURE_KPA), MOST_PRESSURE, "pressure", "kPa")
+    load = _within(request.get("load_g", LOAD_G), MOST_LOAD_G, "mass at the tips", "g")
+    if pressure == 0:
+        raise DesignError("pressure of a prediction must be above 0 kPa")
+    prediction = api.predict_assembly(assembled, pressure_kpa=pressure, load_g=load, pause=pause)
+    figures = [
+        {
+            "group": figure.part,
+            "name": figure.name,
+            "value": figure.value,
+            "unit": figure.unit,
+            "model": figure.model,
+            "trust": f"The paper: {figure.paper}" if figure.paper else "",
+            "design_with": True,
+            "measured": {"sentence": figure.measured} if figure.measured else None,
+        }
+        for figure in prediction.figures
+    ]
+    omitted = [figure.partition(": ") for figure in prediction.left_out]
+    return {
+        "kind": "prediction",
+        "asked": {"pressure_kpa": pressure, "load_g": load},
+        "figures": figures,
+        "left_out": [{"name": name, "reason": reason} for name, _, reason in omitted],
+        "met": prediction.met(),
+        "meets": bool(prediction.touches or prediction.bent_touches),
+    }
+
+
+def _within(value: Any, most: float, name: str, unit: str) -> float:
+    if not isinstance(value, int | float) or not math.isfinite(value) or not 0 <= value <= most:
+        raise DesignError(f"{name} must be from 0 to {most:g} {unit}")
+    return float(value)
+
+
+def _frame(placed: PlacedPart) -> Any:
+    """Rows (3, 4) that take a part's own frame to the assembly's."""
+    import numpy as np  # a page without a server may lack it
+
+    corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
+    return np.column_stack([*(corners[1:] - corners[0]), corners[0]])

@@ -1,14 +1,17 @@
-"""Files the page may name: design files in the chosen folder, and what designs refer to there."""
+"""Design files in the chosen folder with the files they name, and folders of runs."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import os
 import stat
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -78,14 +81,14 @@ def state(path: Path) -> str:
         return ""
 
 
-def save(path: Path, text: str, seen: str | None) -> str:
+def save(path: Path, text: str, expected: str | None) -> str:
     """Writes the file whole and returns its hash.
 
     ``seen``: the hash of what the page has read; where another lies there now, raises OutputError.
     """
     if path.exists() and not path.is_file():
         raise OutputError(f"{path.name} is not a regular file; save under another name")
-    if seen is not None and state(path) != seen:
+    if expected is not None and state(path) != expected:
         raise OutputError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
     content = text.encode("utf-8")
     try:
@@ -149,3 +152,47 @@ def _lies_in(path: Path, folder: Path) -> bool:
 
 def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
+
+
+# Folders that runs wrote, as the page shows them and hands them out.
+
+
+DAY_ONE = (1980, 1, 1, 0, 0, 0)
+"""The date of every file in a zip: equal runs give equal zips."""
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The folder of a run and the name that it goes by."""
+
+    folder: Path
+    name: str
+
+    def file(self, path: str) -> Path | None:
+        """A file of the run, None for any other place."""
+        try:
+            resolved = (self.folder / path).resolve()
+            inside = resolved.is_relative_to(self.folder.resolve())
+            return resolved if inside and resolved.is_file() else None
+        except (OSError, ValueError):  # a name too long for any file, or one with a NUL
+            return None
+
+
+def zipped(run: RunFolder) -> bytes:
+    """The run's folder as a zip, its files byte for byte, in the order of their names."""
+    paths = sorted(path for path in run.folder.rglob("*") if path.is_file())
+    return packed(
+        (f"{run.name}/{path.relative_to(run.folder).as_posix()}", path.read_bytes())
+        for path in paths
+    )
+
+
+def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
+    """Names and contents as a zip, in this order; equal files give equal bytes."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, file in files:
+            entry = zipfile.ZipInfo(name, DAY_ONE)
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, file)
+    return content.getvalue()

@@ -18,10 +18,10 @@ from importlib import metadata
 from pathlib import Path
 
 import sbafab
-from sbafab.design.templates import templates_folder
+from sbafab.design.files import templates_folder
 from sbafab.errors import DesignError, OutputError
 from sbafab.output.swap import BEGUN, put_in_place
-from sbafab.studio.made import packed
+from sbafab.studio.places import packed
 
 STATIC = Path(__file__).parent / "static"
 PURE = ("annotated-types", "filelock", "tomli-w", "tomlkit", "typing-extensions")
@@ -61,8 +61,8 @@ class Pyodide:
 
     def wheel(self, project: str, version: str | None = None) -> Wheel | None:
         """The wheel of a project, of this version if one is asked for."""
-        found = (one for one in self.wheels if one.project == project)
-        return next((one for one in found if version in {None, one.version}), None)
+        wheels = (wheel for wheel in self.wheels if wheel.project == project)
+        return next((wheel for wheel in wheels if version in {None, wheel.version}), None)
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,10 @@ def write(folder: Path, pyodide: Path | None) -> WrittenPage:
     wheels, pure = _chosen(python)
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
         raise OutputError(f"{folder} is a file or a link; choose a new or empty folder")
-    others = sorted(set(_files(folder)) - set(_listed(folder)))
-    if others:
+    foreign = sorted(set(_files(folder)) - set(_listed(folder)))
+    if foreign:
         raise OutputError(
-            f"{folder} holds {others[0]}, which the page did not write; move it away, or choose a "
+            f"{folder} holds {foreign[0]}, which the page did not write; move it away, or choose a "
             "new folder"
         )
     try:
@@ -116,7 +116,7 @@ def _files(folder: Path) -> list[str]:
 
 
 def _listed(folder: Path) -> list[str]:
-    """What a page that was written here consists of; nothing where there is none."""
+    """Return the files of a page that was written here; none where there is none."""
     try:
         listing = json.loads((folder / LISTING).read_text(encoding="utf-8"))
         return [str(name) for name in listing["files"]]
@@ -151,8 +151,8 @@ def _wheel(path: Path, python: str, abi: str) -> Wheel | None:
     if len(parts) not in {5, 6}:
         return None
     tag, _, machine = parts[-3:]
-    own = f"cp{python.replace('.', '')}"
-    fits = machine == "any" or (tag == own and machine.endswith(f"_{abi}_wasm32"))
+    python_tag = f"cp{python.replace('.', '')}"
+    fits = machine == "any" or (tag == python_tag and machine.endswith(f"_{abi}_wasm32"))
     return Wheel(path, _project(parts[0]), parts[1]) if fits else None
 
 
@@ -188,8 +188,11 @@ def _chosen(python: Pyodide) -> tuple[list[Wheel], list[str]]:
 
 def _core_version(requirements: Sequence[str]) -> str | None:
     """The version of its core that pydantic asks for."""
-    found = (re.match(r"pydantic[-_]core\s*\(?==\s*([\w.]+)", one) for one in requirements)
-    return next((match[1] for match in found if match), None)
+    matches = (
+        re.match(r"pydantic[-_]core\s*\(?==\s*([\w.]+)", requirement)
+        for requirement in requirements
+    )
+    return next((match[1] for match in matches if match), None)
 
 
 def _requirements(wheel: Wheel) -> list[str]:
@@ -215,15 +218,17 @@ def _write_page(
     )
     index = index.replace('<meta charset="utf-8">\n', f'<meta charset="utf-8">\n{head}')
     (folder / INDEX).write_text(index, encoding="utf-8", newline="\n")
-    own = folder / "python"
-    own.mkdir()
+    python_folder = folder / "python"
+    python_folder.mkdir()
     for name in (*NEEDED, *EITHER):
         if (python.folder / name).is_file():
-            shutil.copyfile(python.folder / name, own / name)
+            shutil.copyfile(python.folder / name, python_folder / name)
     for wheel in wheels:
-        shutil.copyfile(wheel.path, own / wheel.path.name)
-    (own / "sbafab.zip").write_bytes(packed(_program()))
-    (own / "packages.zip").write_bytes(packed(one for name in pure for one in _installed(name)))
+        shutil.copyfile(wheel.path, python_folder / wheel.path.name)
+    (python_folder / "sbafab.zip").write_bytes(packed(_program()))
+    (python_folder / "packages.zip").write_bytes(
+        packed(file for name in pure for file in _installed(name))
+    )
     listing = {
         "archives": ["sbafab.zip", "packages.zip"],
         "wheels": [wheel.path.name for wheel in wheels],

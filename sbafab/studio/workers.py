@@ -1,22 +1,30 @@
-"""Worker processes: the newest wish of a tab is worked on, what it replaces is given up.
+"""Worker processes: the newest job of a tab is worked on, the one it replaces is cancelled.
 
-A pool starts a second process only where somebody waits and none is idle, up to the number of
-processors. A process that dies or takes too long is replaced, and who waits for it is told so.
+A pool starts a second process only where a job waits and none is idle, up to the number of
+processors. A process that dies or takes too long is replaced, and the request gets an error.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import json
 import multiprocessing
+import signal
 import threading
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 from typing import Any
 
-from sbafab.studio.worker import END, READY, serve
+from sbafab import api
+from sbafab.errors import SbafabError
 
+END = b""
+"""The last message of a job."""
+READY = 0
+"""The number that says that the process takes jobs; those count from 1."""
 MOST_WAITING = 24
 """Jobs of a pool that wait for a process."""
 MOST_HOMES = 64
@@ -24,7 +32,7 @@ MOST_HOMES = 64
 PATIENCE = 2.0
 """Seconds that a job nobody waits for has until its next step; then its process is replaced."""
 Key = tuple[str, str]
-"""A tab and what it asks for; a newer wish with the same key replaces the older one."""
+"""A tab and its kind of job; a newer job with the same key replaces the older one."""
 
 
 class BusyError(Exception):
@@ -45,16 +53,16 @@ class WaitingJob:
         self.answers.put_nowait(END)
 
     async def lines(self) -> AsyncIterator[bytes]:
-        """Each answer as a line of JSON; they end early where a newer wish replaces this one."""
+        """Each answer as a line of JSON; they end early where a newer job replaces this one."""
         while (answer := await self.answers.get()) != END:
             yield answer
 
 
 class WorkerPool:
-    """Processes and the wishes that wait for them. All methods belong to the event loop.
+    """Processes and the jobs that wait for them. All methods belong to the event loop.
 
     ``seconds`` is what a job may take, ``processes`` how many run at most, and ``patience`` the
-    seconds that a job has to end once nobody waits for it.
+    seconds that a job has to end once it is cancelled.
     """
 
     def __init__(
@@ -68,7 +76,7 @@ class WorkerPool:
         self.closed = False
 
     def start(self) -> None:
-        """Starts one more process; wishes are given to it once it is ready."""
+        """Start one more process; jobs are given to it once it is ready."""
         self.workers.append(Worker(self))
 
     def stop(self) -> None:
@@ -85,16 +93,16 @@ class WorkerPool:
         self._give_up(key)
         if len(self.waiting) >= MOST_WAITING:
             raise BusyError
-        wish = self.waiting[key] = WaitingJob(key, job)
+        waiting = self.waiting[key] = WaitingJob(key, job)
         self.assign()
-        return wish
+        return waiting
 
-    def forget(self, wish: WaitingJob) -> None:
+    def forget(self, waiting: WaitingJob) -> None:
         """Gives a job up that nobody waits for any more; nothing happens to one that has ended."""
-        if self.waiting.get(wish.key) is wish:
-            del self.waiting[wish.key]
+        if self.waiting.get(waiting.key) is waiting:
+            del self.waiting[waiting.key]
         for worker in self.workers:
-            if worker.current is wish:
+            if worker.current is waiting:
                 worker.cancel()
 
     def _give_up(self, key: Key) -> None:
@@ -106,18 +114,18 @@ class WorkerPool:
                 worker.cancel()
 
     def assign(self) -> None:
-        """Gives every idle process the next wish that it may work on; starts one where none is."""
+        """Give every idle process the next job it may take; start one where none is idle."""
         if self.closed:
             return
-        for wish in list(self.waiting.values()):
-            worker = self._idle(wish.key)
+        for waiting in list(self.waiting.values()):
+            worker = self._idle(waiting.key)
             if worker is not None:
-                del self.waiting[wish.key]
-                self.homes.pop(wish.key, None)
-                self.homes[wish.key] = worker
+                del self.waiting[waiting.key]
+                self.homes.pop(waiting.key, None)
+                self.homes[waiting.key] = worker
                 while len(self.homes) > MOST_HOMES:
                     del self.homes[next(iter(self.homes))]
-                worker.work(wish)
+                worker.work(waiting)
         starting = sum(not worker.ready for worker in self.workers)
         needed = sum(not self._ends_soon(key) for key in self.waiting) - starting
         for _ in range(min(needed, self.processes - len(self.workers))):
@@ -132,7 +140,7 @@ class WorkerPool:
         return home if home in idle else next(iter(idle), None)
 
     def _ends_soon(self, key: Key) -> bool:
-        """Whether a process works on an older job of the key, which has been given up."""
+        """Return True if a process works on a cancelled job of the key."""
         return any(worker.current and worker.current.key == key for worker in self.workers)
 
     def remove(self, worker: Worker, message: str) -> None:
@@ -174,18 +182,18 @@ class Worker:
 
     @property
     def cancelled(self) -> bool:
-        """Whether nobody waits for the current job any more."""
+        """True if the current job has been cancelled."""
         return self.number > 0 and self.given_up.value == self.number
 
-    def work(self, wish: WaitingJob) -> None:
-        """Has the process work on the wish."""
-        self.current = wish
+    def work(self, waiting: WaitingJob) -> None:
+        """Make the process work on the job."""
+        self.current = waiting
         self.number += 1
         self._after(
             self.pool.seconds, f"this took more than {self.pool.seconds:g} s and was stopped"
         )
         with contextlib.suppress(OSError):  # a process that just died is seen by who listens
-            self.pipe.send((self.number, wish.job))
+            self.pipe.send((self.number, waiting.job))
 
     def cancel(self) -> None:
         """Has the current job end at its next step, or its process where that is far."""
@@ -197,7 +205,7 @@ class Worker:
         loop = asyncio.get_running_loop()
         self.timers.append(loop.call_later(seconds, self.pool.remove, self, message))
 
-    def heard(self, number: int, answer: bytes) -> None:
+    def receive(self, number: int, answer: bytes) -> None:
         """An answer of the process arrived."""
         if number == READY:
             self.ready = True
@@ -225,7 +233,57 @@ def _listen(pipe: Any, loop: asyncio.AbstractEventLoop, worker: Worker) -> None:
         try:
             while True:
                 number, answer = pipe.recv()
-                loop.call_soon_threadsafe(worker.heard, number, answer)
+                loop.call_soon_threadsafe(worker.receive, number, answer)
         except (EOFError, OSError):
             message = "the process that worked on this ended; it was started again"
             loop.call_soon_threadsafe(worker.pool.remove, worker, message)
+
+
+# The loop of a worker process: one job after the other, answers sent as they come.
+
+
+FIRST_DESIGN = "1dof-5mm"
+
+
+def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
+    """Answers (number, job) with (number, JSON) until the pipe closes."""
+    with contextlib.suppress(ValueError):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # In the worker alone: the server need not load what its jobs use.
+    from sbafab.studio.jobs import SupersededError, answers
+
+    if warm:
+        _warm_up()
+    # What is imported stays; the collector need not look through it again at every change.
+    gc.collect()
+    gc.freeze()
+    with contextlib.suppress(EOFError, OSError):
+        pipe.send((READY, END))
+        while True:
+            number, job = pipe.recv()
+            send = _sender(pipe, number)
+
+            def pause(current: int = number) -> None:
+                if cancelled.value == current:
+                    raise SupersededError
+
+            for answer in answers({**job, "tell": send}, pause):
+                send(answer)
+            pipe.send((number, END))
+
+
+def _sender(pipe: Connection, number: int) -> Any:
+    def send(answer: dict[str, Any]) -> None:
+        pipe.send((number, json.dumps(answer, separators=(",", ":")).encode()))
+
+    return send
+
+
+def _warm_up() -> None:
+    """Import everything and check one small design, so that the first answer is quick."""
+    from sbafab.studio.jobs import design_keys
+
+    with contextlib.suppress(SbafabError):
+        design = api.load(FIRST_DESIGN, {"stack.balloons": 1})
+        list(api.checking(design))
+        design_keys()

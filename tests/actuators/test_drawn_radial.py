@@ -13,13 +13,14 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.run import generate
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 
 COUNT = int(os.environ.get("SBAFAB_EAR_OUTLINES", "4"))
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="100mm" height="100mm" viewBox="0 0 100 100">'
@@ -59,7 +60,7 @@ def assert_held(laminate: Laminate) -> None:
             for piece in layers[0].profile.pieces:
                 tools = [p for p in laminate.pins_in(piece) if p.centre not in bores]
                 assert len(tools) >= 2, layers[0].name
-    assert [f.verdict for f in pin_holes.check(laminate, Limits())] == ["pass"]
+    assert [f.verdict for f in pin_holes.check(Measures(laminate, Limits()))] == ["pass"]
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -106,7 +107,7 @@ def test_an_undrawn_outline_keeps_its_ears() -> None:
 
 def test_what_is_written_for_a_drawn_outline_is_held_on_its_pins(tmp_path: Path) -> None:
     settings = drawn(tmp_path, SHAPES["slot"], "chamber.count=1", "rules.yield_builds=100")
-    generate(load_design("radial-15mm", settings), tmp_path / "out", ("cut",))
+    generate(RunRequest(load_design("radial-15mm", settings), tmp_path / "out", ("cut",)))
     findings = check_folder(tmp_path / "out" / "radial-15mm")
     assert {f.rule: f.verdict for f in findings}["pin-holes"] == "pass"
     assert not has_failed(findings)

@@ -12,12 +12,10 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.output.checking import check
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import check, press_settings
 from sbafab.pressing.schedule import schedule
 
 DESIGNS = [
@@ -84,7 +82,7 @@ def bottom_masks(laminate: Laminate) -> tuple[Region, ...]:
 @pytest.mark.parametrize(("name", "assignments"), DESIGNS)
 def test_nothing_fails_warns_or_is_waived(name: str, assignments: list[str]) -> None:
     design = load_design(name, [*assignments, 'registration.method="ears"'])
-    _, findings = check(design)
+    findings = check(design).findings
     for finding in findings:
         allowed = {"pass"}
         if finding.rule == "registration-worst-case" and name == "radial-15mm":

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.design.writing import design_sha256, design_toml
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
 
 BOND, OVERHANG, TAB = 0.75, 0.5, 5.0

@@ -11,8 +11,7 @@ from shapely.geometry import MultiPolygon
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.panel import SheetPanel
+from sbafab.laminate.laminate import Laminate, SheetPanel
 
 SHEET = ('registration.method="sheet"', "registration.experimental=true")
 ONE = ("1dof-5mm", "stack.balloons=2", "order.copies=2")

@@ -12,8 +12,8 @@ import shapely
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.output.run import Run
 from sbafab.rules.finding import Finding, Place
+from sbafab.runs.run import Run
 
 SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}
 
@@ -78,15 +78,24 @@ def test_solid_and_meshes_are_objects_of_other_libraries(tmp_path: Path) -> None
     run = sbafab.mesh("1dof-5mm", SMALL, h=0.7, formats=("inp",), out=tmp_path)
     assert run.conforming is not None
     volume = run.conforming.volume
+    [block] = volume.meshio().cells
+    assert (block.type, len(block)) == ("wedge", len(volume.cells))
+    [block] = run.conforming.shell.meshio().cells
+    assert (block.type, len(block)) == ("triangle6", len(run.conforming.shell.cells))
+
+
+def test_a_volume_mesh_is_a_grid_of_pyvista(tmp_path: Path) -> None:
+    pytest.importorskip("pyvista", reason="PyVista is not installed")
+    laminate = sbafab.build("1dof-5mm", SMALL)
+    films = sum(layer.profile.area * layer.film.thickness for layer in laminate.tpe_layers)
+    run = sbafab.mesh("1dof-5mm", SMALL, h=0.7, formats=("inp",), out=tmp_path)
+    assert run.conforming is not None
+    volume = run.conforming.volume
     grid = volume.pyvista()
     assert grid.n_cells == len(volume.cells)
     # Without gaps films lie on each other, and the volume is that of the films alone.
     assert abs(grid.compute_cell_sizes()["Volume"].sum()) == pytest.approx(films, rel=2e-3)
     assert set(grid.point_data) == {name for name in volume.node_sets if "bond_" not in name}
-    [block] = volume.meshio().cells
-    assert (block.type, len(block)) == ("wedge", len(volume.cells))
-    [block] = run.conforming.shell.meshio().cells
-    assert (block.type, len(block)) == ("triangle6", len(run.conforming.shell.cells))
 
 
 def test_findings_and_figures_are_rows() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 FEW_BUILDS = "rules.yield_builds=100"
@@ -19,7 +19,7 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Cut files of a 3-DoF actuator of four balloons: 15 layers, bores 4.25 mm off the axis."""
     out = tmp_path_factory.mktemp("clean")
     return generate(
-        load_design("3dof-15mm", ["stack.balloons=4", FEW_BUILDS]), out, ("cut",)
+        RunRequest(load_design("3dof-15mm", ["stack.balloons=4", FEW_BUILDS]), out, ("cut",))
     ).folder
 
 
@@ -32,7 +32,9 @@ def lobed(clean: Path, tmp_path: Path) -> Doctor:
 def clean_column(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Cut files of a 1-DoF actuator of three balloons: 11 layers on one axis."""
     out = tmp_path_factory.mktemp("column")
-    return generate(load_design("1dof-5mm", ["stack.balloons=3", FEW_BUILDS]), out, ("cut",)).folder
+    return generate(
+        RunRequest(load_design("1dof-5mm", ["stack.balloons=3", FEW_BUILDS]), out, ("cut",))
+    ).folder
 
 
 @pytest.fixture

@@ -12,8 +12,9 @@ from typing import Any
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, Point
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 
 
 @dataclass(frozen=True)

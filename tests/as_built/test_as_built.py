@@ -15,14 +15,15 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder, read_folder
+from sbafab.as_built.check import read_folder
 from sbafab.cli import main
-from sbafab.cutting.chords import in_chords
+from sbafab.cutting.kerf import in_chords
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import grow, shrink
-from sbafab.output.run import generate
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 
@@ -146,7 +147,7 @@ def test_a_kerf_undone_wrongly_shows_in_areas_and_bores(times: int, tmp_path: Pa
     design = load_design(
         "1dof-5mm", ["stack.balloons=2", "laser.kerf_tpe=0.2", "rules.yield_builds=100"]
     )
-    doctor = Doctor(generate(design, tmp_path, ("cut",)).folder)
+    doctor = Doctor(generate(RunRequest(design, tmp_path, ("cut",))).folder)
     # The file holds the path for one kerf; half a kerf is 0.1.
     for layer in (1, 3, 5, 7):
         doctor.redraw(layer, lambda r: grow(r, 0.1) if times == 2 else shrink(r, 0.2))

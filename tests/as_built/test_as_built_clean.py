@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder, read_folder
-from sbafab.cutting.dxf_write import Curves, DxfProfile
-from sbafab.output.run import generate
+from sbafab.as_built.check import read_folder
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 
 DROP = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="12mm" height="12mm" viewBox="-6 -6 12 12">'
@@ -72,7 +73,9 @@ def test_what_was_written_checks_as_designed(
     monkeypatch.chdir(tmp_path)
     Path("drop.svg").write_text(DROP)
     run = generate(
-        load_design(template, (*changes, FEW_BUILDS)), tmp_path, ("cut",), curves=Curves(profile)
+        RunRequest(
+            load_design(template, (*changes, FEW_BUILDS)), tmp_path, ("cut",), Curves(profile)
+        )
     )
     findings = check_folder(run.folder)
     own = [finding for finding in findings if finding.rule not in rule_names()]
@@ -111,7 +114,7 @@ def test_as_built_laminate_is_the_designed_one(clean: Path) -> None:
 
 def test_chords_make_no_better_builds(tmp_path: Path) -> None:
     design = load_design("3dof-15mm", ("stack.balloons=1",))
-    run = generate(design, tmp_path, ("cut",), curves=Curves("chords", 0.05))
+    run = generate(RunRequest(design, tmp_path, ("cut",), Curves("chords", 0.05)))
     shares = [
         next(f.measured for f in findings if f.rule == "registration-yield")
         for findings in (run.findings, check_folder(run.folder))

@@ -11,15 +11,14 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder, read_folder
+from sbafab.as_built.check import read_folder
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
-from sbafab.output.job import generate_job
-from sbafab.output.run import generate
+from sbafab.geometry.region import Region, disc
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 Claims = dict[str, Any]
@@ -94,7 +93,9 @@ def test_a_missing_piece_is_told_with_its_pattern_and_counts(doctor: Doctor) -> 
 
 def test_a_mirrored_piece_is_told_as_turned_over(tmp_path: Path) -> None:
     settings = ["stack.balloons=1", "registration.method=ears", "rules.yield_builds=100"]
-    doctor = Doctor(generate(load_design("1dof-5mm", settings), tmp_path, ("cut",)).folder)
+    doctor = Doctor(
+        generate(RunRequest(load_design("1dof-5mm", settings), tmp_path, ("cut",))).folder
+    )
 
     def mirrored(pieces: list[Region]) -> list[Region]:
         over = pieces[0].mirrored()
@@ -200,7 +201,7 @@ def clean_job(tmp_path_factory: pytest.TempPathFactory) -> Path:
         load_design("1dof-5mm", ["stack.balloons=2", "order.copies=2", *few]),
         load_design("radial-15mm", ["stack.balloons=1", *few]),
     ]
-    return generate_job(designs, "batch", tmp_path_factory.mktemp("job")).folder
+    return generate(RunRequest(designs, tmp_path_factory.mktemp("job"), name="batch")).folder
 
 
 def rules_failing(folder: Path) -> set[str]:

@@ -12,11 +12,11 @@ import shapely
 from shapely import LinearRing, Polygon
 
 from sbafab.actuators import build, load_design
-from sbafab.cutting.chords import in_chords
-from sbafab.cutting.dxf_write import Curves
+from sbafab.cutting.kerf import in_chords
+from sbafab.cutting.properties import Curves
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.output.run import generate
+from sbafab.geometry.region import disc, rectangle
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 EARS = "registration.method=ears"
@@ -32,7 +32,7 @@ CASES = [
 
 def written(template: str, settings: tuple[str, ...], error: float, out: Path) -> Doctor:
     design = load_design(template, [*FEW, *settings])
-    return Doctor(generate(design, out, ("cut",), curves=Curves("chords", error)).folder)
+    return Doctor(generate(RunRequest(design, out, ("cut",), Curves("chords", error))).folder)
 
 
 @cache
@@ -157,9 +157,9 @@ def test_sheets_are_cut_as_the_layers_are(tmp_path: Path) -> None:
 def test_chords_too_coarse_are_refused_by_name(tmp_path: Path) -> None:
     """A ring of chamber mask round the bore is just as wide as the laser can cut."""
     fits = load_design("1dof-5mm", [*FEW, "bore.diameter=2", "laser.least_feature=1.49"])
-    generate(fits, tmp_path, ("cut",), curves=Curves("chords", 0.005))
+    generate(RunRequest(fits, tmp_path, ("cut",), Curves("chords", 0.005)))
     with pytest.raises(DesignError, match=r"chords within 0\.1 mm break film-lim.*--chord-error"):
-        generate(fits, tmp_path / "coarse", ("cut",), curves=Curves("chords", 0.1))
+        generate(RunRequest(fits, tmp_path / "coarse", ("cut",), Curves("chords", 0.1)))
     assert not (tmp_path / "coarse").exists() or not any((tmp_path / "coarse").rglob("*.dxf"))
 
 

@@ -13,11 +13,10 @@ from random import Random
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hash
-from sbafab.output.run import generate
 from sbafab.rules.finding import Finding
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 COUNT = int(os.environ.get("SBAFAB_FOREIGN", "10"))
@@ -47,7 +46,7 @@ OPENED = (
 def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     root = tmp_path_factory.mktemp("sound")
     designs = (load_design(template, [*FEW, *settings]) for template, settings in DESIGNS)
-    return [generate(design, root, ("cut",)).folder for design in designs]
+    return [generate(RunRequest(design, root, ("cut",))).folder for design in designs]
 
 
 def failing(folder: Path) -> list[Finding]:
@@ -148,7 +147,7 @@ def test_notes_and_what_file_managers_leave_are_warnings(
     # The next run does not refuse them either.
     design = load_design("1dof-5mm", FEW)
     again = Path(shutil.copytree(folder, tmp_path / "out" / "1dof-5mm"))
-    assert generate(design, again.parent, ("cut",)).folder == again
+    assert generate(RunRequest(design, again.parent, ("cut",))).folder == again
     assert (again / "sheets" / ".DS_Store").exists()
 
 
@@ -159,7 +158,7 @@ def test_running_the_design_again_removes_a_foreign_file(
     """The message asks for that, so it must help."""
     folder = Path(shutil.copytree(folders[0], tmp_path / "1dof-5mm"))
     put(folder, name, next((folders[1] / "layers").glob("*TPE*")))
-    run = generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+    run = generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
     assert run.dropped == (name,)
     assert not failing(folder)
 
@@ -168,7 +167,7 @@ def test_files_of_other_commands_belong_to_the_folder(tmp_path: Path) -> None:
     """Cut files first, meshes and a schedule in runs of their own; nothing of them is foreign."""
     design = load_design("1dof-5mm", FEW)
     for part in ("cut", "mesh", "press"):
-        folder = generate(design, tmp_path, (part,)).folder
+        folder = generate(RunRequest(design, tmp_path, (part,))).folder
     assert not failing(folder)
     (folder / "mujoco").mkdir()
     put(folder, "mujoco/model.xml", folder / "press.csv")
@@ -181,7 +180,7 @@ def test_files_of_other_commands_belong_to_the_folder(tmp_path: Path) -> None:
 def test_a_foreign_file_of_a_job_is_named(folders: list[Path], tmp_path: Path) -> None:
     """Listed in the index of the job, and in that of the design that it lies with."""
     designs = [load_design(name, FEW) for name in ("1dof-5mm", "3dof-15mm")]
-    folder = generate_job(designs, "batch", tmp_path).folder
+    folder = generate(RunRequest(designs, tmp_path, name="batch")).folder
     assert not failing(folder)
     donor = folders[2] / "sheets" / "second_cut.dxf"
     put(folder, "sheets/TPE_9.dxf", donor)
@@ -203,7 +202,7 @@ def test_a_foreign_file_of_a_job_is_named(folders: list[Path], tmp_path: Path) -
 def test_a_job_is_compared_whatever_its_designs_are_called(tmp_path: Path) -> None:
     """The folder of layer files is told by its place, not by letters in another folder's name."""
     design = load_design("1dof-5mm", [*FEW, "name=multilayers"])
-    folder = generate_job([design], "batch", tmp_path).folder
+    folder = generate(RunRequest([design], tmp_path, name="batch")).folder
     press = folder / "multilayers" / "press.json"
     press.write_text(press.read_text().replace("135", "270"))
     Doctor(folder / "multilayers").rehash()

@@ -10,18 +10,19 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder, read_folder
-from sbafab.as_built.meant import drawn_settings
+from sbafab.as_built.check import read_folder
+from sbafab.as_built.expected import drawn_settings
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves
-from sbafab.cutting.lightburn_read import Project, read_project
+from sbafab.cutting.lightburn import Project, read_project
+from sbafab.cutting.properties import Curves
 from sbafab.cutting.second_cut import PATH, laser_path, properties_of, severed, stack_kerf
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import strip
-from sbafab.output.job import generate_job
-from sbafab.output.run import generate
+from sbafab.geometry.region import strip
 from sbafab.rules import bridges
+from sbafab.rules.measures import Measures
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 KERF = 0.12
@@ -39,7 +40,7 @@ def design(*changes: str) -> Design:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     kerf = (f"laser.kerf_tpe={KERF}", f"laser.kerf_ptfe={KERF}")
     return generate(
-        design(*kerf), tmp_path_factory.mktemp("panel"), ("cut", "press", "preview")
+        RunRequest(design(*kerf), tmp_path_factory.mktemp("panel"), ("cut", "press", "preview"))
     ).folder
 
 
@@ -50,7 +51,7 @@ def failing(folder: Path) -> dict[str, str]:
 def test_a_written_folder_passes_and_is_read_back_as_the_design(whole: Path) -> None:
     assert failing(whole) == {}
     built = read_folder(whole)
-    assert built.is_meant
+    assert built.is_expected
     assert built.laminate is not None
     assert built.laminate.panel is not None
     panel = json.loads((whole / "manifest.json").read_text())["panel"]
@@ -152,13 +153,13 @@ def test_a_copy_that_is_cut_otherwise_stands_for_its_layer(whole: Path, tmp_path
     # the kerf besides, on three sides of the notch.
     doctor.redraw(7, lambda sheet: sheet - strip((x, y + 2.9), (x, y + 3.6), 1.0))
     built = read_folder(doctor.folder)
-    assert not built.is_meant
+    assert not built.is_expected
     assert built.laminate is not None
     cap = built.laminate.layer(7).profile
     assert clean.layer(7).profile.area - cap.area == pytest.approx(
         1.12 * (3.25 - 2.84) - 0.04, abs=0.03
     )
-    (found,) = bridges.check(built.laminate, built.limits)
+    (found,) = bridges.check(Measures(built.laminate, built.limits))
     assert found.verdict == "fail"
 
 
@@ -171,9 +172,12 @@ def test_a_folder_without_second_cut_fails(whole: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("refused", "said"),
     [
-        (lambda out: generate(design(), out, curves=Curves("chords")), "are not drawn in chords"),
         (
-            lambda out: generate_job([design(), design("name=other")], "job", out),
+            lambda out: generate(RunRequest(design(), out, curves=Curves("chords"))),
+            "are not drawn in chords",
+        ),
+        (
+            lambda out: generate(RunRequest([design(), design("name=other")], out, name="job")),
             "made in registered sheets",
         ),
     ],

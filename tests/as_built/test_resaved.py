@@ -19,11 +19,11 @@ from ezdxf.addons import r12export
 from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.cutting.dxf_write import Curves, DxfProfile
-from sbafab.output.run import generate
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 Move = Callable[[float], float]
@@ -44,7 +44,7 @@ def good(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     template, settings, profile = request.param
     design = load_design(template, [*settings, "rules.yield_builds=100"])
     out = tmp_path_factory.mktemp("good")
-    return generate(design, out, ("cut",), curves=Curves(profile)).folder
+    return generate(RunRequest(design, out, ("cut",), Curves(profile))).folder
 
 
 @pytest.fixture

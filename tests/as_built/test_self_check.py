@@ -12,27 +12,28 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.as_built import check as as_built
-from sbafab.as_built.check import check_folder
-from sbafab.cli.ending import ended_plainly
+from sbafab.as_built.check import FolderReadBack
+from sbafab.cli.exit import exit_plainly
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import Curves
 from sbafab.errors import DefectError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.models.figures import Asked, Factors
+from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
-from sbafab.nesting.bottom_left import bottom_left
+from sbafab.nesting.engines import bottom_left
 from sbafab.nesting.records import NestPart, Placement, Stock
-from sbafab.output import contents, self_check
-from sbafab.output.job import generate_job
+from sbafab.output import artefacts
+from sbafab.output.artefacts import write_cut_files
+from sbafab.output.checked import DesignPlan
 from sbafab.output.manifest import file_hashes
-from sbafab.output.planned import Planned
-from sbafab.output.predicting import with_prediction
-from sbafab.output.run import Extras, generate
-from sbafab.output.shop import write_cut_files
-from sbafab.progress import Progress
-from sbafab.rules.deck import Rule
+from sbafab.process import Progress
 from sbafab.rules.finding import Finding, Place
+from sbafab.rules.rule import Explanation, Rule
+from sbafab.runs import run
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 FEW = ("stack.balloons=1", "rules.yield_builds=100")
@@ -42,8 +43,8 @@ Edit = Callable[[Path], object]
 def spoilt(edit: Edit) -> Callable[..., object]:
     """Writes the cut files, and then one of them once more, as a defect of the program might."""
 
-    def write(planned: Planned, folder: Path, tell: Progress) -> None:
-        write_cut_files(planned, folder, tell)
+    def write(plan: DesignPlan, folder: Path, tell: Progress) -> None:
+        write_cut_files(plan, folder, tell)
         edit(next((folder / "layers").glob("003_TPE_*.dxf")))
 
     return write
@@ -73,12 +74,12 @@ def test_a_run_whose_files_are_not_its_design_changes_nothing(
     edit: Edit, said: str, tmp_path: Path
 ) -> None:
     design = load_design("1dof-5mm", FEW)
-    before = file_hashes(generate(design, tmp_path, ("cut",)).folder)
+    before = file_hashes(generate(RunRequest(design, tmp_path, ("cut",))).folder)
     with (
-        patch.object(contents, "write_cut_files", spoilt(edit)),
+        patch.object(artefacts, "write_cut_files", spoilt(edit)),
         pytest.raises(DefectError, match=f"(?s){said}.*a defect of sbafab.*report"),
     ):
-        generate(design, tmp_path, ("cut",))
+        generate(RunRequest(design, tmp_path, ("cut",)))
     assert file_hashes(tmp_path / "1dof-5mm") == before
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".part"] == []
 
@@ -87,13 +88,13 @@ def test_rules_are_not_run_twice_on_what_is_as_designed(tmp_path: Path) -> None:
     def never(*_: object) -> list[object]:
         raise AssertionError
 
-    rules = (Rule("never", never),)  # type: ignore[arg-type]
+    rules = (Rule("never", never, Explanation("", "", "")),)  # type: ignore[arg-type]
     with patch.object(as_built, "RULES", rules):
-        generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+        generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
 
 
 def test_a_defect_ends_with_the_code_of_a_failed_rule(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop, ended_plainly():
+    with pytest.raises(SystemExit) as stop, exit_plainly():
         raise DefectError("the files do not hold")
     assert stop.value.code == 1
     assert "the files do not hold" in capsys.readouterr().err
@@ -103,7 +104,7 @@ def test_a_mistake_of_the_program_is_no_finding(clean_column: Path) -> None:
     def mistaken(*_: object) -> list[object]:
         raise AttributeError("no attribute of this name")
 
-    rules = (Rule("mistaken", mistaken),)  # type: ignore[arg-type]
+    rules = (Rule("mistaken", mistaken, Explanation("", "", "")),)  # type: ignore[arg-type]
     with patch.object(as_built, "RULES", rules), pytest.raises(AttributeError):
         check_folder(clean_column)
 
@@ -115,9 +116,8 @@ def as_designed(folder: Path) -> list[str]:
 
 def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
-    wish = Asked(volumes_ul=(5.0,), calibration=Factors(0.9, 1.1, 0.1, 12.0))
-    extras = Extras(also=with_prediction(design, predict(design, wish)))
-    generate(design, tmp_path, ("cut",), extras=extras)
+    wish = PredictionRequest(volumes_ul=(5.0,), calibration=Factors(0.9, 1.1, 0.1, 12.0))
+    generate(RunRequest(design, tmp_path, ("cut", "predict"), prediction=predict(design, wish)))
     doctor = Doctor(tmp_path / "1dof-5mm")
     assert as_designed(doctor.folder) == []
     path = doctor.folder / "predict.json"
@@ -130,7 +130,7 @@ def test_a_prediction_is_asked_for_again(tmp_path: Path) -> None:
 
 def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
     designs = [load_design("1dof-5mm", [*FEW, f"name={name}"]) for name in ("one", "two")]
-    folder = generate_job(designs, "both", tmp_path).folder
+    folder = generate(RunRequest(designs, tmp_path, name="both")).folder
     assert as_designed(folder) == []
     doctor = Doctor(folder / "two")
     path = doctor.folder / "press.json"
@@ -143,10 +143,10 @@ def test_a_job_is_made_again_whole(tmp_path: Path) -> None:
 def test_chords_that_are_too_coarse_are_the_users_choice(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", FEW)
     with (
-        patch.object(contents, "write_cut_files", spoilt(in_inches)),
+        patch.object(artefacts, "write_cut_files", spoilt(in_inches)),
         pytest.raises(OutputError, match=r"smaller --chord-error than 0\.005"),
     ):
-        generate(design, tmp_path, ("cut",), curves=Curves("chords"))
+        generate(RunRequest(design, tmp_path, ("cut",), Curves("chords")))
 
 
 @pytest.mark.parametrize(
@@ -161,10 +161,10 @@ def test_parts_of_a_nest_that_lie_badly_are_not_let_through(
         return (replace(first, shift=(x + shift[0], y + shift[1])), *others)
 
     with (
-        patch("sbafab.nesting.bottom_left.bottom_left", moved),
+        patch("sbafab.nesting.nest.bottom_left", moved),
         pytest.raises(DefectError, match=said),
     ):
-        generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+        generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
     assert not (tmp_path / "1dof-5mm").exists()
 
 
@@ -176,10 +176,10 @@ def test_what_is_cut_is_told_before_what_is_claimed(tmp_path: Path) -> None:
         for rule in ("manifest-claims", "sealing", "file-integrity", "as-designed")
     ]
     with (
-        patch.object(self_check, "check_written", lambda *_: found),
+        patch.object(run, "read_back", lambda *_: FolderReadBack(tuple(found), (), ())),
         pytest.raises(DefectError) as told,
     ):
-        generate(load_design("1dof-5mm", FEW), tmp_path, ("cut",))
+        generate(RunRequest(load_design("1dof-5mm", FEW), tmp_path, ("cut",)))
     said = [str(told.value).find(f"{rule}: wrong by {rule}") for rule in order]
     assert 0 < said[0] < said[1] < said[2]
     assert said[3] == -1

@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.reading import assembly_of
-from sbafab.design.reading import read_toml
-from sbafab.design.templates import templates_folder
+from sbafab.assemblies.files import assembly_of
+from sbafab.design.files import read_toml, templates_folder
 
 Change = Callable[[dict[str, Any]], None]
 

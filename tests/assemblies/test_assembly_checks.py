@@ -71,12 +71,12 @@ def test_templates_hold(template: str, tables: Tables, put_together: Together) -
 def test_a_waived_check_says_so(tables: Tables, put_together: Together) -> None:
     data = changed(tables("aperture"), FAULTS["seat"][1])
     data["rules"] = {"waive": ["seat"]}
-    seat = one(run_checks(put_together(data)), "seat")
+    seat = only_finding(run_checks(put_together(data)), "seat")
     assert (seat.verdict, seat.by_user) == ("waived", True)
     assert seat.message.startswith("waived by the assembly: ")
 
 
-def one(findings: tuple[Finding, ...], rule: str) -> Finding:
+def only_finding(findings: tuple[Finding, ...], rule: str) -> Finding:
     (found,) = [finding for finding in findings if finding.rule == rule]
     return found
 
@@ -85,7 +85,7 @@ def test_a_magnet_half_over_the_lumen_is_half_glued(tables: Tables, put_together
     # A magnet as wide as the lumen, half a lumen off: what is open is the lens of two circles.
     data = changed(tables("aperture"), {"magnet": {"diameter": 2, "offset": [1, 0]}})
     lens = 2 * (math.pi / 3 - math.sqrt(3) / 4)
-    seat = one(run_checks(put_together(data)), "seat")
+    seat = only_finding(run_checks(put_together(data)), "seat")
     assert seat.measured == pytest.approx(1 - lens / math.pi, abs=1e-6)
 
 
@@ -93,10 +93,10 @@ def test_shared_space_is_measured(tables: Tables, put_together: Together) -> Non
     # A line 0.4 thicker than the cup's bore, as far as it runs into the cup's bottom.
     data = tables("brace")
     changed(data, {"vacuum": {"outer_diameter": 1.5}})
-    found = one(run_checks(put_together(data)), "collision")
+    finding = only_finding(run_checks(put_together(data)), "collision")
     inside = 50 - 47.5 - 1.865
     expected = math.pi / 4 * (1.5**2 - 1.1**2) * inside
-    assert found.measured == pytest.approx(expected, rel=0.01)
+    assert finding.measured == pytest.approx(expected, rel=0.01)
 
 
 def test_parts_that_touch_do_not_collide(put_together: Together) -> None:
@@ -115,7 +115,7 @@ def test_parts_that_touch_do_not_collide(put_together: Together) -> None:
             "two": {**leg(), "offset": [14, 0], "turn": 180},
         },
     }
-    assert one(run_checks(put_together(data)), "collision").verdict == "pass"
+    assert only_finding(run_checks(put_together(data)), "collision").verdict == "pass"
 
 
 def leg() -> dict[str, Any]:
@@ -159,6 +159,6 @@ def test_a_line_must_run_through_its_lumen(
 def test_nothing_to_hold_with_fails(tables: Tables, put_together: Together) -> None:
     data = tables("standing")
     data["deploy"] = {"lumen_diameter": 25.4}
-    brace = one(run_checks(put_together(data)), "lumen-brace")
+    brace = only_finding(run_checks(put_together(data)), "lumen-brace")
     assert brace.verdict == "fail"
     assert "no part expands" in brace.message

@@ -10,8 +10,7 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.loading import load
-from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.files import load, load_assembly
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 
@@ -78,14 +77,16 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("template", "changes", "said"), FAULTS, ids=lambda value: str(value)[:50])
+@pytest.mark.parametrize(
+    ("template", "changes", "message"), FAULTS, ids=lambda value: str(value)[:50]
+)
 def test_what_is_wrong_is_said_in_one_sentence(
-    template: str, changes: dict[str, Any], said: str, tables: Tables, put_together: Together
+    template: str, changes: dict[str, Any], message: str, tables: Tables, put_together: Together
 ) -> None:
     data = tables(template)
     for path, value in changes.items():
         put(data, path, value)
-    pattern = said.replace("[", r"\[").replace("?", r"\?")
+    pattern = message.replace("[", r"\[").replace("?", r"\?")
     with pytest.raises(DesignError, match=pattern) as caught:
         put_together(data)
     assert "\n" not in str(caught.value)
@@ -107,11 +108,11 @@ def test_a_design_is_no_assembly_and_the_other_way_round() -> None:
 
 def test_keys_are_set_by_assignment_and_in_tables() -> None:
     whole = load_assembly("brace", ["parts.arm.set.stack.balloons=4", "parts.tube.length=5 cm"])
-    made = assemble(whole)
-    arm = made["arm"].made
+    assembled = assemble(whole)
+    arm = assembled["arm"].made
     assert arm is not None
     assert arm.laminate.balloons == 4
-    assert made["tube"].height == 50
+    assert assembled["tube"].height == 50
 
 
 def test_a_part_may_be_a_design_file_beside_the_assembly(tmp_path: Path) -> None:
@@ -120,9 +121,9 @@ def test_a_part_may_be_a_design_file_beside_the_assembly(tmp_path: Path) -> None
     whole.write_text(
         'family = "assembly"\n[parts.a]\nkind = "sba"\ndesign = "own.toml"\n', encoding="utf-8"
     )
-    made = assemble(load_assembly(whole))
-    assert made.assembly.name == "mine"
-    assert [one.design.name for one in made.designs] == ["own"]
+    assembled = assemble(load_assembly(whole))
+    assert assembled.assembly.name == "mine"
+    assert [design.design.name for design in assembled.designs] == ["own"]
 
 
 def test_a_typed_path_starts_where_the_user_stands(
@@ -130,8 +131,8 @@ def test_a_typed_path_starts_where_the_user_stands(
 ) -> None:
     (tmp_path / "own.toml").write_text('family = "1dof"\nstack.balloons = 2\n', encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    made = assemble(load_assembly("aperture", ["parts.arm.design=own.toml"]))
-    assert [one.design.name for one in made.designs] == ["own"]
+    assembled = assemble(load_assembly("aperture", ["parts.arm.design=own.toml"]))
+    assert [design.design.name for design in assembled.designs] == ["own"]
 
 
 def test_equal_parts_share_a_design_and_others_get_names_of_their_own() -> None:
@@ -143,12 +144,15 @@ def test_equal_parts_share_a_design_and_others_get_names_of_their_own() -> None:
 
 
 def test_machine_and_films_of_the_assembly_count_for_every_part() -> None:
-    made = assemble(load_assembly("brace", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"]))
-    assert [one.design.sheets.tpe.width for one in made.designs] == [300, 300]
-    assert [one.design.laser.kerf_tpe for one in made.designs] == [0.1, 0.1]
-    assert {one.design.sheets.tpe.length for one in made.designs} == {152.4}
+    assembled = assemble(load_assembly("brace", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"]))
+    assert [design.design.sheets.tpe.width for design in assembled.designs] == [300, 300]
+    assert [design.design.laser.kerf_tpe for design in assembled.designs] == [0.1, 0.1]
+    assert {design.design.sheets.tpe.length for design in assembled.designs} == {152.4}
 
 
 def test_a_waived_rule_of_the_deck_reaches_the_designs() -> None:
-    made = assemble(load_assembly("brace", (), ["tube-fit", "seat"]))
-    assert [one.design.rules.waive for one in made.designs] == [("tube-fit",), ("tube-fit",)]
+    assembled = assemble(load_assembly("brace", (), ["tube-fit", "seat"]))
+    assert [design.design.rules.waive for design in assembled.designs] == [
+        ("tube-fit",),
+        ("tube-fit",),
+    ]

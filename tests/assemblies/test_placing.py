@@ -8,12 +8,20 @@ import numpy as np
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.assemblies.build import assemble
-from sbafab.assemblies.poses import FLIPPED, LYING, OUTWARD, PartPose, about_axis, along, shifted
-from sbafab.assemblies.reading import load_assembly
+from sbafab.assemblies.build import (
+    FLIPPED,
+    LYING,
+    OUTWARD,
+    PartPose,
+    about_axis,
+    along,
+    assemble,
+    shifted,
+)
+from sbafab.assemblies.files import load_assembly
 from sbafab.assemblies.shapes import placed_surface
-from sbafab.geometry.shapes import rectangle
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.geometry.region import rectangle
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import open_edges
 from sbafab.meshing.wrap import bent, cut_along
 
@@ -59,14 +67,14 @@ def test_a_cut_adds_edges_and_changes_no_shape() -> None:
 
 
 def test_parts_stand_where_the_file_says() -> None:
-    made = assemble(load_assembly("brace"))
+    assembled = assemble(load_assembly("brace"))
     thickness = 30 * 0.038 + 29 * 0.025
-    assert made["arm"].at((0, 0, 0)) == pytest.approx((0, 0, 40))
-    assert made["cup"].at((0, 0, 0)) == pytest.approx((0, 0, 40 + thickness))
-    assert made["vacuum"].at((0, 0, 50)) == pytest.approx((0, 0, 42.5))
+    assert assembled["arm"].at((0, 0, 0)) == pytest.approx((0, 0, 40))
+    assert assembled["cup"].at((0, 0, 0)) == pytest.approx((0, 0, 40 + thickness))
+    assert assembled["vacuum"].at((0, 0, 50)) == pytest.approx((0, 0, 42.5))
     # The middle of the sheet, half a turn about its own axis: tabs point to the tube's start.
-    assert made["grip"].at((0, 0, 0)) == pytest.approx((7.5, 0, 18))
-    assert made["grip"].at((0, 5, 0)) == pytest.approx((7.5, 0, 13))
+    assert assembled["grip"].at((0, 0, 0)) == pytest.approx((7.5, 0, 18))
+    assert assembled["grip"].at((0, 5, 0)) == pytest.approx((7.5, 0, 13))
 
 
 def test_a_magnet_hangs_under_its_base() -> None:
@@ -78,8 +86,8 @@ def test_a_magnet_hangs_under_its_base() -> None:
 
 def test_a_line_leaves_its_inlet_outward() -> None:
     feed = [f"parts.feed.{k}={v}" for k, v in {"kind": "line", "on": "arm", "at": "inlet"}.items()]
-    made = assemble(load_assembly("aperture", [*feed, "parts.feed.chamber=chamber2"]))
-    start, end = made["feed"].at((0, 0, 0)), made["feed"].at((0, 0, 10))
+    assembled = assemble(load_assembly("aperture", [*feed, "parts.feed.chamber=chamber2"]))
+    start, end = assembled["feed"].at((0, 0, 0)), assembled["feed"].at((0, 0, 10))
     # Chamber 2 lies at 120 degrees; its tab ends 5 mm past the outline.
     assert math.degrees(math.atan2(start[1], start[0])) == pytest.approx(120)
     assert math.hypot(*start[:2]) == pytest.approx(7.5 + 5)

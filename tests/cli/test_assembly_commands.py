@@ -83,7 +83,7 @@ def test_generate_says_what_it_made_and_exits_1_on_a_failed_check(
         ["generate", "aperture", *small, "--set", "parts.magnet.offset=[0,0]"], capsys
     )
     assert code == 1
-    assert "No cut files were written: seat failed" in out
+    assert "failed: seat. No cut files were written" in out
     assert "--waive seat" in out
 
 

@@ -102,7 +102,7 @@ def test_no_command_is_exit_2_and_shows_the_help(capsys: pytest.CaptureFixture[s
 def test_generate_says_what_it_made(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     code, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path)], capsys)
     assert code == 0
-    for text in ("23 in 7 patterns", "read back", "45 min", "2.555 kN", "1dof-5mm holds: "):
+    for text in ("23 in 7 patterns", "read back", "45 min", "2.555 kN", "1dof-5mm passed: "):
         assert text in out, text
     assert (tmp_path / "1dof-5mm" / "manifest.json").is_file()
 
@@ -182,7 +182,7 @@ def test_a_sheet_without_room_for_its_label_says_so(
 ) -> None:
     narrow = ["--set", "sheets.tpe.border=1"]
     _, out, _ = run(["generate", "1dof-5mm", "-o", str(tmp_path), *narrow], capsys)
-    assert " ".join(out.split()).count("the border has no room for labels") == 1
+    assert " ".join(out.split()).count("borders have no room for labels") == 1
 
 
 @pytest.mark.parametrize(

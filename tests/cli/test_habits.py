@@ -14,10 +14,10 @@ from click.shell_completion import ShellComplete
 import sbafab
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
-from sbafab.cli.verdicts import limit_said
-from sbafab.cli.watching import repeated, stamps
+from sbafab.cli.check import file_states, watch_source
+from sbafab.cli.printing import limit_text
 from sbafab.rules.deck import rule_names
-from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, EXPLAINED
+from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, EXPLAINED
 from sbafab.rules.finding import Finding, Place
 
 
@@ -35,12 +35,13 @@ def test_check_fits_a_screen_and_sums_up_last(
     code, out, _ = run(["check", "3dof-15mm"], capsys)
     assert code == 0
     lines = out.splitlines()
-    assert len(lines) <= 24
+    assert len(lines) <= len(rule_names()) + 8
     assert max(map(len, lines)) <= 80
     for rule in rule_names():
         assert sum(line.startswith(f"{rule} ") for line in lines) == 1, rule
     assert "registration-worst-case: align layers 2 to 3 in step 2 with care" in out
-    assert lines[-1] == "3dof-15mm holds: 15 rules pass, 1 warns. Details: -v"
+    count = len(rule_names())
+    assert lines[-1] == f"3dof-15mm passed: {count} rules, 1 warning. Details: -v"
     _, out, _ = run(["check", "3dof-15mm", "--set", "mask.overhang=0.3"], capsys)
     assert max(map(len, out.splitlines())) <= 80
     _, said, _ = run(["check", "3dof-15mm", "-v"], capsys)
@@ -60,7 +61,7 @@ def test_limits_say_whether_they_are_the_least_or_the_most(
                 continue
             assert one["rule"] in {*rule_names(), *CHECKS}
             finding = Finding(one["rule"], "pass", one["limit"], None, "", Place(), "")
-            is_most = limit_said(finding).startswith("<= ")
+            is_most = limit_text(finding).startswith("<= ")
             good = one["verdict"] == "pass"
             off = one["measured"] - one["limit"]
             assert abs(off) <= 1e-3 or (off < 0) == (good == is_most), one
@@ -162,7 +163,6 @@ def test_a_file_without_its_ending_is_guessed(
 
 
 def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
-    assert tuple(DECK) == rule_names()
     assert set(BETWEEN_PARTS) == set(CHECKS)
     assert set(AS_BUILT) == {"file-integrity", "manifest-claims", "as-designed"}
     code, out, _ = run(["explain", "mask-overhang"], capsys)
@@ -178,7 +178,7 @@ def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -
 def test_the_keys_that_are_named_are_keys(capsys: pytest.CaptureFixture[str]) -> None:
     from sbafab.actuators import records
     from sbafab.assemblies.records import Assembly
-    from sbafab.design.messages import key_paths
+    from sbafab.design.files import key_paths
 
     known = set(key_paths(Assembly))
     for record in records().values():
@@ -216,10 +216,10 @@ def test_a_shell_gets_its_script() -> None:
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("check", "cut files would say so"),
-        ("cut", "Let cut files be written"),
-        ("press", "Let the schedule be written"),
-        ("predict", "Let the prediction be written"),
+        ("check", "cut files would state it"),
+        ("cut", "Write the cut files"),
+        ("press", "Write the schedule"),
+        ("predict", "Write the prediction"),
     ],
 )
 def test_waive_speaks_of_its_command(
@@ -232,7 +232,7 @@ def test_waive_speaks_of_its_command(
 def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
     design = tmp_path / "mine.toml"
     design.write_text("a = 1\n")
-    assert list(stamps(design)) == [design]
+    assert list(file_states(design)) == [design]
     seen: list[str] = []
 
     def once() -> None:
@@ -240,14 +240,14 @@ def test_watching_looks_again_at_what_changed_only(tmp_path: Path) -> None:
         if len(seen) == 1:
             design.write_text("a = 22\n")
 
-    repeated(once, design, looks=3)
+    watch_source(once, design, polls=3)
     assert seen == ["a = 1\n", "a = 22\n"]
 
 
 def test_watch_is_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     code, _, err = run(["check", "1dof-5mm", "--watch", "--json"], capsys)
     assert code == 2
-    assert "--watch is for people" in err
+    assert "--watch and --json exclude each other" in err
 
 
 def test_help_cuts_no_command_short(
@@ -263,7 +263,7 @@ def test_help_cuts_no_command_short(
 
 def test_python_counts_rules_as_the_command_does(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(["check", "1dof-5mm"], capsys)
-    said = out.splitlines()[-1].partition("holds: ")[2].partition(".")[0]
+    said = out.splitlines()[-1].partition("passed: ")[2].partition(".")[0]
     assert repr(sbafab.check("1dof-5mm")) == f"Findings({said})"
 
 
@@ -271,8 +271,8 @@ def test_python_counts_rules_as_the_command_does(capsys: pytest.CaptureFixture[s
     ("command", "words"),
     [
         ("record", "Result of the leak test."),
-        ("sweep", "Take this rule's failure as accepted in every design"),
-        ("find", "Folder that receives found.toml"),
+        ("sweep", "Accept the failure of this rule in every design"),
+        ("find", "Folder in which found.toml is written"),
         ("picture", "NAME-flat.png"),
     ],
 )
@@ -303,7 +303,7 @@ def test_known_keys_are_those_that_a_file_may_hold(
 def test_mesh_formats_are_called_as_they_are_written() -> None:
     """The version of Gmsh's format, wherever it is named, is the one in the files' first lines."""
     root = Path(__file__).parents[2]
-    writer = (root / "sbafab/meshing/conforming/write_msh.py").read_text(encoding="utf-8")
+    writer = (root / "sbafab/meshing/formats/msh.py").read_text(encoding="utf-8")
     version = re.findall(r"MeshFormat.n(\d\.\d)", writer)[0]
     places = [*root.glob("docs/*.md"), *root.glob("docs/scripts/*.py"), root / "README.md"]
     named = [
@@ -313,3 +313,35 @@ def test_mesh_formats_are_called_as_they_are_written() -> None:
     ]
     assert named
     assert set(named) == {version}
+
+
+@pytest.mark.parametrize(
+    ("typed", "hint"),
+    [
+        ("gen", "did you mean generate?"),
+        ("chekc", "did you mean check?"),
+        ("pre", "did you mean press or predict?"),
+        ("xyzzy", "'xyzzy' is not a command; see sbafab --help"),
+    ],
+)
+def test_an_unknown_command_is_answered_with_the_nearest(
+    typed: str, hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run([typed, "3dof-15mm"], capsys)
+    assert (code, out) == (2, "")
+    assert hint in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["--to", "tip.txt"], "tip.txt must end in .toml"),
+        (["--to", "tip.toml", "-o", "out"], "--out names a folder and --to a file"),
+    ],
+)
+def test_a_found_design_goes_to_a_folder_or_a_toml_file(
+    arguments: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run(["find", "1dof-5mm", "--max", "mass=1", *arguments], capsys)
+    assert (code, out) == (2, "")
+    assert reason in err

@@ -59,7 +59,7 @@ def test_one_kerf_for_both_where_it_is_asked_for(
 ) -> None:
     _, out, _ = run(["kerf", str(table), "--resolution", "0.001", "--no-split-xy"], capsys)
     assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": 0.11}}
-    assert "one kerf for both does not correct" in out
+    assert "a common kerf does not correct this" in out
 
 
 def test_kerfs_that_do_not_differ_are_one(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,7 +75,7 @@ def test_a_kerf_that_may_be_none_is_not_pasted_bare(
     path.write_text("feature;axis;nominal_mm;measured_mm\nA outer;x;24;23,95\nA window;y;8;8,07\n")
     code, out, _ = run(["kerf", str(path), "--resolution", "0"], capsys)
     assert code == 0
-    says = "the kerf may be none: its 95 % interval is -0.067 to 0.187 mm from 2 sizes"
+    says = "the kerf may be zero: its 95 % interval is -0.067 to 0.187 mm from 2 sizes"
     assert f"\nwarning: {says}" in out
     assert "Paste into the design file" not in out
     pasted = out[out.index("[laser]") :]
@@ -127,7 +127,7 @@ def test_a_constant_reading_error_is_told_and_corrected_for(
     assert "the calliper reads 0.0300 mm too much" in out
     assert "warning" not in out
     assert "laser" not in out[: out.index("[laser]")]
-    assert "a calliper's jaws press thin film in" in out
+    assert "the jaws of a calliper compress thin film" in out
     assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
     arguments[-1] = "scanner"
     assert "jaws" not in run(arguments, capsys)[1]
@@ -140,7 +140,7 @@ def test_outsides_alone_are_pasted_with_a_warning(
     rows = "".join(f"A outer,{axis},{n},{n - 0.12:.2f}\n" for axis in "xy" for n in (24, 20, 16))
     path.write_text(f"feature,axis,nominal_mm,measured_mm\n{rows}")
     _, out, _ = run(["kerf", str(path), "--instrument", "microscope"], capsys)
-    says = "these sizes cannot tell a constant reading error from kerf"
+    says = "a constant reading error cannot be separated from the kerf"
     assert f"warning: {says}" in out
     assert f"# warning: {says}" in out[out.index("[laser]") :]
 
@@ -149,8 +149,8 @@ def test_shrunk_film_draws_a_warning(table: Path, capsys: pytest.CaptureFixture[
     changed_sizes(table, lambda nominal, measured: measured - 0.003 * nominal)
     code, out, _ = run(["kerf", str(table), "--resolution", "0.001"], capsys)
     assert code == 0
-    assert "warning: sizes along x are 0.9970 times what was drawn" in out
-    assert "leave the laser as it is until a gauge of known length reads right" in out
+    assert "warning: sizes along x are 0.9970 times the drawn ones" in out
+    assert "Check the instrument with a gauge of known length" in out
     assert "steps per mm" not in out
     assert tomllib.loads(out[out.index("[laser]") :]) == {"laser": {"kerf_tpe": [0.12, 0.1]}}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sbafab.cli.lines import print_facts
+from sbafab.cli.printing import print_facts
 
 
 def test_a_path_longer_than_the_line_is_printed_whole(

@@ -47,7 +47,7 @@ def test_json_says_where_each_balloon_is(
 ) -> None:
     file = tmp_path / "map.json"
     code, out, _ = run(["map", "3dof-15mm", "--points", "3", "--to", str(file)], capsys)
-    assert (code, out) == (0, f"written to {file}\n")
+    assert (code, out) == (0, f"3dof-15mm mapped up to 110 kPa. Written to {file}\n")
     found = json.loads(file.read_text())
     hold("balloon-map", found)
     assert found["levels"] == [1] * 15
@@ -147,16 +147,16 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
 @pytest.mark.long
 def test_the_calibration_is_the_best_of_its_neighbours() -> None:
     from sbafab.models import paper
+    from sbafab.models.elastic import blocked_force
     from sbafab.models.figures import Factors
-    from sbafab.models.series import blocked
     from sbafab.models.stack import stack
-    from sbafab.reproduction.mechanics import FITTED
+    from sbafab.reproduction.rows import FITTED
 
     design = sbafab.load("1dof-5mm")
 
     def missed(loss: float) -> float:
         found = stack(design, factors=Factors(FITTED.press_factor, pocket_loss=loss))
-        return abs(float(blocked(found, paper.FORCE_KPA, 0.0)) - paper.FORCE_1DOF[0].value)
+        return abs(float(blocked_force(found, paper.FORCE_KPA, 0.0)) - paper.FORCE_1DOF[0].value)
 
     assert FITTED.modulus_mpa is None
     best = missed(FITTED.pocket_loss)

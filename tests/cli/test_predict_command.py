@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.cli import main
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
 from tests.site.formats import hold
 
 OVAL = str(Path(__file__).parents[2] / "docs" / "gallery" / "oval.toml")
@@ -54,7 +54,7 @@ def test_writes_figures_and_plots_that_the_manifest_lists(
 
 def _table_reads_well(out: str) -> None:
     """No line is longer than 80, each model's figures stand below its name, and none is doubled."""
-    assert max(len(line) for line in out.splitlines() if "written to" not in line) <= 80
+    assert max(len(line) for line in out.splitlines() if "Written to" not in line) <= 80
     lines = out.partition("Figures to design with")[2].splitlines()
     heads = [place for place, line in enumerate(lines) if line.startswith("force: ")]
     assert [lines[place].partition(" [")[0] for place in heads] == [
@@ -67,7 +67,7 @@ def _table_reads_well(out: str) -> None:
     assert first == "blocked force at 10 kPa, flat 0.3927 N"
     assert second.startswith("at 25 % of full stroke")
     # Above the heading of other models each quantity stands once.
-    others = lines.index("Other models of the same: design with the figures above")
+    others = lines.index("Alternative models: design with the figures above")
     assert heads[1] < others < heads[2]
     above = [line[:58] for line in lines[:others] if line.startswith("  ")]
     assert sum("10 kPa, flat" in line for line in above) == 1
@@ -94,7 +94,7 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
         for f in (tmp_path / "a" / "1dof-5mm", tmp_path / "b" / "1dof-5mm")
     )
     assert a == b
-    kept = generate(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",))
+    kept = generate(RunRequest(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",)))
     assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
     code, out, err = run(
         ["1dof-5mm", "-o", str(tmp_path / "a"), "--set", "stack.balloons=3"], capsys
@@ -158,9 +158,12 @@ def test_out_of_range_is_one_sentence_exit_2_and_nothing_on_disk(
         (["brace", "--pocket-loss", "0"], "--pocket-loss is for one actuator"),
         (["brace", "--press-factor", "0.5"], "--press-factor is for one actuator"),
         (["brace", "--contact-factor", "2"], "--contact-factor is for one actuator"),
-        (["brace", "--waive", "seat"], "--waive is for what is written"),
-        (["brace", "-o", "x"], "--out is for what is written"),
-        (["brace", "--pressure", "5", "--pressure", "6"], "--pressure is given once"),
+        (["brace", "--waive", "seat"], "--waive is for written files"),
+        (["brace", "-o", "x"], "--out is for written files"),
+        (
+            ["brace", "--pressure", "5", "--pressure", "6"],
+            "an assembly is predicted at one pressure",
+        ),
         (["radial-15mm", "--modulus", "3"], "--modulus is for elastic balloons, round pockets"),
         (["radial-15mm", "--load", "1.2"], "--load is for an assembly"),
         ([OVAL, "--volume", "5"], "--volume is for pockets that are round or oblong"),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.cli import main
-from sbafab.reports.traveller.code import record_text
+from sbafab.reports.traveller.page import record_text
 from tests.site.formats import hold
 
 FLAT = 12 * 0.038 + 11 * 0.025
@@ -65,11 +65,15 @@ def test_from_the_first_record_to_the_report(
     # The code on the traveller finds the record, and with the serial the one actuator.
     scanned = record_text("1dof-5mm", new["design_sha256"], "sbafab 1.0.0")
     _, out, _ = run(["record", "--find", scanned, "--serial", "A2"], capsys)
-    assert [line.split(",")[0] for line in out.splitlines()] == ["record 2", "record 4"]
+    assert [line.split(",")[0] for line in out.splitlines()] == [
+        "record 2",
+        "record 4",
+        "2 records found in lab.sqlite",
+    ]
     assert "corrected by 4" in out
     # As its last line says, to be typed by hand.
     arguments = scanned.splitlines()[-1].split()[1:]
-    assert len(run(arguments, capsys)[1].splitlines()) == 4
+    assert len(run(arguments, capsys)[1].splitlines()) == 5
 
     monkeypatch.setenv("SBAFAB_LAB", str(Path("lab.sqlite").resolve()))
     _, out, _ = run(["record", "--report", "--json"], capsys)
@@ -85,7 +89,7 @@ def test_from_the_first_record_to_the_report(
     assert height["predicted"] == pytest.approx(FLAT)
     assert height["high"] - 0.5 == pytest.approx(4.30265 * 0.02 / 3**0.5, rel=1e-4)
     assert height["verdict"] == "differs"
-    advice = f"1dof-5mm: sbafab predict --press-factor {0.5 / FLAT:.3f} takes the measured"
+    advice = f"1dof-5mm: sbafab predict --press-factor {0.5 / FLAT:.3f} uses the measured"
     assert advice in run(["record", "--report"], capsys)[1]
 
 
@@ -120,16 +124,16 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "name the DESIGN that was built, or give --find or --report"),
+        ([], "give the DESIGN that was built, --find or --report"),
         (["1dof-5mm"], "give --serial"),
-        (["1dof-5mm", "--serial", "A1"], "say what came out"),
-        (["1dof-5mm", "--report"], "give either DESIGN, --correct, --find or --report"),
-        (["--report", "--find", "A1"], "give either DESIGN, --correct, --find or --report"),
+        (["1dof-5mm", "--serial", "A1"], "give a result"),
+        (["1dof-5mm", "--report"], "give only one of DESIGN, --correct, --find and --report"),
+        (["--report", "--find", "A1"], "give only one of DESIGN, --correct, --find and --report"),
         (["--report", "--leak", "pass"], "--report only shows records"),
         (["1dof-5mm", "--serial", "A1", "--withdraw"], "--withdraw goes with --correct"),
         (["1dof-5mm", "--table", "x.csv", "--leak", "pass"], "--table holds serials"),
         (["1dof-5mm", "--table", "x.csv"], "x.csv cannot be read"),
-        (["--correct", "1"], "say what is right instead"),
+        (["--correct", "1"], "give the correct result"),
         (["--correct", "1", "--again"], "--again goes with DESIGN"),
         (["1dof-5mm", "--serial", "A1", "--leak", "pass", "--again"], "no attempt before this"),
         (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),

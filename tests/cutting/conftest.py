@@ -10,10 +10,8 @@ import pytest
 
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.boolean import union
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, stadium, strip
+from sbafab.geometry.region import Region, disc, stadium, strip, union
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer, Role
 

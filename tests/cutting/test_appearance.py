@@ -13,7 +13,7 @@ from ezdxf.entities.dxfgfx import DXFGraphic
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.errors import OutputError
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import disc
 
 Edit = Callable[[Drawing, DXFGraphic], object]
 

@@ -18,10 +18,10 @@ from sbafab.cutting.calibration import (
     Kind,
     Measurement,
     calibrated,
+    coupon_csv,
+    read_measurements,
     student_t,
 )
-from sbafab.cutting.coupon import coupon_csv
-from sbafab.cutting.measured_table import read_measurements
 from sbafab.errors import DesignError
 
 HEADER = "feature,axis,nominal_mm,measured_mm\n"

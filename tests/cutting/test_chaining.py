@@ -8,9 +8,9 @@ import pytest
 
 from sbafab.cutting.chaining import JOINED, check_clear, closed_loops, nested_region
 from sbafab.errors import OutputError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line, Point
-from sbafab.geometry.region import Contour
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.region import disc, rectangle, stadium
 
 # A square of 1 mm whose last corner is cut off by three edges of half a micrometre each.
 TINY = 0.0005

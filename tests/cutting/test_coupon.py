@@ -11,13 +11,12 @@ import pytest
 import shapely
 import svgelements
 
-from sbafab.cutting.coupon import SIZE, coupon, write_coupon
+from sbafab.cutting.calibration import SIZE, coupon, read_measurements, write_coupon
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.measured_table import read_measurements
-from sbafab.cutting.svg_write import sheet_svg
+from sbafab.cutting.sheets import sheet_svg
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc, stadium
+from sbafab.geometry.region import disc, stadium
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.cutting.chords import in_chords
-from sbafab.cutting.dxf_own import as_written
-from sbafab.cutting.dxf_read import ReadBack, read_profile, read_with_ezdxf
-from sbafab.cutting.dxf_write import DxfProfile, Surroundings, dxf_text
+from sbafab.cutting.dxf_read import ReadBack, as_written, read_profile, read_with_ezdxf
+from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import DxfProfile
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 

@@ -8,13 +8,14 @@ import re
 import pytest
 import shapely
 
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import DxfProfile, Surroundings, dxf_text, number
+from sbafab.cutting.dxf_write import Surroundings, dxf_text, number
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import DxfProfile
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 
 NAMES = ["disc", "ring", "discs", "stadium", "tab", "plate", "island"]
 

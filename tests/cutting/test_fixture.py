@@ -11,10 +11,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves
 from sbafab.cutting.fixture import PATH, fixture, plate_corner, write_fixture
-from sbafab.cutting.properties import CutSettings
-from sbafab.output.settings import hole_notes, limits
+from sbafab.cutting.properties import Curves, CutSettings
+from sbafab.output.checked import hole_notes, limits
 
 SETTINGS = CutSettings("test", "0" * 64)
 

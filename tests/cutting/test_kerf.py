@@ -12,11 +12,9 @@ from shapely.affinity import scale
 from sbafab.cutting.kerf import compensate
 from sbafab.cutting.properties import kerf_of, kerf_properties, kerf_suffix
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.beam import Kerf
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.offset import Kerf
+from sbafab.geometry.region import Region, disc, rectangle, stadium, union
 
 
 def test_disc_grows_and_its_hole_shrinks_by_half_the_kerf_as_circles() -> None:

@@ -20,12 +20,11 @@ from sbafab.actuators import load_design
 from sbafab.api import build
 from sbafab.cutting.chaining import check_clear
 from sbafab.cutting.kerf import compensate
-from sbafab.geometry.biarc import bezier, fit_arcs
-from sbafab.geometry.boolean import union
+from sbafab.geometry.arcs import bezier, fit_arcs
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import polygon, stadium
+from sbafab.geometry.region import Region, polygon, stadium, union
 
 COUNT = int(os.environ.get("SBAFAB_KERF_SHAPES", "8"))
 PAIRS = ((0.12, 0.1), (0.1, 0.12), (0.05, 0.2), (0.3, 0.1), (0.08, 0.085))

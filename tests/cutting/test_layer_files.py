@@ -14,12 +14,11 @@ import pytest
 import sbafab
 from sbafab.cutting import files
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.dxf_write import Curves, DxfProfile
 from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
-from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.properties import Curves, CutSettings, DxfProfile
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Counted
+from sbafab.process import Counted
 
 SETTINGS = CutSettings("two-plates", "ab" * 32)
 CALIBRATED = CutSettings(
@@ -153,14 +152,14 @@ def test_a_folder_that_cannot_be_written_is_left_to_the_run_to_report(
 
 SCRIPT = """
 import hashlib, math
-from sbafab.cutting.chords import in_chords
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.kerf import compensate
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import CutSettings, file_properties
-from sbafab.cutting.skeleton import skeleton_text
-from sbafab.geometry.boolean import union
-from sbafab.geometry.shapes import disc
+from sbafab.cutting.dxf_write import skeleton_text
+from sbafab.geometry.region import union
+from sbafab.geometry.region import disc
 axes = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.0, 2.1, 4.2)]
 plate = union([disc(axis, 3.25) for axis in axes]) | disc((0, 0), 1.75)
 plate = plate - union([disc(axis, 0.5) for axis in axes])

@@ -11,13 +11,10 @@ from xml.etree import ElementTree
 import pytest
 
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.lightburn import project_text
-from sbafab.cutting.lightburn_read import read_project
-from sbafab.cutting.lightburn_verify import verify_project
+from sbafab.cutting.lightburn import project_text, read_project, verify_project
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 
 AROUND = Surroundings(
     engraved=(((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)),),

@@ -10,9 +10,7 @@ import networkx
 import pytest
 
 from sbafab.cutting.order import cutting_order, travel
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle, union
 
 
 def grid(columns: int, rows: int, pitch: float, radius: float) -> Region:

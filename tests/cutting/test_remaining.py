@@ -9,10 +9,10 @@ from itertools import pairwise
 import pytest
 
 from sbafab.cutting import order
-from sbafab.cutting.remaining import PointsLeft
+from sbafab.cutting.order import PointsLeft
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc
+from sbafab.geometry.region import Region, disc
 
 
 def scattered(seed: int) -> list[Point]:

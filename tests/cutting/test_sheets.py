@@ -15,7 +15,7 @@ from sbafab.cutting.lettering import GLYPHS, strokes, width
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import Machine, SheetFile, write_sheets
 from sbafab.errors import OutputError
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 

@@ -7,8 +7,8 @@ import re
 import ezdxf
 import pytest
 
-from sbafab.cutting.cut_layers import COLOURS
-from sbafab.cutting.skeleton import SKELETON, skeleton_text
+from sbafab.cutting.dxf_write import SKELETON, skeleton_text
+from sbafab.cutting.properties import COLOURS
 
 
 @pytest.mark.skipif(ezdxf.version < (1, 4), reason="older ezdxf writes more tags")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.cutting.chords import in_chords
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import DxfProfile
 from sbafab.cutting.verify import verify_file
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 
 Write = Callable[[str], Path]
 

@@ -11,11 +11,12 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.design.files import kit_names, templates_folder
 from sbafab.design.films import Films
-from sbafab.design.kits import OTHER_TUBE, citation, read_kit, tube_name, write_kit
-from sbafab.design.records import Acceptance, Design, Laser, Press, Registration, Rules, Sheets
-from sbafab.design.templates import kit_names, templates_folder
-from sbafab.design.writing import design_sha256, design_toml, resolved
+from sbafab.design.identity import OTHER_TUBE, citation, design_sha256, tube_name
+from sbafab.design.kits import read_kit, write_kit
+from sbafab.design.records import Design, design_toml, resolved
+from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
 
 SECTIONS = {
@@ -125,7 +126,7 @@ def test_a_tube_of_the_kit_is_known_by_its_name(lab: Path) -> None:
     name = "inlet.tube=Braintree RPT040"
     bare = {"name": "x", "family": "1dof", "kit": str(lab)}
     from sbafab.actuators import records
-    from sbafab.design.reading import validated
+    from sbafab.design.records import validated
 
     found = validated({**bare, "inlet": {"tube": name.partition("=")[2]}}, records(), Path())
     assert found.inlet.tube_outer_diameter == 1.016

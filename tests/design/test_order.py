@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import binom
 
 from sbafab.actuators import load_design
-from sbafab.assemblies.reading import load_assembly
-from sbafab.design.order import builds_for, probability_of
-from sbafab.design.writing import design_sha256
+from sbafab.assemblies.files import load_assembly
+from sbafab.design.identity import design_sha256
+from sbafab.design.sections import builds_for, probability_of
 from sbafab.errors import DesignError
 
 

@@ -14,8 +14,7 @@ import shapely
 from sbafab.design.outline import read_outline, understood
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, stadium
+from sbafab.geometry.region import Region, disc, stadium
 from tests.design.drawing import ARROW, PAGE, dxf, svg
 
 SLOT = stadium((0, 0), 4, 10).turned(90)
@@ -97,7 +96,7 @@ def test_the_size_that_is_understood_is_said(tmp_path: Path, unit: int, said: st
         with pytest.raises(DesignError, match=r"measures 152\.4 x 152\.4 mm"):
             understood(path)
     else:
-        assert understood(path).said.startswith(f"drawn outline: {said}")
+        assert understood(path).description.startswith(f"drawn outline: {said}")
 
 
 def test_a_drawing_that_was_changed_is_read_again(tmp_path: Path) -> None:
@@ -303,13 +302,13 @@ def test_an_outline_drawn_elsewhere_is_centred_on_its_centroid(
 ) -> None:
     outline = understood(dxf(tmp_path, lambda m: m.add_circle(centre, 2)))
     assert outline.region.bounds == pytest.approx((-2, -2, 2, 2), abs=1e-6)
-    assert outline.said.endswith("centred on its centroid")
+    assert outline.description.endswith("centred on its centroid")
 
 
 def test_an_outline_round_the_origin_stays_as_it_is_drawn(tmp_path: Path) -> None:
     outline = understood(dxf(tmp_path, lambda m: m.add_circle((1, 0), 2)))
     assert outline.region.bounds == pytest.approx((-1, -2, 3, 2))
-    assert "centred" not in outline.said
+    assert "centred" not in outline.description
 
 
 def test_a_shape_that_is_not_alike_both_ways_is_centred_by_area(tmp_path: Path) -> None:

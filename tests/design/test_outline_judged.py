@@ -39,7 +39,7 @@ def understood_as(folder: Path, text: str) -> Region:
     path.write_text(text, encoding="utf-8")
     found = understood(path)
     low_x, low_y, high_x, high_y = found.region.bounds
-    assert f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm" in found.said
+    assert f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm" in found.description
     return found.region
 
 
@@ -259,7 +259,7 @@ def test_how_large_a_unit_is_is_said(tmp_path: Path) -> None:
         ('width="9mm"', "1.058 x 1.058 mm, read at 0.264583 mm a unit, 96 units an inch"),
     ):
         path.write_text(drawing(page, '<circle r="2"/>'))
-        assert understood(path).said == f"drawn outline: {said}"
+        assert understood(path).description == f"drawn outline: {said}"
 
 
 def a_length(dice: random.Random, units: float, whole: float) -> str:

@@ -9,11 +9,10 @@ import pytest
 from pydantic import BaseModel
 
 from sbafab.actuators import FAMILIES, build
-from sbafab.assemblies.reading import assembly_of
+from sbafab.assemblies.files import assembly_of
 from sbafab.assemblies.records import KINDS
-from sbafab.design.messages import key_paths
-from sbafab.design.reading import read_toml, validated
-from sbafab.design.templates import templates_folder
+from sbafab.design.files import key_paths, read_toml, templates_folder
+from sbafab.design.records import validated
 from sbafab.errors import DesignError
 from sbafab.reports.layers_svg import layers_svg
 

@@ -1,4 +1,4 @@
-"""Writes ``docs/faults.md`` from what the checks find: ``python -m tests.faults``.
+"""Writes ``docs/measured/faults.csv`` from what the checks find: ``python -m tests.faults``.
 
 With ``--check`` the page is compared, not written.
 """

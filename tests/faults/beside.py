@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-from sbafab.cutting.cut_layers import ENGRAVE
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import ENGRAVE
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from tests.faults.record import Fault, Kind

@@ -11,9 +11,9 @@ from filelock import FileLock
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import read_folder
-from sbafab.design.writing import design_sha256
+from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.faults import beside, chords, claims, files, holes, layers, masks, panels, sheets
 from tests.faults.record import Fault, Kind
@@ -55,9 +55,9 @@ def good_folders(root: Path) -> Goods:
             if not folder.exists():
                 if whole:
                     with unabridged():
-                        generate(design, out)
+                        generate(RunRequest(design, out))
                 else:
-                    generate(design, out, ("cut",))
+                    generate(RunRequest(design, out, ("cut",)))
         clean = read_folder(folder).laminate
         assert clean is not None
         return Specimen(Doctor(folder), clean)

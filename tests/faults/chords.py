@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import polygon
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.region import Region, polygon
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Pick, Specimen, mask, separator, wall
 

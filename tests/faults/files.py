@@ -7,14 +7,13 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from sbafab.cutting.chords import in_chords
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.edges import Line
-from sbafab.geometry.intersect import meeting_points
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Line, meeting_points
+from sbafab.geometry.region import Region, disc
 from tests.faults.holes import bore
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Pick, Specimen, mask, separator, tabbed_wall, wall

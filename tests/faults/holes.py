@@ -6,8 +6,7 @@ import math
 from collections.abc import Iterable
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin, Role
 from tests.faults.record import Fault, Kind, no_lumen, redrawn
 from tests.faults.specimen import Change, Pick, Specimen, base, cap, mask, separator, wall

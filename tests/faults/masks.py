@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
 from tests.faults.holes import aside, bore, cut_in_two
 from tests.faults.record import Kind, no_lumen, no_sheet, one_chamber, redrawn

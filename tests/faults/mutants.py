@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 from zipfile import ZipFile
 
-from sbafab.meshing.write_3mf import _write_zip
+from sbafab.meshing.formats.three_mf import _write_zip
 
 Change = Callable[[bytes, Random], bytes]
 NUMBER = re.compile(r"(?<![\w.#-])-?\d+(?:\.\d+)?(?![\w.])")

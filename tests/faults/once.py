@@ -11,10 +11,10 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.as_built import derived
-from sbafab.design.writing import design_sha256
-from sbafab.output.manifest_records import Manifest
-from sbafab.output.planned import Checked
+from sbafab.design.identity import design_sha256
+from sbafab.output.checked import Checked
+from sbafab.output.manifest import Manifest
+from sbafab.runs import check_folder as derived
 
 
 def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
@@ -22,9 +22,11 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
 
     That is what a design makes, what the rules find in it, and what it writes beside cut files.
     """
-    deck, write = as_built._deck, derived._write_anew
+    deck, write = as_built._run_deck, derived._regenerate
     measured = _remembered(deck, _asked_of_deck)
-    meant_by = _remembered(as_built.meant_by, lambda d, curves: f"{design_sha256(d)} {curves}")
+    expected = _remembered(
+        as_built.expected_laminate, lambda d, curves: f"{design_sha256(d)} {curves}"
+    )
     run_deck = _remembered(as_built.run_deck, lambda made, limits: made.name + repr(limits))
     made: dict[str, Any] = {}
 
@@ -44,20 +46,20 @@ def remembering(root: Path) -> Callable[[], AbstractContextManager[None]]:
     @contextmanager
     def context() -> Iterator[None]:
         with (
-            patch.object(as_built, "_deck", lambda b: (measured if b.is_meant else deck)(b)),
-            patch.object(as_built, "meant_by", meant_by),
+            patch.object(as_built, "_run_deck", lambda b: (measured if b.is_expected else deck)(b)),
+            patch.object(as_built, "expected_laminate", expected),
             patch.object(as_built, "run_deck", run_deck),
-            patch.object(derived, "_write_anew", write_once),
+            patch.object(derived, "_regenerate", write_once),
         ):
             yield
 
     return context
 
 
-def _asked_of_deck(built: as_built.AsBuilt) -> str:
+def _asked_of_deck(built: as_built.AsBuiltFolder) -> str:
     """Design, limits, and the rules that are run: some checks leave out all or some."""
     names = [rule.name for rule in as_built.RULES]
-    return design_sha256(built.design) + repr((built.limits, built.known, names))
+    return design_sha256(built.design) + repr((built.limits, built.design_findings, names))
 
 
 def _remembered(work: Callable[..., Any], key: Callable[..., str]) -> Callable[..., Any]:

@@ -10,8 +10,7 @@ from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.second_cut import PATH, marks
 from sbafab.geometry.edges import Edge, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.laminate import Laminate
 from tests.faults.record import Fault, Kind
 from tests.faults.specimen import Change, Pick, Specimen, base, separator, wall

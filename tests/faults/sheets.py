@@ -7,13 +7,14 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from sbafab.cutting.cut_layers import CUT_SHEET, ENGRAVE
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import CUT_SHEET, ENGRAVE
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
+from sbafab.geometry.region import Region
 from sbafab.nesting.check import least_distance
 from tests.faults.files import inches
 from tests.faults.holes import EARS

@@ -13,23 +13,23 @@ from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
 from sbafab.as_built import cut_files, stack
-from sbafab.as_built.check import check_folder, design_problems_of, read_folder
+from sbafab.as_built.check import read_folder
 from sbafab.as_built.cut_files import CutPart, read_part
-from sbafab.as_built.meant import Expected
+from sbafab.as_built.expected import Expected
 from sbafab.as_built.sheets import sheet_problems
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.geometry.region import Region
 from sbafab.laminate import laminate
-from sbafab.laminate.interfaces import interface_regions
-from sbafab.laminate.laminate import Laminate, Layer, Role
-from sbafab.output import checking
+from sbafab.laminate.laminate import Laminate, Layer, Role, interface_regions
+from sbafab.output import checked
+from sbafab.output.checked import Checked, DesignPlan, cut_settings
 from sbafab.output.manifest import manifest
-from sbafab.output.planned import Checked, Planned
-from sbafab.output.settings import cut_settings
 from sbafab.rules import registration_worst_case, registration_yield
 from sbafab.rules.deck import RULES, run_deck
+from sbafab.runs import check_folder as whole
+from sbafab.runs.check_folder import check_folder, design_problems_of
 from tests.as_built.doctoring import Doctor
 
 Change = Callable[[Region, Laminate], Region]
@@ -66,7 +66,7 @@ class Specimen:
         built = read_folder(self.doctor.folder)
         if built.laminate is not None:
             checked = Checked(built.design, built.laminate, ())
-            planned = Planned(checked, frozenset(), cut_settings(built.design, ()))
+            planned = DesignPlan(checked, frozenset(), cut_settings(built.design, ()))
             told = manifest(planned, (), ())
             self.doctor.set_manifest(lambda claims: _retold(claims, told))
         self.doctor.rehash()
@@ -116,8 +116,8 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
         patch.object(stack, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
-        patch.object(as_built, "design_problems_of", lambda *_: []),
-        patch.object(checking, "run_deck", lambda *_: ()),
+        patch.object(whole, "design_problems_of", lambda *_: []),
+        patch.object(checked, "run_deck", lambda *_: ()),
     ):
         yield
 
@@ -127,8 +127,8 @@ def unabridged() -> Iterator[None]:
     """Every rule is run, and all that lies in a folder is held against its design."""
     with (
         patch.object(as_built, "RULES", RULES),
-        patch.object(as_built, "design_problems_of", design_problems_of),
-        patch.object(checking, "run_deck", run_deck),
+        patch.object(whole, "design_problems_of", design_problems_of),
+        patch.object(checked, "run_deck", run_deck),
     ):
         yield
 

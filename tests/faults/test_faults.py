@@ -1,4 +1,4 @@
-"""Every fault is caught by the rule named for it, and ``docs/faults.md`` says what was found.
+"""Every fault is caught by the rule named for it, as ``docs/measured/faults.csv`` records it.
 
 Every second fault is put into ``1dof-5mm``, and every fourth into each other template.
 ``python -m tests.faults`` runs all of them and writes the page; with ``--check`` it compares.

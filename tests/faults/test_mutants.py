@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.errors import OutputError
-from sbafab.output.run import generate
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 from tests.faults.harmless import changes_nothing
 from tests.faults.mutants import mutated
@@ -37,7 +37,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     few = ("stack.balloons=2", "rules.yield_builds=100")
     root = tmp_path_factory.mktemp("sound")
     return [
-        generate(load_design(template, [*few, *settings]), root).folder
+        generate(RunRequest(load_design(template, [*few, *settings]), root)).folder
         for template, settings in DESIGNS
     ]
 

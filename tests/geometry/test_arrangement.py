@@ -6,14 +6,11 @@ import math
 
 import pytest
 
+from sbafab.errors import GeometryError, InconsistentError
 from sbafab.geometry import arrangement
-from sbafab.geometry.arrangement import Arrangement
-from sbafab.geometry.boolean import union, wound
+from sbafab.geometry.arrangement import Arrangement, Overlay, Piece, by_owner, overlaid, split_edges
 from sbafab.geometry.edges import EPSILON, Arc, Line, Point, distance_to, left_normal
-from sbafab.geometry.inconsistent import GeometryError, InconsistentError
-from sbafab.geometry.pieces import Overlay, Piece, by_owner, overlaid, split_edges
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle, union, wound
 
 
 def arranged(*regions: Region) -> Arrangement:
@@ -21,24 +18,24 @@ def arranged(*regions: Region) -> Arrangement:
 
 
 def test_windings_of_nested_and_crossing_shapes() -> None:
-    found = arranged(
+    arrangement = arranged(
         disc((0, 0), 3), disc((0, 0), 2), disc((2.5, 0), 1), rectangle((9, 0), (10, 1))
     )
-    assert set(found.left) == {0, 1, 2, 3}
-    for half in range(len(found.origin)):
-        edge = found.edge(half)
+    assert set(arrangement.left) == {0, 1, 2, 3}
+    for half in range(len(arrangement.origin)):
+        edge = arrangement.edge(half)
         (x, y), (ux, uy) = edge.at(0.5), edge.direction(edge.at(0.5))
         p = (x - 1e-4 * uy, y + 1e-4 * ux)
         inside = [r.contains(p) for r in (disc((0, 0), 3), disc((0, 0), 2), disc((2.5, 0), 1))]
-        assert found.left[half] == sum(inside) + rectangle((9, 0), (10, 1)).contains(p)
+        assert arrangement.left[half] == sum(inside) + rectangle((9, 0), (10, 1)).contains(p)
 
 
 def test_each_owner_has_its_own_windings() -> None:
     first, second = disc((0, 0), 3), rectangle((0, -9), (9, 9))
     rows = [first, second, *([disc((0, 0), 1)] * 30), second]
-    found = Arrangement(overlaid([region.edges for region in rows]))
-    for half, turns in enumerate(found.left):
-        edge = found.edge(half)
+    arrangement = Arrangement(overlaid([region.edges for region in rows]))
+    for half, turns in enumerate(arrangement.left):
+        edge = arrangement.edge(half)
         nx, ny = left_normal(edge, edge.at(0.5))
         x, y = edge.at(0.5)
         p = (x + 1e-4 * nx, y + 1e-4 * ny)

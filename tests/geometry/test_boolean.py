@@ -7,10 +7,8 @@ import random
 
 import pytest
 
-from sbafab.geometry.boolean import union, wound
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union, wound
 
 
 def lens(r: float, s: float, gap: float) -> float:
@@ -203,7 +201,7 @@ def test_operations_add_up_on_turned_lobed_plates() -> None:
     """Areas of union and intersection sum to those of the two, at every small difference."""
     lobes = [disc((4.25, 0), 3.25).turned(angle) for angle in (0, 120, 240)]
     plate = union([*lobes, disc((0, 0), 1.75)]) - disc((0, 0), 1)
-    others = [
+    partners = [
         plate.turned(2),
         plate.turned(1e-4),
         plate.turned(120),
@@ -215,11 +213,11 @@ def test_operations_add_up_on_turned_lobed_plates() -> None:
     ]
     # Slivers thinner than four times the tolerance count as nothing.
     dust = 8e-6 * plate.outers[0].length
-    for other in others:
-        total = plate.area + other.area
-        common = plate & other
-        assert (plate | other).area + common.area == pytest.approx(total, abs=dust)
-        assert (plate - other).area == pytest.approx(plate.area - common.area, abs=dust)
+    for b in partners:
+        total = plate.area + b.area
+        common = plate & b
+        assert (plate | b).area + common.area == pytest.approx(total, abs=dust)
+        assert (plate - b).area == pytest.approx(plate.area - common.area, abs=dust)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -230,10 +228,8 @@ def test_discs_apart_are_what_laying_them_over_each_other_gives(seed: int) -> No
             disc((draw.uniform(-9, 9), draw.uniform(-9, 9)), draw.uniform(0.3, 2)).turned(33)
             for _ in range(draw.randint(2, 5))
         ]
-        laid_over = wound([edge for one in discs for edge in one.edges], 0)
+        laid_over = wound([edge for a in discs for edge in a.edges], 0)
         assert union(discs).contours == laid_over.contours
     for apart in (0.0, 1e-6, 3e-6, 7e-6, 9e-6, 1e-3):
         pair = disc((0, 0), 1), disc((2 + apart, 0), 1)
-        assert (
-            union(pair).contours == wound([edge for one in pair for edge in one.edges], 0).contours
-        )
+        assert union(pair).contours == wound([edge for a in pair for edge in a.edges], 0).contours

@@ -7,9 +7,7 @@ import math
 import pytest
 import shapely
 
-from sbafab.geometry.centroid import centroid
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.region import Region, centroid, disc, rectangle, strip
 
 HALF = disc((3.0, -1.0), 2.0) & rectangle((3.0, -5.0), (9.0, 5.0))
 SHAPES = {

@@ -13,12 +13,12 @@ Box = tuple[float, float, float, float]
 
 
 def boxes(draw: random.Random, count: int) -> list[Box]:
-    found = []
+    rows = []
     for _ in range(count):
         x, y = draw.randrange(40), draw.randrange(40)
         # Whole numbers, so that many touch at an edge or a corner.
-        found.append((x, y, x + draw.randrange(6), y + draw.randrange(6)))
-    return [tuple(map(float, box)) for box in found]
+        rows.append((x, y, x + draw.randrange(6), y + draw.randrange(6)))
+    return [tuple(map(float, box)) for box in rows]
 
 
 def touch(a: Box, b: Box) -> bool:
@@ -37,31 +37,31 @@ def touch(a: Box, b: Box) -> bool:
 )
 def test_each_part_touches_its_own_boxes_alone(parts: list[tuple[int, int]]) -> None:
     draw = random.Random(16)
-    asked = [boxes(draw, count) for count, _ in parts]
-    others = [boxes(draw, count) for _, count in parts]
+    queries = [boxes(draw, count) for count, _ in parts]
+    targets = [boxes(draw, count) for _, count in parts]
     expected = []
     first = other_first = 0
-    for own, near in zip(asked, others, strict=True):
+    for query, near in zip(queries, targets, strict=True):
         expected += [
             (first + i, other_first + j)
-            for i, a in enumerate(own)
+            for i, a in enumerate(query)
             for j, b in enumerate(near)
             if touch(a, b)
         ]
-        first, other_first = first + len(own), other_first + len(near)
+        first, other_first = first + len(query), other_first + len(near)
     columns = [
         np.array([box for part in every for box in part]).reshape(-1, 4).T
-        for every in (asked, others)
+        for every in (queries, targets)
     ]
     counts, other_counts = zip(*parts, strict=True)
-    own, near = touching_in_parts(columns[0], counts, columns[1], other_counts)
-    assert list(zip(own.tolist(), near.tolist(), strict=True)) == expected
+    query, near = touching_in_parts(columns[0], counts, columns[1], other_counts)
+    assert list(zip(query.tolist(), near.tolist(), strict=True)) == expected
 
 
 def test_many_boxes_are_told_as_few_are() -> None:
     draw = random.Random(17)
-    asked, others = boxes(draw, 300), boxes(draw, 200)
-    assert len(asked) * len(others) > FEW
-    own, near = touching(np.array(asked).T, np.array(others).T)
-    expected = [(i, j) for i, a in enumerate(asked) for j, b in enumerate(others) if touch(a, b)]
-    assert list(zip(own.tolist(), near.tolist(), strict=True)) == expected
+    queries, targets = boxes(draw, 300), boxes(draw, 200)
+    assert len(queries) * len(targets) > FEW
+    query, near = touching(np.array(queries).T, np.array(targets).T)
+    expected = [(i, j) for i, a in enumerate(queries) for j, b in enumerate(targets) if touch(a, b)]
+    assert list(zip(query.tolist(), near.tolist(), strict=True)) == expected

@@ -6,8 +6,15 @@ import math
 
 import pytest
 
-from sbafab.geometry.edges import Arc, Line, distance_to, edge_from_bulge, left_normal, unit
-from sbafab.geometry.intersect import meeting_points
+from sbafab.geometry.edges import (
+    Arc,
+    Line,
+    distance_to,
+    edge_from_bulge,
+    left_normal,
+    meeting_points,
+    unit,
+)
 
 QUARTER = Arc((3.0, 1.0), (1.0, 3.0), (1.0, 1.0), 2.0, True)
 HALF = Arc((3.0, 1.0), (-1.0, 1.0), (1.0, 1.0), 2.0, True)

@@ -4,9 +4,8 @@ import math
 
 import pytest
 
-from sbafab.geometry.facets import facets
-from sbafab.geometry.region import Contour
-from sbafab.geometry.shapes import circle, disc, rectangle, stadium
+from sbafab.geometry.contour import Contour, circle, facets
+from sbafab.geometry.region import disc, rectangle, stadium
 
 
 def shoelace(points: list[tuple[float, float]]) -> float:

@@ -8,10 +8,10 @@ from random import Random
 
 import pytest
 
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from tests.hunt import oracle
 from tests.hunt.__main__ import CHUNK, hunted
 
@@ -30,7 +30,7 @@ def test_offsets(chunk: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("what", "seed", "number"),
+    ("operation", "seed", "number"),
     [
         # An edge 7 nm long; the arc beside it ends 3.7 nm off its circle.
         ("offsets", 11, 16945),
@@ -49,8 +49,8 @@ def test_offsets(chunk: int) -> None:
         ("offsets", 2026, 189961),
     ],
 )
-def test_found_before(what: str, seed: int, number: int) -> None:
-    assert hunted(what, seed, number, count=1) == []
+def test_found_before(operation: str, seed: int, number: int) -> None:
+    assert hunted(operation, seed, number, count=1) == []
 
 
 def ring() -> tuple[Region, Region]:
@@ -58,9 +58,9 @@ def ring() -> tuple[Region, Region]:
 
 
 def with_a_chord(region: Region) -> Region:
-    first, *others = region.contours
+    first, *rest = region.contours
     arc, *edges = first.edges
-    return Region((Contour((Line(arc.start, arc.end), *edges)), *others))
+    return Region((Contour((Line(arc.start, arc.end), *edges)), *rest))
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import random
 
-from sbafab.geometry.nanometres import in_reading_order, nanometres
-from sbafab.geometry.shapes import circle, rectangle
+from sbafab.geometry.contour import circle, in_reading_order, nanometres
+from sbafab.geometry.region import rectangle
 
 
 def test_nearest_nanometre_either_side_of_zero() -> None:

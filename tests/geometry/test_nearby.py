@@ -82,14 +82,14 @@ def test_pairs_of_many_boxes_come_as_those_of_few(
         x, y = draw.choice([round(draw.uniform(0, 50)), draw.uniform(0, 50)]), draw.uniform(0, 50)
         size = draw.choice([0.0, 0.5, 9.0])
         boxes.append((x, y, x + size, y + size * draw.random()))
-    found = list(close_pairs(boxes, reach))
+    pairs = list(close_pairs(boxes, reach))
     monkeypatch.setattr(nearby, "AT_ONCE", 100)
-    assert list(close_pairs(boxes, reach)) == found
+    assert list(close_pairs(boxes, reach)) == pairs
     monkeypatch.setattr(nearby, "MANY_BOXES", sys.maxsize)
-    assert list(close_pairs(boxes, reach)) == found
+    assert list(close_pairs(boxes, reach)) == pairs
     monkeypatch.setattr(nearby, "FEW_BOXES", sys.maxsize)
-    assert list(close_pairs(boxes, reach)) == found
-    assert len(found) > 500
+    assert list(close_pairs(boxes, reach)) == pairs
+    assert len(pairs) > 500
 
 
 def test_the_distance_to_a_single_edge_is_found_from_anywhere() -> None:
@@ -115,9 +115,9 @@ def test_close_pairs_are_those_whose_boxes_come_within_reach() -> None:
             for j, b in enumerate(boxes[:i])
             if max(a[0] - b[2], b[0] - a[2]) <= reach and max(a[1] - b[3], b[1] - a[3]) <= reach
         }
-        found = list(close_pairs(boxes, reach))
-        assert {frozenset(pair) for pair in found} == expected
-        assert len(found) == len(expected)
+        pairs = list(close_pairs(boxes, reach))
+        assert {frozenset(pair) for pair in pairs} == expected
+        assert len(pairs) == len(expected)
 
 
 @pytest.mark.parametrize("seed", range(4))

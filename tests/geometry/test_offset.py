@@ -6,12 +6,9 @@ import math
 
 import pytest
 
-from sbafab.geometry.beam import beam_path
-from sbafab.geometry.boolean import union
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.offset import fillet, grow, shrink
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.offset import beam_path, fillet, grow, shrink
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 
 CONVEX = [
     disc((1, 2), 3.25),

@@ -7,22 +7,20 @@ from random import Random
 
 import pytest
 
-from sbafab.geometry.boolean import difference, intersection, union
+from sbafab.geometry.arrangement import PointPool
 from sbafab.geometry.edges import SAME, Point
-from sbafab.geometry.pool import PointPool
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.region import Region, difference, disc, intersection, rectangle, stadium, union
 
 STEPS = [(0.95 * SAME * i, 0.0) for i in range(5)]
 
 
 def groups(points: list[Point]) -> set[frozenset[Point]]:
     pool = PointPool(points)
-    found: dict[Point, set[Point]] = {}
+    by_leader: dict[Point, set[Point]] = {}
     for p in points:
-        found.setdefault(pool.snapped(p), set()).add(p)
-    assert all(leader == min(group) for leader, group in found.items())
-    return {frozenset(group) for group in found.values()}
+        by_leader.setdefault(pool.snapped(p), set()).add(p)
+    assert all(leader == min(group) for leader, group in by_leader.items())
+    return {frozenset(group) for group in by_leader.values()}
 
 
 def test_a_chain_of_points_is_one_point_in_any_order() -> None:

@@ -14,12 +14,11 @@ from random import Random
 
 import pytest
 
-from sbafab.geometry.biarc import ellipse, fit_arcs
-from sbafab.geometry.boolean import union
+from sbafab.geometry.arcs import ellipse, fit_arcs
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, edge_from_bulge
 from sbafab.geometry.offset import grow, shrink
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle, union
 from tests.hunt.oracle import OPERATIONS, complaint, offset_complaint
 
 QUARTER = math.tan(math.pi / 8)
@@ -112,13 +111,13 @@ PAIRS: dict[str, tuple[Vertices, Vertices]] = {
 }
 
 
-@pytest.mark.parametrize("what", OPERATIONS)
+@pytest.mark.parametrize("operation", OPERATIONS)
 @pytest.mark.parametrize("case", PAIRS)
-def test_booleans(case: str, what: str) -> None:
+def test_booleans(case: str, operation: str) -> None:
     a, b = (outline(vertices) for vertices in PAIRS[case])
     for seed in range(5):
-        assert complaint(what, a, b, Random(seed)) is None
-        assert complaint(what, b, a, Random(seed)) is None
+        assert complaint(operation, a, b, Random(seed)) is None
+        assert complaint(operation, b, a, Random(seed)) is None
 
 
 OFFSETS: dict[str, tuple[Vertices, tuple[float, ...]]] = {

@@ -7,10 +7,9 @@ import math
 
 import pytest
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, union
 
 RING = disc((0, 0), 3) - disc((0.5, 0), 1)
 

@@ -7,11 +7,8 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, unit
-from sbafab.geometry.region import Contour
-from sbafab.geometry.runs import runs, same_support
-from sbafab.geometry.shapes import circle
-from sbafab.geometry.tidy import tidy
+from sbafab.geometry.contour import Contour, circle, tidy
+from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, runs, same_support, unit
 
 
 def closed(points: list[Point]) -> tuple[Edge, ...]:
@@ -59,8 +56,8 @@ def test_a_spiral_of_arcs_is_no_circle() -> None:
             Arc((centre + radius, 0.0), (centre - radius, 0.0), (centre, 0.0), radius, True)
         )
     assert all(same_support(a, b) for a, b in pairwise(spiral))
-    found = list(runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))))
-    for run in found:
+    result = list(runs((*spiral, Line((0.0, 0.0), (1.0, 0.0)))))
+    for run in result:
         radii = [edge.radius for edge in run if isinstance(edge, Arc)]
         assert max(radii, default=0.0) - min(radii, default=0.0) <= 1.7e-5
 

@@ -6,9 +6,7 @@ import math
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.section import section
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.region import Region, disc, rectangle, section, strip
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3, 1.0, 2.49])

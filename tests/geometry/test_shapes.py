@@ -7,7 +7,7 @@ import math
 import pytest
 
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import disc, polygon, rectangle, stadium, strip
 
 
 def test_disc_area_is_exact_and_it_is_one_circle() -> None:

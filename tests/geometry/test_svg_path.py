@@ -7,9 +7,7 @@ from shapely.geometry import Polygon
 from svgelements import Arc, Path
 
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium, strip
-from sbafab.geometry.svg import path_data
+from sbafab.geometry.region import Region, disc, path_data, rectangle, stadium, strip
 
 PLATE = fillet(disc((0.0, 0.0), 3.25) | strip((0.0, 0.0), (8.25, 0.0), 3.1), 1.0)
 

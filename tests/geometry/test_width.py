@@ -8,10 +8,9 @@ import random
 import pytest
 import shapely
 
-from sbafab.geometry.boolean import union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 from sbafab.geometry.width import (
     Boundary,
     Gathered,
@@ -182,7 +181,7 @@ def sharp_holes_in_a_plate(seed: int) -> Region:
         hole = shapely.Polygon(
             [(x + radius * math.cos(way), y + radius * math.sin(way)) for way in ways]
         )
-        if hole.area > 0.2 and all(hole.distance(other) > 0.02 for other in taken):
+        if hole.area > 0.2 and all(hole.distance(b) > 0.02 for b in taken):
             taken.append(hole)
     holes = [polygon(list(hole.exterior.coords)[:-1]) for hole in taken]
     return disc((0.0, 0.0), 12.0) - union(holes)
@@ -220,9 +219,9 @@ def test_erosion_by_half_the_width_breaks_the_plate(seed: int) -> None:
 def test_only_what_is_narrower_than_asked_for_is_found() -> None:
     bar = rectangle(AXIS, (4.0, 1.0))
     assert least_width(bar, 15.0, 1.0) is None
-    found = least_width(bar, 15.0, 1.01)
-    assert found is not None
-    assert found.value == pytest.approx(1.0, abs=EXACT)
+    result = least_width(bar, 15.0, 1.01)
+    assert result is not None
+    assert result.value == pytest.approx(1.0, abs=EXACT)
     slit = rectangle((-5, -5), (5, 5)) - rectangle((0.0, -1.0), (0.15, 1.0))
     assert least_gap(slit, 15.0, 0.1) is None
     assert least_gap(slit, 15.0, 0.2) is not None
@@ -294,14 +293,14 @@ def test_across_a_ring_lies_what_every_foot_tells(monkeypatch: pytest.MonkeyPatc
         sides = [_side(arc, arc.bounds) for arc in (outer, inner.reversed())]
         if draw.random() < 0.5:
             sides.reverse()
-        told = []
+        segments = []
         for is_known in (True, False):
             gathered = Gathered(Boundary([], 30.0), 9.0)
             if not is_known:
                 monkeypatch.setattr("sbafab.geometry.width.bound_a_ring", lambda *_: False)
             _along_each_other(*sides, gathered)
             monkeypatch.undo()
-            told.append(gathered.offered)
-        assert told[0] == told[1]
-        offered += len(told[0])
+            segments.append(gathered.offered)
+        assert segments[0] == segments[1]
+        offered += len(segments[0])
     assert offered > 300

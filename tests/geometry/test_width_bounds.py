@@ -8,11 +8,8 @@ import random
 import pytest
 
 from sbafab.geometry import width
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle
-from sbafab.geometry.width import least_gap, least_width
-from sbafab.geometry.width_bounds import may_be_narrower, widest_least
+from sbafab.geometry.region import Region, disc, polygon, rectangle, union
+from sbafab.geometry.width import least_gap, least_width, may_be_narrower, widest_least
 
 AXIS = (0.0, 0.0)
 CLOSED = {
@@ -61,16 +58,16 @@ def test_widths_are_those_found_without_bounds(
     monkeypatch.setattr(width, "widest_least", lambda _: math.inf)
     # Elsewhere, so that nothing is remembered.
     plain = [least(region.moved(1.0, 1e-3), 30.0, below) for below in limits]
-    found = [one and round(one.value, 9) for one in bounded]
-    assert found == [one and round(one.value, 9) for one in plain]
-    assert found[0] is not None
-    assert found[1:] == [found[0] if found[0] < below else None for below in limits[1:]]
+    result = [a and round(a.value, 9) for a in bounded]
+    assert result == [a and round(a.value, 9) for a in plain]
+    assert result[0] is not None
+    assert result[1:] == [result[0] if result[0] < below else None for below in limits[1:]]
 
 
 def test_far_and_wide_circles_are_left_out() -> None:
     region = (
         rectangle((-9, -9), (9, 9)) - disc((-5, 0), 1.0) - disc((5, 0), 0.3) - disc((5, 1), 0.3)
     )
-    left = [one.circle for one in may_be_narrower(region.contours, 0.5)]
+    left = [a.circle for a in may_be_narrower(region.contours, 0.5)]
     assert sum(circle is not None for circle in left) == 2
     assert len(may_be_narrower(region.contours, math.inf)) == len(region.contours)

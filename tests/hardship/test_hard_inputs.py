@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.errors import SbafabError
-from sbafab.geometry.boolean import wound
+from sbafab.errors import GeometryError, SbafabError
 from sbafab.geometry.edges import Line
-from sbafab.geometry.inconsistent import GeometryError
-from sbafab.output import checking
+from sbafab.geometry.region import wound
+from sbafab.output import checked
+
+pytestmark = pytest.mark.long
 
 if TYPE_CHECKING:
     from conftest import Ended, Output, Runs
@@ -122,9 +123,9 @@ def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.M
     def unresolved(*_: object) -> object:
         return wound([Line((1.0, 2.0), (3.0, 4.0))], 0)
 
-    monkeypatch.setattr(checking, "build", unresolved)
+    monkeypatch.setattr(checked, "build", unresolved)
     with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):
-        checking.check(load_design("1dof-5mm"))
+        checked.check(load_design("1dof-5mm"))
 
 
 @pytest.mark.parametrize("before", ["", "import sys; sys.stdout.reconfigure(encoding='ascii')\n"])

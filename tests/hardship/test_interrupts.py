@@ -83,11 +83,11 @@ def test_an_interrupt_that_is_ignored_stays_so(tmp_path: Path) -> None:
 
 LOST = """
 import os, sys
-from sbafab.cli import ending
+from sbafab.cli import exit as ending
 class Watched:
     def __del__(self):
         os.kill(os.getpid(), {number})
-with ending.ended_plainly():
+with ending.exit_plainly():
     watched = Watched()
     del watched
     import time
@@ -95,8 +95,8 @@ with ending.ended_plainly():
 """
 CONVERTED = """
 import os
-from sbafab.cli import ending
-with ending.ended_plainly():
+from sbafab.cli import exit as ending
+with ending.exit_plainly():
     try:
         os.kill(os.getpid(), {number})
         for _ in range(1000): pass
@@ -133,4 +133,5 @@ def test_the_door_loads_nothing_before_it_is_guarded() -> None:
         "sbafab",
         "sbafab.entry",
         "sbafab.errors",
+        "sbafab.version",
     }

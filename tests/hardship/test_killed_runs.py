@@ -18,6 +18,8 @@ import pytest
 from sbafab.output import swap
 from sbafab.output.swap import replaced_folder
 
+pytestmark = pytest.mark.long
+
 if TYPE_CHECKING:
     from conftest import Output, Runs
 

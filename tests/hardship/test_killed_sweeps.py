@@ -55,7 +55,7 @@ def test_killed_and_stopped_it_goes_on_where_it_was(runs: Runs, tmp_path: Path) 
     assert code == -signal.SIGKILL
     code, said, second = _stopped_at(runs, broken, first + 2, signal.SIGTERM)
     assert code == 128 + signal.SIGTERM
-    assert f"{second} of 8 designs are measured; the same command goes on from there" in said
+    assert f"{second} of 8 designs are computed; run the same command again to resume" in said
     assert "Traceback" not in said
     # What measured for them is gone, the killed run's too.
     for _ in range(100):

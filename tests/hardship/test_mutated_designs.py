@@ -16,15 +16,11 @@ import pytest
 
 from sbafab.actuators import load_design
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.reading import load
-from sbafab.assemblies.records import Assembly
-from sbafab.assemblies.writing import assembly_toml
-from sbafab.design.records import Design
-from sbafab.design.templates import template_names, templates_folder
-from sbafab.design.writing import design_toml
+from sbafab.assemblies.files import assembly_toml, load
+from sbafab.design.files import template_names, templates_folder
+from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
-from sbafab.output.assembly import check_assembly
-from sbafab.output.checking import check
+from sbafab.output.job import check_job
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
 BATCHES = 8
@@ -143,11 +139,7 @@ def at_most(seconds: int) -> Iterator[None]:
 def refused(path: Path) -> str | None:
     """What is said of a design file that is refused, None of one that is checked."""
     try:
-        found = load(path)
-        if isinstance(found, Assembly):
-            check_assembly(found)
-        else:
-            check(found)
+        check_job(load(path))
     except SbafabError as error:
         return str(error)
     return None

@@ -19,7 +19,7 @@ import pytest
 from sbafab.cli import main
 from sbafab.output import swap
 from sbafab.output.swap import SCHEMA, replaced_folder
-from sbafab.simulators import program
+from sbafab.simulators import simulator
 
 PACKAGE = Path(__file__).parents[2] / "sbafab"
 POSIX_ONLY = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
@@ -75,7 +75,7 @@ def test_a_simulator_is_stopped_without_groups_of_processes(
     monkeypatch.delattr(os, "killpg")
     monkeypatch.delattr(signal, "SIGKILL")
     process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-    program._end(process)
+    simulator._end(process)
     assert process.poll() is not None
 
 

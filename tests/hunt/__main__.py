@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from random import Random
 
-from sbafab.geometry.inconsistent import GeometryError
+from sbafab.errors import GeometryError
 from tests.hunt import cases, oracle
 
 CHUNK = 200

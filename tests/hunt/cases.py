@@ -12,9 +12,9 @@ from random import Random
 
 from shapely import Polygon
 
+from sbafab.geometry.contour import Contour, circle
 from sbafab.geometry.edges import Arc, Edge, Line, Point, edge_from_bulge
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import circle, disc, polygon, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip
 
 Pair = tuple[Region, Region]
 ANGLES = [0.0, 0.0, 30.0, 45.0, 90.0, 17.3, 211.123]
@@ -202,7 +202,7 @@ def shared(random: Random) -> Pair:
 
 def through_a_point(random: Random) -> Pair:
     """Circles and straight edges that all pass through the origin, or a hair beside it."""
-    from sbafab.geometry.boolean import union
+    from sbafab.geometry.region import union
 
     parts = []
     for _ in range(random.randint(2, 6)):
@@ -294,7 +294,7 @@ def offset_case(seed: int, number: int) -> tuple[Region, float]:
     region = sliver(random) if number % 3 == 0 else shape(random)
     if number % 3 == 1 and number % 2:
         first, second = random.choice(list(PAIRS.values()))(random)
-        from sbafab.geometry.boolean import union
+        from sbafab.geometry.region import union
 
         region = union([first, second])
     distance = random.choice([0.05, 0.1, 0.25, 0.5, 0.75, size(random, 1e-3, 2)])

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from sbafab.geometry.boolean import difference, intersection, union
+from sbafab.errors import GeometryError
+from sbafab.geometry.contour import LEAST_AREA
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Point, left_normal
-from sbafab.geometry.inconsistent import GeometryError
 from sbafab.geometry.offset import grow
-from sbafab.geometry.region import Region
-from sbafab.geometry.tidy import LEAST_AREA
+from sbafab.geometry.region import Region, difference, intersection, union
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.intp]

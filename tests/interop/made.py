@@ -9,9 +9,9 @@ import shapely
 from pyogrio import raw
 
 from sbafab.actuators import load_design
-from sbafab.cutting.dxf_write import Curves, DxfProfile
+from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.laminate.films import Material
-from sbafab.output.run import Run, generate
+from sbafab.runs.run import Run, RunRequest, generate
 
 DESIGNS = {"3dof-15mm": 4, "radial-15mm": 2}
 """Balloons by template: as many as go on one sheet of each film."""
@@ -50,7 +50,8 @@ def write_design(design: str, profile: DxfProfile, folder: Path) -> Run:
         *sizes,
     ]
     return generate(
-        load_design(design, overrides), folder / profile, ("cut",), None, Curves(profile)
+        RunRequest(load_design(design, overrides), folder / profile, ("cut",), Curves(profile)),
+        None,
     )
 
 

@@ -9,7 +9,8 @@ import os
 from collections.abc import Sequence
 from datetime import date
 
-from docs.scripts.measured import Table, keep, record
+from docs.scripts.measured import keep, record
+from docs.scripts.tables import Table
 from tests.interop.made import Sheet
 
 NAME, TABLE = "programs", "areas"

@@ -10,12 +10,11 @@ import ezdxf
 import pytest
 from ezdxf.document import Drawing
 
-from sbafab.cutting.chords import in_chords
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.cutting.properties import DxfProfile
+from sbafab.geometry.region import Region, disc, strip, union
 
 AXES = [(4.25 * math.cos(turn), 4.25 * math.sin(turn)) for turn in (0.5, 2.6, 4.7)]
 PROFILES: list[DxfProfile] = ["bulges", "arcs", "chords"]

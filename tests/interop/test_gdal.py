@@ -11,13 +11,12 @@ import pytest
 import shapely
 from pyogrio import raw
 
-from sbafab.cutting.chords import in_chords
-from sbafab.cutting.dxf_write import DxfProfile, dxf_text
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.cutting.kerf import in_chords
 from sbafab.cutting.order import cutting_order
-from sbafab.geometry.boolean import union
+from sbafab.cutting.properties import DxfProfile
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, stadium, strip
+from sbafab.geometry.region import Region, disc, stadium, strip, union
 
 
 @pytest.fixture(autouse=True)

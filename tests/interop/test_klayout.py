@@ -11,8 +11,7 @@ from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, strip
+from sbafab.geometry.region import Region, disc, polygon, rectangle, strip
 from sbafab.geometry.width import least_gap, least_width
 from sbafab.laminate.laminate import Laminate
 from tests.interop.judging import TOLERANCE, compared, overhang, widths

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from pyogrio import raw
 
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.properties import DxfProfile
 from tests.interop.made import BORDER, LENGTH, PROFILES, WIDTH, Sheet
 from tests.interop.page import contours_are_as_on_the_page
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.cutting.dxf_write import DxfProfile
+from sbafab.cutting.properties import DxfProfile
 from tests.interop.made import EXACT, Sheet
 from tests.interop.page import contours_are_as_on_the_page
 from tests.interop.svg_contours import svg_contours

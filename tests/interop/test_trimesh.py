@@ -10,9 +10,8 @@ import trimesh
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.cavity import cavity_slabs
 from sbafab.meshing.files import write_meshes
-from sbafab.meshing.solid import solid_slabs
+from sbafab.meshing.solid import cavity_slabs, solid_slabs
 
 TEMPLATES = ["1dof-5mm", "3dof-15mm", "radial-15mm"]
 

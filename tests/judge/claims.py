@@ -20,10 +20,10 @@ SIZE = 0.002
 """mm by which a stated size may differ."""
 STRIP = 0.04
 """mm, about, of an inlet strip and its fillets that are not told apart from their pocket."""
-CIRCLE = re.compile(r"[Ff]its? a circle[a-z ]* of\s+([\d.]+)\s*mm")
-OVERALL = re.compile(r"All that is cut[a-z, ]* fits one of\s+([\d.]+)\s*mm")
+CIRCLE = re.compile(r"Diameter round the axis, without [a-z ]+?\s+([\d.]+)\s*mm")
+OVERALL = re.compile(r"Diameter round the axis, with [a-z ]+?\s+([\d.]+)\s*mm")
 LIMITS = re.compile(r"\bLIMITS\s+9\s+\$CUSTOMPROPERTY\s+1\s+([^\n]*)")
-EXTENT = re.compile(r"(Width|Length) of all that is cut[a-z, ]*\s+([\d.]+)\s*mm")
+EXTENT = re.compile(r"Overall (width|length), with [a-z ]+?\s+([\d.]+)\s*mm")
 
 
 def judge_claims(folder: Folder) -> Iterator[Disagreement]:

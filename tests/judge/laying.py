@@ -89,8 +89,8 @@ def _stacked(
     """The table of the whole stack, its turns written out: every layer once, from the lowest."""
     groups: list[tuple[int, list[dict[str, str]]]] = []
     before = None
-    for row in rows(page, "How often", "Layers", "Pattern"):
-        often = row["How often"]
+    for row in rows(page, "Repeat", "Layers", "Pattern"):
+        often = row["Repeat"]
         turns = 1 if often == "once" else int(NUMBERS.findall(often)[0])
         if turns > 1 and before == often:
             groups[-1][1].append(row)

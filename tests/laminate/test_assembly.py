@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import Laminate, Pin
 

@@ -8,10 +8,8 @@ from dataclasses import replace
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
-from sbafab.laminate.interfaces import interface_regions
-from sbafab.laminate.laminate import LOOSE, Laminate, Pin
+from sbafab.geometry.region import Region, disc
+from sbafab.laminate.laminate import LOOSE, Laminate, Pin, interface_regions
 
 AXIS = (0.0, 0.0)
 
@@ -81,7 +79,7 @@ def test_films_that_touch_bond_all_over(laminate: Laminate) -> None:
 
 
 @pytest.mark.parametrize(
-    ("dx", "diameter", "held"),
+    ("dx", "diameter", "is_held"),
     [
         (0.0, 1.04, True),
         (LOOSE - 0.001, 1.04, True),
@@ -92,9 +90,9 @@ def test_films_that_touch_bond_all_over(laminate: Laminate) -> None:
     ],
 )
 def test_a_hole_near_enough_to_its_pin_is_held(
-    dx: float, diameter: float, held: bool, laminate: Laminate
+    dx: float, diameter: float, is_held: bool, laminate: Laminate
 ) -> None:
     pinned = replace(laminate, pins=(Pin("bore", (dx, 0.0), diameter),))
-    found = pinned.pins_holding(pinned.layer(5))
-    assert found == (pinned.pins if held else ())
+    pins = pinned.pins_holding(pinned.layer(5))
+    assert pins == (pinned.pins if is_held else ())
     assert pinned.pins_in(disc(AXIS, 3.25)) == ()

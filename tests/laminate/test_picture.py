@@ -11,9 +11,8 @@ from shapely.geometry import Polygon
 from svgelements import Arc, Move, Path
 
 from sbafab.actuators import build, load_design
-from sbafab.geometry.shapes import rectangle
-from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.picture import laminate_svg, layer_svg
+from sbafab.geometry.region import rectangle
+from sbafab.laminate.laminate import Laminate, laminate_svg, layer_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

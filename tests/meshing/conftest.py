@@ -6,9 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from sbafab.geometry.boolean import union
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, strip, union
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Bore, Chamber, Laminate, Layer, Role
 

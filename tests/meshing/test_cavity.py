@@ -10,9 +10,7 @@ import pytest
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Chamber, Laminate, Role
-from sbafab.meshing.cavity import cavity, cavity_slabs
-from sbafab.meshing.prisms import fuse
-from sbafab.meshing.solid import solid_slabs
+from sbafab.meshing.solid import cavity, cavity_slabs, fuse, solid_slabs
 from sbafab.meshing.surface import open_edges
 
 Profiles = list[tuple[Role, Region]]

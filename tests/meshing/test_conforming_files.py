@@ -11,15 +11,15 @@ import pytest
 import trimesh
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.elements import FACES, volumes
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.meshing.conforming.mesh import FACES, volumes
 from sbafab.meshing.conforming.meshes import (
-    FORMATS,
     ConformingMeshes,
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.conforming.settings import MeshSettings
 from sbafab.meshing.files import MeshFile
+from sbafab.meshing.formats.table import CONFORMING_ENDINGS
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]
 
@@ -46,7 +46,7 @@ def test_each_format_is_listed_and_there(written: Written) -> None:
     _, files, folder = written
     names = [Path(file.file).name for file in files]
     assert sorted(names) == sorted(path.name for path in folder.iterdir())
-    assert {Path(name).suffix[1:] for name in names} == set(FORMATS)
+    assert {Path(name).suffix[1:] for name in names} == set(CONFORMING_ENDINGS)
     assert {file.kind for file in files} == {"volume", "shell", "cavity", "skin"}
     assert all(file.fill_ul == 2.0 and file.elements > 0 for file in files)
 

@@ -9,10 +9,10 @@ import pytest
 
 from sbafab.api import build
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.meshes import conforming_meshes
-from sbafab.meshing.conforming.settings import MeshSettings
 
 AXIS = (0.0, 0.0)
 FILM = 0.038

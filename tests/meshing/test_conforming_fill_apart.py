@@ -11,15 +11,12 @@ import pytest
 
 from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
-from sbafab.meshing.conforming.checks import skin
 from sbafab.meshing.conforming.crossing import check_apart, crossing
-from sbafab.meshing.conforming.elements import FACES
+from sbafab.meshing.conforming.element_mesh import skin
 from sbafab.meshing.conforming.fill import filled
-from sbafab.meshing.conforming.form import flat
-from sbafab.meshing.conforming.layup import layup
+from sbafab.meshing.conforming.layup import MeshSettings, flat, layup
+from sbafab.meshing.conforming.mesh import FACES, Mesh
 from sbafab.meshing.conforming.meshes import conforming_meshes
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings
 
 SETTINGS = MeshSettings(h=0.75)
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, stadium, strip
-from sbafab.meshing.conforming.elements import scaled_jacobians
+from sbafab.geometry.region import Region, disc, stadium, strip
+from sbafab.meshing.conforming.mesh import scaled_jacobians
 from sbafab.meshing.conforming.plane import Plane, triangulation
 
 AXIS = (0.0, 0.0)

@@ -12,12 +12,11 @@ import pytest
 from sbafab.api import build
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.cavity import cavity_slabs
-from sbafab.meshing.conforming.checks import check_cavities, check_mesh
-from sbafab.meshing.conforming.elements import volumes
+from sbafab.meshing.conforming.element_mesh import check_cavities, check_mesh
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.meshing.conforming.mesh import Mesh, volumes
 from sbafab.meshing.conforming.meshes import ConformingMeshes, conforming_meshes
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.solid import cavity_slabs
 
 FILM = 0.038
 

@@ -12,9 +12,8 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.cavity import cavity_slabs
 from sbafab.meshing.files import write_meshes
-from sbafab.meshing.solid import solid, solid_slabs
+from sbafab.meshing.solid import cavity_slabs, solid, solid_slabs
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 

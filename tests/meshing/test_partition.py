@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.meshing.partition import Partition, partition
+from sbafab.geometry.region import disc, rectangle
+from sbafab.meshing.solid import Partition, partition
 
 
 def area(plane: Partition, chosen: np.ndarray) -> float:

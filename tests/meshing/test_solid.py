@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from sbafab.errors import OutputError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Role
-from sbafab.meshing.prisms import Slab, closed_surface, fuse
-from sbafab.meshing.solid import solid, solid_slabs
+from sbafab.meshing.solid import Slab, closed_surface, fuse, solid, solid_slabs
 from sbafab.meshing.surface import Surface, open_edges
 
 Profiles = list[tuple[Role, Region]]

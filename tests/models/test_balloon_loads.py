@@ -10,7 +10,7 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.models.balloon_loads import inflate_to, pressed_by, stresses
+from sbafab.models.balloons import inflate_to, pressed_by, stresses
 
 INNER = Balloon(neck=1.25, bore=0.5)
 

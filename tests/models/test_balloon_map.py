@@ -12,7 +12,7 @@ import pytest
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap, balloon_map
-from sbafab.models.rippled import pressed, risen, taller
+from sbafab.models.rippled import compressed_shapes, free_shapes, height_ratio
 
 SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
@@ -56,11 +56,11 @@ def test_forces_are_within_two_percent(
     """Of force and of pressure times pocket, at places drawn from 0.06 to 100 kPa; so volumes."""
     draw = np.random.default_rng(7)
     p = 0.06 * (100 / 0.06) ** draw.random(200)
-    free = inflate(made.balloon, p).height * taller(made.balloon, p).share
+    free = inflate(made.balloon, p).height * height_ratio(made.balloon, p).share
     h = free * draw.uniform(least, most, len(p))
     inside = (h < 0.98 * made.most_height) & (h > 0.02)
     p, h = p[inside], h[inside]
-    found = pressed(made.balloon, p, h, tied=True)
+    found = compressed_shapes(made.balloon, p, h, tied=True)
     full = p * math.pi * made.balloon.pocket**2 + np.abs(found.force)
     near = NEAR.get(name, 0.02)
     assert (np.abs(made.force(p, h) - found.force) < near * full).all()
@@ -69,7 +69,7 @@ def test_forces_are_within_two_percent(
 
 def test_free_heights_are_near(name: str, made: BalloonMap) -> None:
     p = np.geomspace(0.06, 100.0, 40)
-    free = risen(made.balloon, p).height
+    free = free_shapes(made.balloon, p).height
     inside = free < 0.95 * made.most_height
     assert made.free_height(p[inside]) == pytest.approx(free[inside], rel=FREE[name])
 
@@ -106,13 +106,13 @@ def judged(balloon: Balloon, most: float = 110.0) -> None:
     assert (np.diff(volume, axis=0) >= -1e-3 * volume[1:] - 1e-4 * area).all()
     assert (np.diff(force, axis=1) <= 1e-5 * (p * area + np.abs(force[:, 1:]))).all()
     # Taut films whose neck, pocket and rim stay: none stretches up to a tenth of its length.
-    gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.rigid
+    gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.membrane_stiffness
     assert (volume[gentle] < 1.1**3 * mylar(balloon.pocket + 0.1)).all()
     # Between plates far below its free height it holds what a balloon computed there does.
     at = np.geomspace(0.1, most, 8)
     free = inflate(balloon, at).height
     held = np.minimum(0.3 * free, 0.3 * made.most_height)
-    exact = pressed(balloon, at, held, tied=True)
+    exact = compressed_shapes(balloon, at, held, tied=True)
     full = at * area + np.abs(exact.force)
     assert (np.abs(made.force(at, held) - exact.force) < 0.06 * full).all()
 

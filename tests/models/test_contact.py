@@ -10,9 +10,9 @@ import pytest
 
 import sbafab
 from sbafab.models.balloon import Balloon
-from sbafab.models.contact import chamber_gap, rim_gap
-from sbafab.models.springs import RING
+from sbafab.models.elastic import chamber_gap, rim_gap
 from sbafab.models.stack import Stack
+from sbafab.models.stack_loads import RING_POINTS
 
 OUTER = -4.25 / 2 - 3.25
 """x of the rims opposite the first chamber: its axis lies at 4.25, lobes have a radius of 3.25."""
@@ -26,12 +26,12 @@ def three() -> Stack:
 def moment(three: Stack, pressures: tuple[float, ...], tilt: float) -> float:
     """Moment in mN mm of the balloons' forces about the rims that a level turns on by ``tilt``."""
     balloon = three.maps[0].balloon
-    turn = np.arange(RING) * math.tau / RING
+    turn = np.arange(RING_POINTS) * math.tau / RING_POINTS
     across = (balloon.neck + balloon.pocket) / 2 * np.cos(turn)
     total = 0.0
     for (x, _), pressure in zip(three.axes, pressures, strict=True):
         arm = x + across - OUTER
-        force = three.maps[0].force(np.full(RING, pressure), tilt * arm)
+        force = three.maps[0].force(np.full(RING_POINTS, pressure), tilt * arm)
         total += float((force * arm).mean())
     return total
 
@@ -48,9 +48,9 @@ def test_with_one_chamber_a_level_is_a_lever_over_its_rims(three: Stack, pressur
     assert rim_gap(three, pose) == 0.0
     # The touching rims push: what balloons pull by on their own is not in balance.
     left = sum(
-        float(three.maps[0].force(np.full(RING, p), low * (x + ring - OUTER)).mean())
+        float(three.maps[0].force(np.full(RING_POINTS, p), low * (x + ring - OUTER)).mean())
         for (x, _), p in zip(three.axes, pressures, strict=True)
-        for ring in [1.885 * np.cos(np.arange(RING) * math.tau / RING)]
+        for ring in [1.885 * np.cos(np.arange(RING_POINTS) * math.tau / RING_POINTS)]
     )
     assert left < -0.3
 

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.motion import CLOSE, LITTLE, SUCTION, Motion
 from sbafab.models.pneumatics import AIR, WATER, Line
-from sbafab.models.stack import Stack
+from sbafab.models.stack import LEAST_CONTENT, SUCTION, TOLERANCE, Motion, Stack
 
 COUNT = int(os.environ.get("SBAFAB_HISTORIES", "3"))
 STEPS = 15
@@ -56,7 +55,11 @@ def test_no_history_gives_up_and_no_fluid_is_lost(
                 wanted = numbers.uniform(-60, 300, 3)
                 motion.step(dt, flows=tuple((wanted - before) / dt))
             missed = contents(motion) - wanted
-            close = 2 * CLOSE * np.maximum(np.maximum(np.abs(before), np.abs(wanted)), LITTLE)
+            close = (
+                2
+                * TOLERANCE
+                * np.maximum(np.maximum(np.abs(before), np.abs(wanted)), LEAST_CONTENT)
+            )
             at = np.array(motion.pressures)
             empty = (at == 0.0) | (at <= -SUCTION * (1 - 1e-9))
             # What a valve leaves without pressure draws in what it lacks, and no pump takes out

@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.models import banded
+from sbafab.models import least_energy
 from sbafab.models.balloon import (
     RIM_ELEMENTS,
     Balloon,
     BalloonLoad,
     coordinates,
-    start,
-    total,
+    initial_shape,
+    rim_ripples,
+    squared_tilt,
+    total_energy,
 )
-from sbafab.models.least_energy import Descent, NoBalance, settled
-from sbafab.models.rim_ripple import amplitude, rippling
+from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
 
 INNER = Balloon(neck=1.25, bore=0.5)
 DRAW = np.random.default_rng(3)
@@ -33,46 +34,50 @@ def positive(size: int = 12, width: int = 4, rows: int = 3) -> np.ndarray:
 
 def test_a_band_is_solved_as_the_whole_matrix_is() -> None:
     band, wanted = positive(), DRAW.normal(size=(12, 3))
-    own = np.transpose(banded.solve(band, wanted))
-    several = banded.solve(band, np.stack([2 * wanted, wanted], axis=1))
+    own = np.transpose(least_energy.solve(band, wanted))
+    several = least_energy.solve(band, np.stack([2 * wanted, wanted], axis=1))
     assert several[:, 1] == pytest.approx(np.transpose(own))
-    assert own == pytest.approx(np.linalg.solve(banded.dense(band), wanted.T[..., None])[..., 0])
+    assert own == pytest.approx(
+        np.linalg.solve(least_energy.dense(band), wanted.T[..., None])[..., 0]
+    )
 
 
 @pytest.mark.parametrize("size", [3, 4, 11, 12])
 def test_a_positive_band_is_solved_block_by_block(size: int) -> None:
     band, wanted = positive(size), DRAW.normal(size=(size, 3))
-    own = banded.solve_positive(band, wanted)
-    whole = np.linalg.solve(banded.dense(band), wanted.T[..., None])[..., 0]
+    own = least_energy.solve_positive(band, wanted)
+    whole = np.linalg.solve(least_energy.dense(band), wanted.T[..., None])[..., 0]
     assert own is not None
     assert np.transpose(own) == pytest.approx(whole)
     band[size // 2, 0, 1] = -1.0
-    assert banded.solve_positive(band, wanted) is None
+    assert least_energy.solve_positive(band, wanted) is None
 
 
 def test_unknowns_that_are_equal_are_joined_and_those_that_are_held_are_none() -> None:
     band, wanted = positive(), DRAW.normal(size=(12, 3))
-    whole, pick = banded.dense(band), np.delete(np.eye(12), [1, 7], axis=1)
+    whole, pick = least_energy.dense(band), np.delete(np.eye(12), [1, 7], axis=1)
     pick[1] = pick[3]
     small = np.linalg.solve(pick.T @ whole @ pick, (pick.T @ wanted).T[..., None])[..., 0]
     free = np.delete(np.arange(12), [1, 7])
-    banded.join(band, 1, 3)
+    least_energy.tie(band, 1, 3)
     wanted[3] += wanted[1]
-    own = banded.solve(banded.packed(band, banded.packing(free, 12, 4)), wanted[free])
+    own = least_energy.solve(
+        least_energy.packed(band, least_energy.packing(free, 12, 4)), wanted[free]
+    )
     assert np.transpose(own) == pytest.approx(small)
 
 
 def test_unknowns_that_are_held_leave_no_gap_in_a_packed_band() -> None:
     band, free = positive(), np.array([0, 2, 3, 6, 8, 9, 11])
-    small = banded.packed(band, banded.packing(free, 12, 4))
-    whole = banded.dense(band)[:, free[:, None], free]
-    assert banded.dense(small) == pytest.approx(whole)
+    small = least_energy.packed(band, least_energy.packing(free, 12, 4))
+    whole = least_energy.dense(band)[:, free[:, None], free]
+    assert least_energy.dense(small) == pytest.approx(whole)
 
 
 @pytest.mark.parametrize("order", [0, 2])
 def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
     one = replace(INNER, order=order)
-    (ripple,) = rippling((one,), np.full((2, RIM_ELEMENTS), -0.04), [np.array([1.0, 9.0])])
+    (ripple,) = rim_ripples((one,), np.full((2, RIM_ELEMENTS), -0.04), [np.array([1.0, 9.0])])
     load = BalloonLoad(
         np.array([3.0, 50.0]),
         np.array([0.4, 0.7]),
@@ -80,21 +85,21 @@ def test_slopes_are_what_the_energy_changes_by(order: int) -> None:
         tied=True,
         ripple=ripple,
     )
-    x = coordinates(*start(one, load))
+    x = coordinates(*initial_shape(one, load))
     x += DRAW.normal(0, 0.003, x.shape)
     x[2 * one.edge :: 2] *= 0.96
-    assert (amplitude(one.film, one.edge, ripple, x[::2].T) > 0).all()
-    found, step = total(one, load, x), 1e-6
+    assert (squared_tilt(one.film, one.edge, ripple, x[::2].T) > 0).all()
+    found, step = total_energy(one, load, x), 1e-6
     slopes, curves = [], []
     for i in range(len(x)):
         moved = np.zeros_like(x)
         moved[i] = step
-        more, less = total(one, load, x + moved), total(one, load, x - moved)
+        more, less = total_energy(one, load, x + moved), total_energy(one, load, x - moved)
         slopes.append((more.energy - less.energy) / (2 * step))
         curves.append((more.gradient - less.gradient) / (2 * step))
     assert found.gradient == pytest.approx(np.array(slopes), rel=1e-5, abs=1e-3)
     whole = np.transpose(curves, (2, 0, 1))
-    own, rim = banded.dense(found.matrix), np.arange(2 * one.edge, len(x), 2)
+    own, rim = least_energy.dense(found.matrix), np.arange(2 * one.edge, len(x), 2)
     own[:, rim[:, None], rim] += np.moveaxis(found.rim, -1, 0)
     assert own == pytest.approx(whole, rel=1e-4, abs=1e-6 * whole.max())
 
@@ -107,16 +112,16 @@ class Well:
     def at(self, x: np.ndarray, rows: np.ndarray) -> Descent:
         return Descent((x**4 - x**2)[0], 4 * x**3 - 2 * x, (12 * x**2 - 2)[:, None])
 
-    def ahead(self, state: Descent, damping: np.ndarray) -> np.ndarray:
+    def newton_step(self, state: Descent, damping: np.ndarray) -> np.ndarray:
         band = state.matrix + damping * np.abs(state.matrix)
-        return banded.solve(band, -state.gradient)
+        return least_energy.solve(band, -state.gradient)
 
     def change(self, x: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         return np.abs(ahead)[0]
 
 
 def test_the_least_energy_is_found_from_where_it_bends_downward() -> None:
-    found = settled(Well(), np.array([[0.01, -0.3]]))
+    found = equilibrium(Well(), np.array([[0.01, -0.3]]))
     assert found == pytest.approx(np.array([[0.5**0.5, -(0.5**0.5)]]))
 
 
@@ -128,5 +133,5 @@ class Slope(Well):
 
 
 def test_an_energy_without_a_least_one_is_given_up() -> None:
-    with pytest.raises(NoBalance):
-        settled(Slope(), np.zeros((1, 2)))
+    with pytest.raises(NoEquilibrium):
+        equilibrium(Slope(), np.zeros((1, 2)))

@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 from sbafab.errors import DesignError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.models import bending, parabola, printed
-from sbafab.models.flow import seconds
-from sbafab.models.folded import folded_diameter
-from sbafab.models.force import force, work_uj
-from sbafab.models.inlet import largest_tube
-from sbafab.models.stiffness import modulus, second_moments, tip_stiffness
+from sbafab.geometry.region import Region, disc, rectangle
+from sbafab.models import formulas, parabola, printed
+from sbafab.models.formulas import (
+    folded_diameter,
+    force,
+    largest_tube,
+    modulus,
+    second_moments,
+    tip_stiffness,
+    work_uj,
+)
+from sbafab.models.pneumatics import seconds
 
 AXES = [(4.25 * math.cos(t), 4.25 * math.sin(t)) for t in np.radians([0, 120, 240])]
 
@@ -51,7 +55,7 @@ def test_work_of_a_litre_at_a_kilopascal_is_a_joule() -> None:
 
 
 def test_one_long_chamber_bends_to_the_other_side() -> None:
-    found = bending.bend([13.0, 7.0, 7.0], AXES)
+    found = formulas.bend([13.0, 7.0, 7.0], AXES)
     # The two others lie half as far on the other side: 6 mm over 1.5 x 4.25.
     assert float(found.angle) == pytest.approx(6 / (1.5 * 4.25))
     assert float(found.length) == pytest.approx(9.0)
@@ -66,7 +70,7 @@ def test_one_long_chamber_bends_to_the_other_side() -> None:
 
 def test_chamber_lengths_come_back_from_the_arc() -> None:
     lengths = np.array([8.0, 11.0, 6.5])
-    found = bending.bend(lengths, AXES)
+    found = formulas.bend(lengths, AXES)
     inner = [
         float(found.length)
         - float(found.angle) * (x * math.cos(found.towards) + y * math.sin(found.towards))
@@ -79,13 +83,13 @@ def test_equal_chambers_stay_straight_whatever_their_number() -> None:
     for count in range(2, 9):
         turns = np.linspace(0, 2 * math.pi, count, endpoint=False)
         axes = np.column_stack([np.cos(turns), np.sin(turns)]) * 5
-        found = bending.bend(np.full((4, count), 9.0), axes)
+        found = formulas.bend(np.full((4, count), 9.0), axes)
         np.testing.assert_allclose(found.angle, 0, atol=1e-12)
         np.testing.assert_allclose(found.tip, np.tile([0, 0, 9.0], (4, 1)), atol=1e-11)
 
 
 def test_two_chambers_bend_in_their_plane() -> None:
-    found = bending.bend([10.0, 8.0], [(4.0, 0.0), (-4.0, 0.0)])
+    found = formulas.bend([10.0, 8.0], [(4.0, 0.0), (-4.0, 0.0)])
     assert float(found.angle) == pytest.approx(2 / 8)
     assert float(found.tip[1]) == pytest.approx(0, abs=1e-12)
 

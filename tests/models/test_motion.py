@@ -8,10 +8,9 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.flow import ATMOSPHERE_KPA
-from sbafab.models.pneumatics import AIR, WATER, Line
+from sbafab.models.elastic import time_to_fill
+from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
 from sbafab.models.stack import Stack
-from sbafab.models.stacked import filled
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +60,7 @@ def test_a_pump_of_water_puts_in_what_it_delivers(three: Stack) -> None:
 
 
 def test_a_prediction_of_water_is_what_the_motion_does(three: Stack) -> None:
-    time, pose = filled(three, 35.0, 10.0)
+    time, pose = time_to_fill(three, 35.0, 10.0)
     motion = three.motion(line=Line(WATER))
     for _ in range(4):
         motion.step(time / 4, flows=(35e3 / 60 / 3,) * 3)

@@ -6,12 +6,12 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import film_mass
-from sbafab.models.figures import Asked, Prediction
+from sbafab.laminate.laminate import film_mass
+from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.models.stack import stack
-from sbafab.simulators.calculix.settings import deck_settings
-from sbafab.simulators.coarse.actuator import actuator as coarse
+from sbafab.simulators.calculix.deck import deck_settings
+from sbafab.simulators.coarse.shell import actuator as coarse
 
 TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")
 KNOWN = (*TPU, "films.tpe.modulus=20", "films.tpe.poisson=0.45")
@@ -63,12 +63,14 @@ def test_what_the_paper_measured_of_its_film_holds_for_no_other() -> None:
 def test_the_elastic_balloon_takes_the_films_own_numbers() -> None:
     """Shapes hang on p / E and on t alone: twice the modulus and the pressure, the same stroke."""
     same = ("films.tpe.product=A", "films.tpe.thickness=0.038", "films.tpe.poisson=0.2")
-    papers = predict(load_design("1dof-5mm"), Asked(pressures_kpa=(3.0,)))
+    papers = predict(load_design("1dof-5mm"), PredictionRequest(pressures_kpa=(3.0,)))
     alike = predict(
-        load_design("1dof-5mm", (*same, "films.tpe.modulus=10")), Asked(pressures_kpa=(3.0,))
+        load_design("1dof-5mm", (*same, "films.tpe.modulus=10")),
+        PredictionRequest(pressures_kpa=(3.0,)),
     )
     twice = predict(
-        load_design("1dof-5mm", (*same, "films.tpe.modulus=20")), Asked(pressures_kpa=(6.0,))
+        load_design("1dof-5mm", (*same, "films.tpe.modulus=20")),
+        PredictionRequest(pressures_kpa=(6.0,)),
     )
     stroke = papers.value("free stroke at 3 kPa")
     assert alike.value("free stroke at 3 kPa") == pytest.approx(stroke, rel=1e-9)

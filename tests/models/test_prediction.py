@@ -16,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
-from sbafab.models.drawn import FLAT
+from sbafab.models.drawn import FLAT_PLATES
 from sbafab.models.figures import Prediction
 from sbafab.models.kinematics import round_stack, slot_stack
 
@@ -338,7 +338,7 @@ def test_drawn_discs_push_flat_with_pressure_times_area_at_most(tmp_path: Path) 
     most = sbafab.predict(*drawn).value("blocked force at 100 kPa, flat, at most")
     assert most == pytest.approx(3 * math.pi * 2.5**2 * 0.1)
     # Sec. 4.3: the 3-DoF actuator pushed with 4.87 N, which the bound's own words tell.
-    assert f"{4.87 / most:.2f} of it" in FLAT.trust
+    assert f"{4.87 / most:.2f} of it" in FLAT_PLATES.trust
 
 
 def test_tapered_stack_is_the_sum_of_its_balloons() -> None:

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.models import rim_ripple
-from sbafab.models.balloon import Balloon, inflate, rippling
-from sbafab.models.balloon_loads import stresses
+from sbafab.models import balloon
+from sbafab.models.balloon import Balloon, inflate, ripples_at
+from sbafab.models.balloons import stresses
 
 WIDE = Balloon(pocket=60.0)
 """So wide that its rim is nearly a straight strip."""
@@ -22,11 +22,11 @@ def onset(one: Balloon, tension: float) -> tuple[float, float]:
     shape = (1, len(one.nodes) - 1 - one.edge)
     for _ in range(60):
         middle = (low + high) / 2
-        (found,) = rim_ripple.rippling((one,), np.full(shape, -middle), [np.array([tension])])
+        (found,) = balloon.rim_ripples((one,), np.full(shape, -middle), [np.array([tension])])
         ripples = (found.cost - middle * found.pull.sum(-1) < 0).all()
         low, high = (low, middle) if ripples else (middle, high)
-    (found,) = rim_ripple.rippling((one,), np.full(shape, -high), [np.array([tension])])
-    return 2 * one.rigid * high, float(found.waves[0])
+    (found,) = balloon.rim_ripples((one,), np.full(shape, -high), [np.array([tension])])
+    return 2 * one.membrane_stiffness * high, float(found.waves[0])
 
 
 @pytest.mark.parametrize("tension", [0.5, 4.0])
@@ -38,7 +38,7 @@ def test_a_straight_rim_ripples_as_a_strip_hinged_at_one_edge_does(tension: floa
     """
     b, nu = WIDE.ring, WIDE.poisson
     plate = WIDE.modulus * (2 * WIDE.thickness) ** 3 / (12 * (1 - nu**2))
-    spring = 2 * math.sqrt(WIDE.rigidity * tension)
+    spring = 2 * math.sqrt(WIDE.bending_stiffness * tension)
     k = (3 * spring / (plate * b**3)) ** 0.25
     wanted = plate * (6 * (1 - nu) / b**2 + k**2) + 3 * spring / (k**2 * b**3)
     force, waves = onset(WIDE, tension)
@@ -49,16 +49,17 @@ def test_a_straight_rim_ripples_as_a_strip_hinged_at_one_edge_does(tension: floa
 def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
     lone = Balloon()
     found = inflate(lone, 6.0)
-    (ripple,) = rippling((lone,), ((found.r, found.z),))
+    (ripple,) = ripples_at((lone,), ((found.r, found.z),))
     for law in (2, 0):
         flat = lone.film._replace(order=law)
-        term = rim_ripple.eased(flat, lone.edge, ripple, found.r)
+        term = balloon.ripple_energy(flat, lone.edge, ripple, found.r)
         assert term.energy[0] < 0
         for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):
             step = np.zeros_like(found.r)
             step[0, node] = 1e-5
             up, down = (
-                rim_ripple.eased(flat, lone.edge, ripple, found.r + sign * step) for sign in (1, -1)
+                balloon.ripple_energy(flat, lone.edge, ripple, found.r + sign * step)
+                for sign in (1, -1)
             )
             slope = (up.energy - down.energy) / 2e-5
             own = node - lone.edge
@@ -71,9 +72,9 @@ def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
     """Summed over a fine mesh, stretching and bending of a tilted rim are least where it says."""
     lone = Balloon()
     found = inflate(lone, 6.0)
-    (ripple,) = rippling((lone,), ((found.r, found.z),))
+    (ripple,) = ripples_at((lone,), ((found.r, found.z),))
     hoop = ((found.r[0, 1:] + found.r[0, :-1]) / (lone.nodes[1:] + lone.nodes[:-1])) ** 2 / 2 - 0.5
-    tension = lone.rigid * (
+    tension = lone.membrane_stiffness * (
         (np.hypot(np.diff(found.r[0]), np.diff(found.z[0])) / np.diff(lone.nodes)) ** 2 / 2 - 0.5
     )
     edges = np.linspace(0, 1, 2001)
@@ -81,21 +82,21 @@ def test_the_amplitude_is_the_one_of_least_energy_and_the_waves_too() -> None:
     r, ds = lone.pocket + s, lone.ring / 2000
     strain = np.interp(r, (lone.nodes[1:] + lone.nodes[:-1]) / 2, hoop)
     plate = lone.modulus * (2 * lone.thickness) ** 3 / 12
-    turned = math.pi * lone.pocket * 2 * math.sqrt(lone.rigidity * tension[lone.edge - 1])
+    turned = math.pi * lone.pocket * 2 * math.sqrt(lone.bending_stiffness * tension[lone.edge - 1])
 
     def energy(tilt: float, n: int) -> float:
         around = (1 / r - n**2 * s / r**2) ** 2
         bent = plate / (1 - lone.poisson**2) * around
         bent = bent + 2 * plate / (1 + lone.poisson) * n**2 * (1 / r - s / r**2) ** 2
         relief = tilt**2 * (n**2 * s**2 / r**2 - s / r) / 4
-        stretched = 2 * lone.rigid * (strain + relief) ** 2 * math.tau * r / 2
+        stretched = 2 * lone.membrane_stiffness * (strain + relief) ** 2 * math.tau * r / 2
         return float(((math.pi * r * bent * tilt**2 / 2 + stretched) * ds).sum()) + (
             turned * tilt**2 / 2
         )
 
     tilts = np.linspace(0, 0.6, 601)
     best = min((energy(tilt, n), tilt, n) for tilt in tilts for n in range(2, 20))
-    told = math.sqrt(rim_ripple.amplitude(lone.film, lone.edge, ripple, found.r)[0])
+    told = math.sqrt(balloon.squared_tilt(lone.film, lone.edge, ripple, found.r)[0])
     assert ripple.waves[0] == pytest.approx(best[2], abs=1)
     assert told == pytest.approx(
         min((energy(tilt, int(ripple.waves[0])), tilt) for tilt in tilts)[1], rel=0.05
@@ -106,8 +107,8 @@ def test_low_pressures_leave_the_rim_smooth_and_high_ones_relieve_its_outside() 
     """The rim of a lone d = 5 ripples between 0.1 and 2 kPa (in CalculiX it does from 0.45 on)."""
     lone = Balloon()
     found = inflate(lone, [0.1, 2.0])
-    (ripple,) = rippling((lone,), ((found.r, found.z),))
-    tilt = rim_ripple.amplitude(lone.film, lone.edge, ripple, found.r)
+    (ripple,) = ripples_at((lone,), ((found.r, found.z),))
+    tilt = balloon.squared_tilt(lone.film, lone.edge, ripple, found.r)
     assert tilt[0] == 0 < tilt[1]
     hoop = stresses(lone, found).hoop[:, lone.edge :]
     assert (np.diff(hoop[1]) > 0).all()

@@ -11,13 +11,18 @@ import pytest
 
 from docs.scripts.ripple_sector import Sector, sector_states
 from sbafab.errors import DesignError
-from sbafab.models import banded
+from sbafab.models import least_energy
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
-from sbafab.models.film_elements import Elements, air, bending, membrane
-from sbafab.models.rippled import pressed, resolved, rippled, risen, taller
-from sbafab.models.wave_energy import Waves
-from sbafab.models.waving import EDGE, OVERTONES, PLACES, UP, R, Waving, Z, first_of
+from sbafab.models.film_elements import Elements, air_volume, bending, membrane
+from sbafab.models.rim_modes import EDGE, OVERTONES, PLACES, UP, R, Waves, Waving, Z, first_of
+from sbafab.models.rippled import (
+    compressed_shapes,
+    free_shapes,
+    height_ratio,
+    resolves_waves,
+    rippled,
+)
 
 WIDE = Balloon(5.0)
 INNER = Balloon(5.0, neck=1.27, bore=0.52)
@@ -26,7 +31,7 @@ INNER = Balloon(5.0, neck=1.27, bore=0.52)
 def at(one: Balloon, pressure: float, waves: int) -> tuple[Waves, np.ndarray]:
     """The energy of a balloon, and its coordinates as ``inflate`` has it: without waves."""
     of, shape = Waving(one, waves), inflate(one, pressure)
-    x = np.zeros((of.kept.size, 1))
+    x = np.zeros((of.is_free.size, 1))
     x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
     dr, dz = np.diff(shape.r), np.diff(shape.z)
     length = np.hypot(dr, dz)
@@ -36,7 +41,7 @@ def at(one: Balloon, pressure: float, waves: int) -> tuple[Waves, np.ndarray]:
 
 def waved(problem: Waves, x: np.ndarray, size: float, seed: int = 3) -> np.ndarray:
     draw = np.random.default_rng(seed).standard_normal(x.shape)
-    return x + size * draw * problem.of.kept.ravel()[:, None]
+    return x + size * draw * problem.of.is_free.ravel()[:, None]
 
 
 @pytest.mark.parametrize("one", [WIDE, INNER, Balloon(2.5, thickness=0.1)])
@@ -50,7 +55,7 @@ def test_slopes_are_those_of_the_energy(one: Balloon) -> None:
     assert (found.gradient * ahead).sum() == pytest.approx(slope[0], rel=1e-6)
     free = problem.of.freedoms
     turned = ((more.gradient - less.gradient) / (2 * step))[free, 0]
-    own = banded.dense(found.band)[0] @ ahead[free, 0]
+    own = least_energy.dense(found.band)[0] @ ahead[free, 0]
     assert own == pytest.approx(turned, abs=1e-6 * np.abs(turned).max())
 
 
@@ -63,10 +68,13 @@ def test_without_waves_it_is_the_smooth_balloon() -> None:
         never = np.full((1, len(one.nodes) - 1), math.inf)
         stored = membrane(one.film, lie, never).energy
         stored = (
-            stored + bending(one.film, one.rigidity, slice(one.held, one.edge), lie).term.energy
+            stored
+            + bending(
+                one.film, one.bending_stiffness, slice(one.neck_edge, one.edge), lie
+            ).term.energy
         )
         assert found.stored == pytest.approx(stored, rel=1e-9)
-        assert found.volume == pytest.approx(air(one.film, one.edge, lie).energy, rel=1e-3)
+        assert found.volume == pytest.approx(air_volume(one.film, one.edge, lie).energy, rel=1e-3)
         assert np.abs(found.gradient.reshape(-1, PLACES)[:, 2:]).max() < 1e-9
 
 
@@ -89,7 +97,7 @@ def test_a_rim_bends_as_a_plate_ring_does() -> None:
     one, n, tilt = WIDE, 14, 1e-6
     problem, _ = at(one, 1.0, n)
     of = problem.of
-    x = np.zeros((of.kept.size, 1))
+    x = np.zeros((of.is_free.size, 1))
     x[R::PLACES, 0] = one.nodes
     flat = problem.total(x, np.array([0])).stored[0]
     x[PLACES * one.edge + EDGE] = -tilt * one.thickness / 2
@@ -140,9 +148,9 @@ def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
         replace(WIDE, wrinkles=False),
         replace(WIDE, mate=Balloon(5.0, thickness=0.05)),
     ):
-        assert not resolved(one)
-        assert risen(one, 1.0).height == inflate(one, 1.0).height
-    assert risen(WIDE, 30.0).height == inflate(WIDE, 30.0).height
+        assert not resolves_waves(one)
+        assert free_shapes(one, 1.0).height == inflate(one, 1.0).height
+    assert free_shapes(WIDE, 30.0).height == inflate(WIDE, 30.0).height
     with pytest.raises(DesignError, match="above 0 kPa"):
         rippled(WIDE, [1.0, 0.0])
 
@@ -150,10 +158,10 @@ def test_narrow_pockets_unlike_films_and_other_laws_are_as_before() -> None:
 def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
     """Of W(p, h), beside a smaller share of what waves themselves keep (see ``balloon_map``)."""
     p, h, step = np.array([0.4, 1.5, 6.0]), np.array([1.0, 2.0, 3.0]), 1e-4
-    found = pressed(WIDE, p, h)
+    found = compressed_shapes(WIDE, p, h)
 
     def potential(dp: float, dh: float) -> np.ndarray:
-        one = pressed(WIDE, p + dp, h + dh)
+        one = compressed_shapes(WIDE, p + dp, h + dh)
         return np.asarray(one.energy - (p + dp) * one.volume)
 
     force = -(potential(0, step) - potential(0, -step)) / (2 * step)
@@ -164,9 +172,9 @@ def test_between_plates_force_and_volume_are_slopes_of_one_energy() -> None:
 
 def test_free_heights_of_the_map_are_those_with_waves() -> None:
     p = np.array([0.5, 1.0, 3.0, 8.0])
-    assert (taller(INNER, p).share > 1.005).all()
+    assert (height_ratio(INNER, p).share > 1.005).all()
     found = balloon_map(INNER, 50.0).free_height(p)
-    assert found == pytest.approx(risen(INNER, p).height, rel=0.015)
+    assert found == pytest.approx(free_shapes(INNER, p).height, rel=0.015)
 
 
 @pytest.mark.long

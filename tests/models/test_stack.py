@@ -13,12 +13,16 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.chain import chain
-from sbafab.models.loads import RIM, loaded, with_blocks
-from sbafab.models.rippled import risen
-from sbafab.models.series import blocked
+from sbafab.models.elastic import blocked_force
+from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Plate, Stack
-from sbafab.models.stack_balance import MOST_STEPS, _met, _settled, free
+from sbafab.models.stack_balance import (
+    MOST_STEPS,
+    _by_softer_plates,
+    _energy_descent,
+    free_equilibrium,
+)
+from sbafab.models.stack_loads import WALL_RIM, loaded_energy, plate_chain, with_diagonal_blocks
 
 LOADS: dict[str, dict[str, Any]] = {
     "7 mN on the tip": {"tip_load": (0.0, 0.005, -0.005)},
@@ -134,14 +138,14 @@ def test_one_chamber_is_its_balloons_in_series() -> None:
     for pressure, force in zip((10, 100), alone.force, strict=True):
         held = one.pose((pressure,), plate=one.flat_height + 6 * 0.5)
         assert held.force == pytest.approx(force / 1000, rel=0.02)
-        assert float(blocked(one, pressure, 6 * 0.5)) == pytest.approx(force / 1000, rel=0.02)
+        assert float(blocked_force(one, pressure, 6 * 0.5)) == pytest.approx(force / 1000, rel=0.02)
 
 
 def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
     sizes = [12.0, 9.0, 6.0]
     taper = sbafab.stack("1dof-10mm", {"chamber.diameter": sizes}, "stack.balloons=3")
     bound = 100e-3 * math.pi * 3.0**2
-    found = blocked(taper, 100.0, np.linspace(0, 3, 7))
+    found = blocked_force(taper, 100.0, np.linspace(0, 3, 7))
     assert (found <= bound).all()
     assert (np.diff(found) <= 1e-9).all()
     assert found[0] > 0.9 * bound
@@ -163,14 +167,14 @@ def test_gradients_of_a_loaded_stack_are_those_of_its_energy(three: Stack) -> No
     assert load is not None
     at = np.full((15, 3), 0.02) + np.linspace(0, 0.01, 45).reshape(15, 3)
     at[:, 0] += 0.6
-    found = loaded(springs, three.pitch, load, at)
-    slope, matrix = found.gradient, with_blocks(found.rest(), found.blocks)
+    found = loaded_energy(springs, three.pitch, load, at)
+    slope, matrix = found.gradient, with_diagonal_blocks(found.rest(), found.blocks)
     assert found.push > 0
     for number in (0, 1, 20, 43):
         step = np.zeros(45)
         step[number] = 1e-6
-        up = loaded(springs, three.pitch, load, at + step.reshape(15, 3))
-        down = loaded(springs, three.pitch, load, at - step.reshape(15, 3))
+        up = loaded_energy(springs, three.pitch, load, at + step.reshape(15, 3))
+        down = loaded_energy(springs, three.pitch, load, at - step.reshape(15, 3))
         assert (up.value - down.value) / 2e-6 == pytest.approx(slope[number], rel=1e-4)
         # What the tilts of one joint do to each other is taken at their mean.
         other = np.arange(45) // 3 != number // 3
@@ -271,14 +275,14 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
     assert 10 < wide.most_pressure < 110
     with pytest.raises(DesignError, match="outside the balloon's map"):
         wide.pose((110,))
-    free = risen(wide.maps[0].balloon, 1.0)
+    free = free_shapes(wide.maps[0].balloon, 1.0)
     assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
 
 
 def test_a_pushed_column_buckles_the_sooner_the_longer_and_the_freer_it_is() -> None:
     """Flat, none does; at 25 % six balloons do where the tip may slide, ten where it may not."""
     from sbafab.models.stack import stack
-    from sbafab.reproduction.mechanics import FITTED
+    from sbafab.reproduction.rows import FITTED
 
     def is_straight(balloons: int, share: float, sticks: bool) -> bool:
         found = stack(sbafab.load("1dof-5mm", f"stack.balloons={balloons}"), factors=FITTED)
@@ -316,14 +320,14 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
         pose = three.pose(pressures, **loads)
         assert acting is not None
         springs = three.springs(pressures)
-        start = free(springs, three._risen(pressures))[three.levels]
+        start = free_equilibrium(springs, three._risen(pressures))[three.levels]
         each, wall = three.each(springs), acting.wall
         if wall is None:
-            slow = _settled(each, three.pitch, acting, start, MOST_STEPS)
+            slow = _energy_descent(each, three.pitch, acting, start, MOST_STEPS)
         else:
-            slow = _met(each, three.pitch, acting, wall, start)
+            slow = _by_softer_plates(each, three.pitch, acting, wall, start)
         assert slow is not None
-        places = chain(slow[0], three.pitch).places
+        places = plate_chain(slow[0], three.pitch).places
         assert pose.frames[0] == pytest.approx(places, abs=1e-5)
         assert pose.stable
 
@@ -343,7 +347,7 @@ def test_a_plate_that_is_hardly_met_is_met_from_any_start(three: Stack) -> None:
         assert again.frames[0] == pytest.approx(pose.frames[0], abs=1e-5)
         assert again.force == pytest.approx(pose.force, rel=1e-4, abs=1e-9)
         # The points of the top's rim lie below the plate, and its middle on the axis.
-        rim = pose.height + three.outline * float((RIM @ pose.frames[1][-1].T)[:, 2].max())
+        rim = pose.height + three.outline * float((WALL_RIM @ pose.frames[1][-1].T)[:, 2].max())
         assert rim < 12.0 + 1e-4
         assert pose.tip[:2] == pytest.approx([0.0, 0.0], abs=1e-4)
         assert pose.stable

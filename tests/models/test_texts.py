@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.models import paper, stacked
-from sbafab.models.series import blocked
+from sbafab.models import elastic, paper
+from sbafab.models.elastic import blocked_force
 from sbafab.models.stack import Stack
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -26,7 +26,7 @@ def bend(three: Stack, chambers: int, pressure: float = 5.0) -> float:
 
 
 def test_bends_that_predict_tells_of_are_the_stack_s_and_sofa_s(three: Stack) -> None:
-    text = stacked.BEND.trust
+    text = elastic.BEND.trust
     stack = re.search(r"at 5 kPa has (\d+) deg with two chambers, (\d+) with one", text)
     shell = re.search(r"have (\d+) and (\d+); the paper's largest is (\d+) \+- (\d+)", text)
     assert stack
@@ -41,11 +41,11 @@ def test_bends_that_predict_tells_of_are_the_stack_s_and_sofa_s(three: Stack) ->
 
 
 def test_shares_of_the_force_that_the_paper_measured(three: Stack) -> None:
-    said = re.search(r"has ([\d.]+), ([\d.]+) and ([\d.]+) of it", stacked.FORCE.trust)
+    said = re.search(r"has ([\d.]+), ([\d.]+) and ([\d.]+) of it", elastic.FORCE.trust)
     assert said
     full = paper.FULL_HEIGHT.value - three.flat_height
     for share, measured, value in zip(paper.HEIGHTS, paper.FORCE_3DOF, said.groups(), strict=True):
-        pushed = 3 * float(blocked(three, paper.FORCE_KPA, share * full))
+        pushed = 3 * float(blocked_force(three, paper.FORCE_KPA, share * full))
         assert float(value) == pytest.approx(measured.value / pushed, abs=0.051)
 
 

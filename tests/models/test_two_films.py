@@ -11,7 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.simulators.calculix.frd import read_frd
+from sbafab.simulators.calculix.results import read_frd
 from sbafab.simulators.calculix.run import run_ccx
 
 SMOOTH = Balloon(wrinkles=False)

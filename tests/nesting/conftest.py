@@ -7,8 +7,7 @@ from dataclasses import replace
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.nesting.parts import parts_of
-from sbafab.nesting.records import NestPart
+from sbafab.nesting.records import NestPart, parts_of
 
 
 @pytest.fixture

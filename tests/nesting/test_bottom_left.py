@@ -12,8 +12,7 @@ from shapely import unary_union
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon, box
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Stock
@@ -24,9 +23,9 @@ def part(region: Region, count: int, pattern: str = "P01") -> NestPart:
 
 
 def nested(parts: Sequence[NestPart], stock: Stock) -> Nest:
-    (found,) = nest(parts, {"TPE": stock})
-    check_nest(found)
-    return found
+    (result,) = nest(parts, {"TPE": stock})
+    check_nest(result)
+    return result
 
 
 def shapely_of(region: Region) -> Polygon:
@@ -47,16 +46,16 @@ def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -
 @pytest.mark.parametrize(("usable", "column"), [(54.0, 5), (53.9, 4), (43.0, 4), (42.9, 3)])
 def test_a_column_holds_as_many_squares_as_its_length(usable: float, column: int) -> None:
     stock = Stock(10 + 20, usable + 20, 10, 1.0)
-    found = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 2 * column)], stock)
-    assert [len(found.on_sheet(sheet)) for sheet in range(found.sheets)] == [column, column]
+    result = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 2 * column)], stock)
+    assert [len(result.on_sheet(sheet)) for sheet in range(result.sheets)] == [column, column]
 
 
 def test_discs_in_a_row_touch_the_spacing() -> None:
     """Diameter 8 at spacing 2: ten need 98 mm of length in a channel as wide as one."""
     stock = Stock(8 + 2 * 5, 98 + 2 * 5, 5, 2.0)
-    found = nested([part(disc((0.0, 0.0), 4.0), 10)], stock)
-    assert found.sheets == 1
-    heights = sorted(found.region(place).bounds[1] for place in found.placements)
+    result = nested([part(disc((0.0, 0.0), 4.0), 10)], stock)
+    assert result.sheets == 1
+    heights = sorted(result.region(place).bounds[1] for place in result.placements)
     assert heights == pytest.approx([5.0 + 10.0 * i for i in range(10)], abs=1e-6)
 
 
@@ -74,20 +73,20 @@ def test_discs_lie_closer_than_in_squares() -> None:
 def test_no_part_goes_into_a_hole_which_is_cut_before_it() -> None:
     frame = rectangle((0.0, 0.0), (40.0, 40.0)) - rectangle((5.0, 5.0), (35.0, 35.0))
     stock = Stock(60, 60, 10, 1.0)
-    found = nested([part(frame, 1), part(disc((0.0, 0.0), 14.0), 1, "P02")], stock)
-    assert found.sheets == 2
+    result = nested([part(frame, 1), part(disc((0.0, 0.0), 14.0), 1, "P02")], stock)
+    assert result.sheets == 2
 
 
 def test_only_turns_that_the_stock_allows_are_used() -> None:
     upright = Stock(60, 200, 10, 1.0, turns=(0, 2))
-    found = nested([part(rectangle((0.0, 0.0), (39.0, 5.0)), 12)], upright)
-    assert {place.turn % 2 for place in found.placements} == {0}
+    result = nested([part(rectangle((0.0, 0.0), (39.0, 5.0)), 12)], upright)
+    assert {place.turn % 2 for place in result.placements} == {0}
 
 
 def test_a_part_is_turned_where_only_that_fits() -> None:
     stock = Stock(40, 80, 5, 1.0)
-    found = nested([part(rectangle((0.0, 0.0), (69.97, 29.98)), 1)], stock)
-    assert [place.turn % 2 for place in found.placements] == [1]
+    result = nested([part(rectangle((0.0, 0.0), (69.97, 29.98)), 1)], stock)
+    assert [place.turn % 2 for place in result.placements] == [1]
 
 
 def test_a_part_as_large_as_the_usable_area_is_nested() -> None:
@@ -99,25 +98,25 @@ def test_a_part_as_large_as_the_usable_area_is_nested() -> None:
 def test_parts_keep_clear_of_pins() -> None:
     pins = ((20.0, 20.0, 6.0), (50.0, 61.0, 3.0))
     stock = Stock(80, 80, 5, 1.5, pins=pins)
-    found = nested([part(rectangle((0.0, 0.0), (11.0, 9.0)), 30)], stock)
-    assert found.sheets == 1
+    result = nested([part(rectangle((0.0, 0.0), (11.0, 9.0)), 30)], stock)
+    assert result.sheets == 1
     for x, y, diameter in pins:
         pin = ShapelyPoint(x, y)
-        nearest = min(pin.distance(shapely_of(found.region(p))) for p in found.placements)
+        nearest = min(pin.distance(shapely_of(result.region(p))) for p in result.placements)
         assert nearest >= diameter / 2 + 1.5 - 1e-6
 
 
 def test_a_roll_is_cut_off_after_its_parts() -> None:
     """Twelve squares of 10 mm, four across: three rows and two spacings between borders."""
     stock = Stock(63, 5000, 10, 1.0, roll=True)
-    found = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 12)], stock)
-    assert found.sheets == 1
-    assert found.length(0) == pytest.approx(10 + 3 * 10 + 2 * 1 + 10)
+    result = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 12)], stock)
+    assert result.sheets == 1
+    assert result.length(0) == pytest.approx(10 + 3 * 10 + 2 * 1 + 10)
 
 
 def test_sheets_have_their_whole_length() -> None:
-    found = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(60, 70, 10, 1.0))
-    assert found.length(0) == 70
+    result = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(60, 70, 10, 1.0))
+    assert result.length(0) == 70
 
 
 def test_the_same_parts_are_nested_alike() -> None:
@@ -143,12 +142,12 @@ def test_shapely_agrees_that_random_parts_are_apart(
     chosen: list[tuple[Region, int]], spacing: float
 ) -> None:
     stock = Stock(45.0, 50.0, 4.0, spacing, pins=((22.0, 25.0, 2.0),))
-    found = nested(
+    result = nested(
         [part(region, count, f"P{i}") for i, (region, count) in enumerate(chosen)], stock
     )
-    assert len(found.placements) == sum(count for _, count in chosen)
-    for sheet in range(found.sheets):
-        shapes = [shapely_of(found.region(place)) for place in found.on_sheet(sheet)]
+    assert len(result.placements) == sum(count for _, count in chosen)
+    for sheet in range(result.sheets):
+        shapes = [shapely_of(result.region(place)) for place in result.on_sheet(sheet)]
         shapes.append(ShapelyPoint(22.0, 25.0).buffer(1.0, quad_segs=200))
         least = min(
             (a.distance(b) for i, a in enumerate(shapes) for b in shapes[:i]), default=math.inf
@@ -161,6 +160,6 @@ def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
     lobed_plates: list[NestPart],
 ) -> None:
     """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
-    found = nested(lobed_plates, Stock(152.4, 152.4, 10, 1.0))
-    assert len(found.placements) == 79
-    assert found.sheets == 1
+    result = nested(lobed_plates, Stock(152.4, 152.4, 10, 1.0))
+    assert len(result.placements) == 79
+    assert result.sheets == 1

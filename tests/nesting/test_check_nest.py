@@ -12,8 +12,7 @@ from shapely.geometry import Polygon
 
 from sbafab.errors import OutputError
 from sbafab.geometry.edges import Arc, Line
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_distance
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
@@ -22,12 +21,12 @@ STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
 
 
 def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:
-    wanted = len(shifts) if count is None else count
+    placements = len(shifts) if count is None else count
     return Nest(
         engine="bottom-left",
         material="TPE",
         stock=STOCK,
-        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, wanted),),
+        parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, placements),),
         placements=tuple(Placement(0, sheet, 0, (x, y)) for x, y, sheet in shifts),
     )
 
@@ -37,7 +36,7 @@ def test_a_sound_nest_passes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("faulty", "told"),
+    ("faulty", "message"),
     [
         (nest_of((5, 5, 0), (15.9, 5, 0)), r"are 0\.9000 mm apart at x 15\.\d+, y \d+\.\d+"),
         (nest_of((5, 5, 0), (12, 8, 0)), r"overlap at x"),
@@ -47,19 +46,19 @@ def test_a_sound_nest_passes() -> None:
         (nest_of((45, 30, 0), (45, 45, 0)), r"pin at x 50, y 50 overlap"),
         (nest_of((37.5, 45, 0)), r"pin at x 50, y 50 are 0\.5000 mm apart"),
         (nest_of((5, 5, 0), count=2), r"not nested 2 times"),
-        (nest_of((5, 5, 1)), r"sheets too many"),
-        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"sheets too many"),
+        (nest_of((5, 5, 1)), r"too many parts or sheets"),
+        (nest_of((5, 5, 0), (5, 5, 1), (5, 5, 2)), r"too many parts or sheets"),
     ],
 )
-def test_a_faulty_nest_is_refused(faulty: Nest, told: str) -> None:
-    with pytest.raises(OutputError, match=told):
+def test_a_faulty_nest_is_refused(faulty: Nest, message: str) -> None:
+    with pytest.raises(OutputError, match=message):
         check_nest(faulty)
 
 
 def test_a_part_on_no_known_index_is_refused() -> None:
     sound = nest_of((5, 5, 0))
     stray = replace(sound, placements=(*sound.placements, Placement(3, 0, 0, (30.0, 30.0))))
-    with pytest.raises(OutputError, match="parts or sheets too many"):
+    with pytest.raises(OutputError, match="too many parts or sheets"):
         check_nest(stray)
 
 
@@ -134,9 +133,9 @@ lines = st.builds(Line, spots, spots).filter(lambda line: line.length > 0.1)
 def test_edge_distances_are_what_dense_samples_find(a: Arc | Line, b: Arc | Line) -> None:
     count = 400
     sampled = min(math.dist(b.nearest(p), p) for p in (a.at(i / count) for i in range(count + 1)))
-    found = edge_distance(a, b).value
-    assert found <= sampled + 1e-6
-    assert found >= sampled - a.length / count
+    result = edge_distance(a, b).value
+    assert result <= sampled + 1e-6
+    assert result >= sampled - a.length / count
 
 
 sizes = st.floats(0.5, 3)

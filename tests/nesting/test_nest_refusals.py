@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.errors import DesignError
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import NestPart, Stock
 
@@ -30,8 +30,8 @@ def test_a_part_larger_than_the_sheet() -> None:
 
 
 def test_a_part_that_fits_in_another_turn_only_is_no_error() -> None:
-    (found,) = nest([PLATE], {"TPE": Stock(62, 120, 10, 1.0)})
-    assert found.sheets == 1
+    (result,) = nest([PLATE], {"TPE": Stock(62, 120, 10, 1.0)})
+    assert result.sheets == 1
 
 
 @pytest.mark.parametrize("border", [30.0, 31.0])

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon, box
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, stadium
-from sbafab.nesting.grid import grid_of
-from sbafab.nesting.raster import aligned, meetings, quarter_turned, raster
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
+from sbafab.nesting.engines import aligned, grid_of, meetings, quarter_turned, raster
 from sbafab.nesting.records import TURNS
 
 SHAPES = {
@@ -31,10 +29,10 @@ def shapely_of(region: Region) -> Polygon:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_cell_is_set_where_shapely_finds_the_region_in_it(name: str) -> None:
     region, cell = SHAPES[name], 0.25
-    cells, (left, bottom, _, _) = raster(region, cell)
+    cells, (low_x, bottom, _, _) = raster(region, cell)
     judge = shapely_of(region)
     for row, column in np.ndindex(cells.shape):
-        x, y = left + column * cell, bottom + row * cell
+        x, y = low_x + column * cell, bottom + row * cell
         shared = judge.intersection(box(x, y, x + cell, y + cell)).area
         if shared > 1e-4:
             assert cells[row, column], (row, column)
@@ -65,13 +63,13 @@ def test_a_disc_is_the_same_in_every_turn() -> None:
 def test_meetings_are_what_trying_every_offset_finds() -> None:
     a = raster(SHAPES["bent"], 0.5).cells
     b = raster(SHAPES["triangle"], 0.5).cells
-    found = meetings(a, b)
+    result = meetings(a, b)
     rows, columns = b.shape
-    assert found.shape == (a.shape[0] + rows - 1, a.shape[1] + columns - 1)
+    assert result.shape == (a.shape[0] + rows - 1, a.shape[1] + columns - 1)
     padded = np.pad(a, ((rows - 1, rows - 1), (columns - 1, columns - 1)))
-    for row, column in np.ndindex(found.shape):
+    for row, column in np.ndindex(result.shape):
         expected = bool((padded[row : row + rows, column : column + columns] & b).any())
-        assert found[row, column] == expected
+        assert result[row, column] == expected
 
 
 def test_what_keeps_two_forms_apart_does_not_hang_on_what_was_asked_before() -> None:

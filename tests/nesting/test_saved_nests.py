@@ -8,10 +8,9 @@ from typing import Any
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.nesting.nest import nest
+from sbafab.geometry.region import disc, rectangle
+from sbafab.nesting.nest import as_dict, from_dict, nest
 from sbafab.nesting.records import NestPart, Stock
-from sbafab.nesting.saved import as_dict, from_dict
 
 PARTS = (
     NestPart("demo", "P01", 1, "TPE", rectangle((0.1, 0.2), (9.3, 7.7)), 7),
@@ -44,8 +43,8 @@ def test_other_parts_are_nested_anew(saved: Any, parts: tuple[NestPart, ...]) ->
 
 
 def test_another_stock_or_engine_is_nested_anew(saved: Any) -> None:
-    other = {**STOCKS, "PTFE": replace(STOCKS["PTFE"], spacing=0.8)}
-    assert from_dict(saved, PARTS, other, "bottom-left") is None
+    stocks = {**STOCKS, "PTFE": replace(STOCKS["PTFE"], spacing=0.8)}
+    assert from_dict(saved, PARTS, stocks, "bottom-left") is None
     assert from_dict(saved, PARTS, STOCKS, "spyrrow") is None
 
 

@@ -8,12 +8,11 @@ import pytest
 from shapely.geometry import Polygon
 
 from sbafab.errors import DesignError, SbafabError
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium
+from sbafab.geometry.region import Region, disc, rectangle, stadium
 from sbafab.nesting.check import check_nest
+from sbafab.nesting.engines import SAGITTA, _outline
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Stock
-from sbafab.nesting.strip import SAGITTA, _outline
 
 
 def part(region: Region, count: int, pattern: str = "P01") -> NestPart:
@@ -22,37 +21,37 @@ def part(region: Region, count: int, pattern: str = "P01") -> NestPart:
 
 def nested(parts: list[NestPart], stock: Stock, seconds: float = 1) -> Nest:
     pytest.importorskip("spyrrow")
-    (found,) = nest(parts, {"TPE": stock}, "spyrrow", seconds)
-    check_nest(found)
-    return found
+    (result,) = nest(parts, {"TPE": stock}, "spyrrow", seconds)
+    check_nest(result)
+    return result
 
 
 def test_parts_that_do_not_fit_one_sheet_go_to_the_next() -> None:
     """16 squares of 10 mm take 43 x 43 mm; one more takes a second sheet."""
     stock = Stock(64, 64, 10, 1.0)
-    found = nested([part(rectangle((5.0, 5.0), (15.0, 15.0)), 17)], stock)
-    assert found.sheets >= 2
-    assert len(found.placements) == 17
+    result = nested([part(rectangle((5.0, 5.0), (15.0, 15.0)), 17)], stock)
+    assert result.sheets >= 2
+    assert len(result.placements) == 17
 
 
 def test_parts_of_several_shapes_keep_the_spacing() -> None:
     bent = rectangle((0.0, 0.0), (12.0, 3.0)) | stadium((1.5, 6.0), 3.0, 12.0)
     parts = [part(bent, 6), part(disc((3.0, 1.0), 4.0) - disc((3.0, 1.0), 2.0), 6, "P02")]
-    found = nested(parts, Stock(60, 152.4, 10, 1.0))
-    assert found.sheets == 1
+    result = nested(parts, Stock(60, 152.4, 10, 1.0))
+    assert result.sheets == 1
 
 
 def test_a_part_too_long_to_be_turned_is_not() -> None:
-    found = nested([part(rectangle((0.0, 0.0), (100.0, 20.0)), 3)], Stock(152.4, 60, 10, 1.0))
-    assert all(place.turn % 2 == 0 for place in found.placements)
+    result = nested([part(rectangle((0.0, 0.0), (100.0, 20.0)), 3)], Stock(152.4, 60, 10, 1.0))
+    assert all(place.turn % 2 == 0 for place in result.placements)
 
 
 def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
     lobed_plates: list[NestPart],
 ) -> None:
-    found = nested(lobed_plates, Stock(152.4, 152.4, 10, 0.5), seconds=2)
-    assert len(found.placements) == 79
-    assert found.sheets == 1
+    result = nested(lobed_plates, Stock(152.4, 152.4, 10, 0.5), seconds=2)
+    assert len(result.placements) == 79
+    assert result.sheets == 1
 
 
 def test_pins_are_refused() -> None:

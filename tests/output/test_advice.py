@@ -5,7 +5,7 @@ from __future__ import annotations
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.output.advice import CHECK_SEED, SEED, advise
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")

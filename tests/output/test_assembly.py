@@ -12,14 +12,12 @@ import pytest
 import trimesh
 from lxml import html as lxml_html
 
-from sbafab.as_built.check import check_folder
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.reading import load_assembly
-from sbafab.assemblies.writing import assembly_sha256
+from sbafab.assemblies.files import assembly_sha256, load_assembly
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.output.assembly import generate_assembly
 from sbafab.output.manifest import file_hashes
-from sbafab.output.run import Run
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Run, RunRequest, generate
 from tests.site.formats import hold
 
 SMALL = [f"parts.{name}.set.stack.balloons=2" for name in ("left", "right", "head")]
@@ -28,12 +26,12 @@ BRACE = ["parts.arm.set.stack.balloons=2"]
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return generate_assembly(load_assembly("standing", SMALL), tmp_path_factory.mktemp("out"))
+    return generate(RunRequest(load_assembly("standing", SMALL), tmp_path_factory.mktemp("out")))
 
 
 @pytest.fixture(scope="module")
 def brace(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return generate_assembly(load_assembly("brace", BRACE), tmp_path_factory.mktemp("out"))
+    return generate(RunRequest(load_assembly("brace", BRACE), tmp_path_factory.mktemp("out")))
 
 
 def test_a_folder_for_each_design_and_one_page_for_all(brace: Run) -> None:
@@ -91,8 +89,9 @@ def test_the_written_design_builds_the_same_assembly(brace: Run) -> None:
     assert assembly_sha256(again) == brace.manifest["design_sha256"]
 
 
+@pytest.mark.long
 def test_the_same_assembly_gives_the_same_bytes(standing: Run, tmp_path: Path) -> None:
-    again = generate_assembly(load_assembly("standing", SMALL), tmp_path)
+    again = generate(RunRequest(load_assembly("standing", SMALL), tmp_path))
     assert file_hashes(again.folder) == file_hashes(standing.folder)
 
 
@@ -131,7 +130,7 @@ def test_three_copies_share_a_lamination(standing: Run) -> None:
 
 def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> None:
     keys = [*BRACE, "parts.tube.outer_diameter=14"]
-    run = generate_assembly(load_assembly("brace", keys), tmp_path)
+    run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
     assert run.failed
     assert not list(run.folder.rglob("*.dxf"))
     assert not (run.folder / "traveller.html").exists()
@@ -140,17 +139,19 @@ def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> No
     assert failed == {"tube-match"}
 
 
+@pytest.mark.long
 def test_a_failed_rule_of_one_design_stops_all(tmp_path: Path) -> None:
     keys = [*BRACE, "parts.arm.set.bond.width=0.4"]
-    run = generate_assembly(load_assembly("brace", keys), tmp_path)
+    run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
     assert run.failed
     assert {f.rule for f in run.between or () if f.verdict == "fail"} == set()
     assert not list(run.folder.rglob("*.dxf"))
 
 
+@pytest.mark.long
 def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> None:
     whole = load_assembly("aperture", ["parts.arm.set.stack.balloons=2", *OFF], ["seat"])
-    run = generate_assembly(whole, tmp_path)
+    run = generate(RunRequest(whole, tmp_path))
     assert not run.failed
     assert run.manifest["waived"] == ["seat"]
     sheet = (run.folder / "sheets" / "TPE_1.dxf").read_text(encoding="utf-8")
@@ -159,10 +160,11 @@ def test_a_waived_check_is_said_on_sheets_page_and_manifest(tmp_path: Path) -> N
     assert not [f for f in check_folder(run.folder) if f.verdict == "fail"]
 
 
+@pytest.mark.long
 def test_lowered_limits_of_parts_and_checks_are_said(tmp_path: Path) -> None:
     keys = ["parts.arm.set.stack.balloons=2", "parts.arm.set.rules.bond_width=0.7"]
     whole = load_assembly("aperture", [*keys, "rules.seat_share=0.1"])
-    run = generate_assembly(whole, tmp_path)
+    run = generate(RunRequest(whole, tmp_path))
     assert not run.failed
     said = ["bond_width 0.7 (paper 0.75)", "seat_share 0.1 (default 0.25)"]
     assert run.manifest["lowered_limits"] == said
@@ -195,6 +197,7 @@ def claims_failed(folder: Path) -> str:
     return " / ".join(f"{f.rule}: {f.message}" for f in failed)
 
 
+@pytest.mark.long
 def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     folder = doctored(standing, tmp_path)
     path = folder / "manifest.json"
@@ -205,6 +208,7 @@ def test_a_moved_part_is_found(standing: Run, tmp_path: Path) -> None:
     assert said == "manifest-claims: parts or their places are not those of design.toml"
 
 
+@pytest.mark.long
 def test_another_design_file_is_found(standing: Run, tmp_path: Path) -> None:
     folder = doctored(standing, tmp_path)
     path = folder / "design.toml"

@@ -8,9 +8,9 @@ import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.output.run import Run, generate
 from sbafab.rules.deck import has_failed
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Run, RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 COPIES = 5
@@ -22,7 +22,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     small = ("press.platen_width=42", "press.platen_length=32")
     few = ("stack.balloons=2", f"order.copies={COPIES}", "rules.yield_builds=100")
     design = load_design("1dof-5mm", [*small, *few])
-    return generate(design, tmp_path_factory.mktemp("batch"), ("cut", "press", "preview"))
+    return generate(
+        RunRequest(design, tmp_path_factory.mktemp("batch"), ("cut", "press", "preview"))
+    )
 
 
 def test_two_cycles_make_five_copies_on_one_plate(run: Run) -> None:

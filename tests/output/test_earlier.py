@@ -8,48 +8,43 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.assemblies.loading import load
+from sbafab.assemblies.files import load
 from sbafab.assemblies.records import Assembly
-from sbafab.cutting.dxf_write import Curves
+from sbafab.cutting.properties import Curves
 from sbafab.errors import OutputError
-from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.output.assembly import generate_assembly
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.output.checked import RunPart
 from sbafab.output.manifest import file_hashes
-from sbafab.output.planned import RunPart
-from sbafab.output.run import Conforming, Extras, generate
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Conforming, RunRequest, generate
 
 SMALL = ("stack.balloons=1",)
 OTHER = (*SMALL, "press.temperature_c=140")
 WRONG = (*SMALL, "bond.width=0.72")
 
 
-def results(found: str, mesh: str = "mesh") -> Extras:
-    """As a simulator leaves them; with nothing found, as an export does."""
-
-    def put(_: Laminate, folder: Path) -> None:
-        own = folder / "calculix"
-        own.mkdir()
-        (own / "mesh.inp").write_text(mesh)
-        if found:
-            (own / "result.json").write_text(found)
-
-    return Extras(also=put, own=("calculix",))
+def simulated(out: Path, result: str, mesh: str = "mesh") -> RunRequest:
+    """A run with what a simulator left; with an empty result, as an export does."""
+    folder = out / f"{mesh}{result}" / "calculix"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "mesh.inp").write_text(mesh)
+    if result:
+        (folder / "result.json").write_text(result)
+    return RunRequest(load_design("1dof-5mm", SMALL), out, ("calculix",), simulated=folder)
 
 
 def test_a_failing_design_leaves_another_ones_run_as_it_was(tmp_path: Path) -> None:
-    good = generate(load_design("1dof-5mm", SMALL), tmp_path)
+    good = generate(RunRequest(load_design("1dof-5mm", SMALL), tmp_path))
     before = file_hashes(good.folder)
-    run = generate(load_design("1dof-5mm", WRONG), tmp_path)
+    run = generate(RunRequest(load_design("1dof-5mm", WRONG), tmp_path))
     assert run.failed
     assert run.kept
     assert file_hashes(good.folder) == before
 
 
 def test_a_failing_design_takes_the_place_of_a_failed_one(tmp_path: Path) -> None:
-    generate(load_design("1dof-5mm", WRONG), tmp_path)
-    run = generate(load_design("1dof-5mm", (*SMALL, "bond.width=0.71")), tmp_path)
+    generate(RunRequest(load_design("1dof-5mm", WRONG), tmp_path))
+    run = generate(RunRequest(load_design("1dof-5mm", (*SMALL, "bond.width=0.71")), tmp_path))
     assert run.failed
     assert not run.kept
     assert "0.71" in (run.folder / "design.toml").read_text()
@@ -60,36 +55,35 @@ def test_a_failing_design_takes_the_place_of_a_failed_one(tmp_path: Path) -> Non
 def test_a_part_alone_does_not_put_away_another_designs_files(
     part: RunPart, tmp_path: Path
 ) -> None:
-    good = generate(load_design("1dof-5mm", SMALL), tmp_path)
+    good = generate(RunRequest(load_design("1dof-5mm", SMALL), tmp_path))
     before = file_hashes(good.folder)
     key = re.escape("with press.temperature_c 135.0, not 140.0; take")
     with pytest.raises(OutputError, match=f"{key}.* --set name=NAME"):
-        generate(load_design("1dof-5mm", OTHER), tmp_path, (part,))
+        generate(RunRequest(load_design("1dof-5mm", OTHER), tmp_path, (part,)))
     assert file_hashes(good.folder) == before
 
 
 def test_a_part_made_anew_for_another_design_takes_the_old_ones_place(tmp_path: Path) -> None:
-    generate(load_design("1dof-5mm", SMALL), tmp_path, ("press",))
-    run = generate(load_design("1dof-5mm", OTHER), tmp_path, ("press",))
+    generate(RunRequest(load_design("1dof-5mm", SMALL), tmp_path, ("press",)))
+    run = generate(RunRequest(load_design("1dof-5mm", OTHER), tmp_path, ("press",)))
     assert "140" in (run.folder / "press.json").read_text()
 
 
 def test_a_whole_run_of_another_design_says_what_it_put_away(tmp_path: Path) -> None:
-    generate(load_design("1dof-5mm", SMALL), tmp_path, (), extras=results("1.6"))
-    run = generate(load_design("1dof-5mm", OTHER), tmp_path)
+    generate(simulated(tmp_path, "1.6"))
+    run = generate(RunRequest(load_design("1dof-5mm", OTHER), tmp_path))
     assert run.dropped == ("calculix/mesh.inp", "calculix/result.json")
 
 
 def test_results_stay_while_what_they_come_from_is_the_same(tmp_path: Path) -> None:
-    design = load_design("1dof-5mm", SMALL)
-    ran = generate(design, tmp_path, (), extras=results("1.6"))
+    ran = generate(simulated(tmp_path, "1.6"))
     before = file_hashes(ran.folder)
-    assert generate(design, tmp_path, (), extras=results("")).dropped == ()
+    assert generate(simulated(tmp_path, "")).dropped == ()
     assert file_hashes(ran.folder) == before
     with pytest.raises(OutputError, match="holds results of other settings"):
-        generate(design, tmp_path, (), extras=results("", mesh="finer"))
+        generate(simulated(tmp_path, "", mesh="finer"))
     assert file_hashes(ran.folder) == before
-    again = generate(design, tmp_path, (), extras=results("1.7", mesh="finer"))
+    again = generate(simulated(tmp_path, "1.7", mesh="finer"))
     assert (again.folder / "calculix" / "result.json").read_text() == "1.7"
 
 
@@ -99,9 +93,9 @@ def test_a_failing_assembly_leaves_an_earlier_run_as_it_was(tmp_path: Path) -> N
         assert isinstance(found, Assembly)
         return found
 
-    good = generate_assembly(brace(), tmp_path)
+    good = generate(RunRequest(brace(), tmp_path))
     before = file_hashes(good.folder)
-    run = generate_assembly(brace("deploy.lumen_diameter=15"), tmp_path)
+    run = generate(RunRequest(brace("deploy.lumen_diameter=15"), tmp_path))
     assert run.failed
     assert run.kept
     assert file_hashes(good.folder) == before
@@ -110,11 +104,11 @@ def test_a_failing_assembly_leaves_an_earlier_run_as_it_was(tmp_path: Path) -> N
 def test_a_design_of_an_assembly_is_not_written_into(tmp_path: Path) -> None:
     found = load("brace", ("parts.arm.set.stack.balloons=1",))
     assert isinstance(found, Assembly)
-    brace = generate_assembly(found, tmp_path).folder
+    brace = generate(RunRequest(found, tmp_path)).folder
     before = file_hashes(brace)
     arm = load_design(brace / "3dof-15mm" / "design.toml")
     with pytest.raises(OutputError, match="several designs made together"):
-        generate(arm, brace, ("press",))
+        generate(RunRequest(arm, brace, ("press",)))
     assert file_hashes(brace) == before
 
 
@@ -123,8 +117,9 @@ def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:
 
     def meshed(fill: float | None, *formats: str) -> set[str]:
         settings = MeshSettings(h=0.7, fill_ul=fill)
-        extras = Extras(Conforming(settings, formats))
-        return set(generate(design, tmp_path, ("mesh",), extras=extras).manifest["files"])
+        conforming = Conforming(settings, formats)
+        run = generate(RunRequest(design, tmp_path, ("mesh",), conforming=conforming))
+        return set(run.manifest["files"])
 
     assert "mesh/volume.vtu" in meshed(5.0, "vtu")
     assert {"mesh/volume.vtu", "mesh/cavity_chamber1_conforming.stl"} <= meshed(5.0, "stl")
@@ -137,7 +132,7 @@ def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:
 
 def test_cut_files_in_chords_stay_so_beside_a_new_schedule(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", SMALL)
-    generate(design, tmp_path, ("cut",), curves=Curves("chords", 0.02))
-    run = generate(design, tmp_path, ("press",))
+    generate(RunRequest(design, tmp_path, ("cut",), Curves("chords", 0.02)))
+    run = generate(RunRequest(design, tmp_path, ("press",)))
     assert run.manifest["curves"] == "chords within 0.02 mm"
     assert [f.message for f in check_folder(run.folder) if f.verdict == "fail"] == []

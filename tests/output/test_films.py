@@ -11,19 +11,20 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
-from sbafab.design.kits import kit_of, write_kit
+from sbafab.design.identity import kit_of
+from sbafab.design.kits import write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.run import Run, generate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
-from sbafab.simulators.calculix.settings import deck_settings
-from sbafab.simulators.coarse.actuator import actuator
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Run, RunRequest, generate
+from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.coarse.rounds import why_not_round
+from sbafab.simulators.coarse.shell import actuator
 from sbafab.simulators.mujoco.model import model_text
-from sbafab.simulators.sofa.files import why_no_scene
+from sbafab.simulators.sofa.scenes import why_no_scene
 
 FILMS = """
 [films.tpu50]
@@ -64,7 +65,9 @@ def design(tmp_path_factory: pytest.TempPathFactory) -> Design:
 
 @pytest.fixture(scope="module")
 def run(design: Design, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return generate(design, tmp_path_factory.mktemp("films"), ("cut", "press", "preview"))
+    return generate(
+        RunRequest(design, tmp_path_factory.mktemp("films"), ("cut", "press", "preview"))
+    )
 
 
 def test_every_film_has_its_files_sheets_and_rows(run: Run) -> None:
@@ -168,8 +171,8 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
 
 
 def test_meshes_hold_area_times_thickness_of_each_film(design: Design) -> None:
+    from sbafab.meshing.conforming.layup import MeshSettings
     from sbafab.meshing.conforming.meshes import conforming_meshes
-    from sbafab.meshing.conforming.settings import MeshSettings
 
     flat = build(
         design.with_("stack.balloons=1", "fillet.radius=0", "inlet.width=1.6", "layup.base=tpu50")

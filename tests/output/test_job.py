@@ -11,9 +11,8 @@ from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.job import generate_job
 from sbafab.output.manifest import file_hashes
-from sbafab.output.run import Run
+from sbafab.runs.run import Run, RunRequest, generate
 from tests.site.formats import hold
 
 
@@ -27,7 +26,7 @@ def designs(*assignments: str) -> list[Design]:
 @pytest.fixture(scope="module")
 def job(tmp_path_factory: pytest.TempPathFactory) -> Run:
     made = designs("order.copies=2", "order.spares=0", "order.spare_share=0")
-    return generate_job(made, "batch", tmp_path_factory.mktemp("job"))
+    return generate(RunRequest(made, tmp_path_factory.mktemp("job"), name="batch"))
 
 
 def test_every_design_has_its_folder_and_the_sheets_are_shared(job: Run) -> None:
@@ -77,15 +76,19 @@ def test_travellers_name_the_shared_sheets(job: Run) -> None:
 
 
 def test_the_same_job_gives_the_same_bytes(job: Run, tmp_path: Path) -> None:
-    again = generate_job(
-        designs("order.copies=2", "order.spares=0", "order.spare_share=0"), "batch", tmp_path
+    again = generate(
+        RunRequest(
+            designs("order.copies=2", "order.spares=0", "order.spare_share=0"),
+            tmp_path,
+            name="batch",
+        )
     )
     assert file_hashes(again.folder) == file_hashes(job.folder)
 
 
 def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
     bad = load_design("1dof-10mm", ["bond.width=0.4"])
-    stopped = generate_job([*designs(), bad], "batch", tmp_path)
+    stopped = generate(RunRequest([*designs(), bad], tmp_path, name="batch"))
     assert stopped.failed
     assert [one.failed for one in stopped.checked] == [False, False, True]
     assert list(tmp_path.iterdir()) == []
@@ -102,7 +105,9 @@ def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
 )
 def test_unfit_names_are_refused(others: list[str], name: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(DesignError, match=said):
-        generate_job([load_design("1dof-5mm"), *map(load_design, others)], name, tmp_path)
+        generate(
+            RunRequest([load_design("1dof-5mm"), *map(load_design, others)], tmp_path, name=name)
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -122,11 +127,15 @@ def test_a_name_that_the_job_needs_is_refused(
 ) -> None:
     both = [load_design("1dof-5mm"), load_design("1dof-10mm", [f"name={own}"])]
     with pytest.raises(DesignError, match=said):
-        generate_job(both, name, tmp_path)
+        generate(RunRequest(both, tmp_path, name=name))
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("key", ["sheets.tpe.width=300", "laser.kerf_tpe=0.1"])
 def test_designs_of_other_films_or_machines_are_not_cut_together(key: str, tmp_path: Path) -> None:
     with pytest.raises(DesignError, match=key.partition(".")[0]):
-        generate_job([load_design("1dof-5mm"), load_design("1dof-10mm", [key])], "batch", tmp_path)
+        generate(
+            RunRequest(
+                [load_design("1dof-5mm"), load_design("1dof-10mm", [key])], tmp_path, name="batch"
+            )
+        )

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
-from sbafab.design.writing import design_sha256
-from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.output import contents
-from sbafab.output.run import Conforming, Extras, generate
+from sbafab.design.identity import design_sha256
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.output import artefacts
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import Conforming, RunRequest, generate
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 
@@ -37,7 +37,7 @@ def manifest_of(folder: Path) -> dict[str, object]:
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_everything_is_there_and_hashed(name: str, tmp_path: Path) -> None:
     design = load_design(name)
-    run = generate(design, tmp_path)
+    run = generate(RunRequest(design, tmp_path))
     assert not run.failed
     manifest = manifest_of(run.folder)
     on_disk = hashes(run.folder)
@@ -68,7 +68,7 @@ def test_everything_is_there_and_hashed(name: str, tmp_path: Path) -> None:
 
 def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", ["bond.width=0.72"])
-    run = generate(design, tmp_path)
+    run = generate(RunRequest(design, tmp_path))
     assert run.failed
     written = hashes(run.folder)
     assert not [path for path in written if path.startswith(("layers/", "mesh/", "press"))]
@@ -79,7 +79,7 @@ def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
 
 def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
     waive = 'rules.waive=["bond-width", "tube-fit"]'
-    run = generate(load_design("1dof-5mm", ["bond.width=0.72", waive]), tmp_path)
+    run = generate(RunRequest(load_design("1dof-5mm", ["bond.width=0.72", waive]), tmp_path))
     assert not run.failed
     cut = sorted((run.folder / "layers").iterdir())
     assert len(cut) == 23
@@ -92,7 +92,7 @@ def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
 
 def test_lowered_limits_stand_in_every_file(tmp_path: Path) -> None:
     settings = ["bond.width=0.6", "rules.bond_width=0.6", "rules.worst_bond_width=0"]
-    run = generate(load_design("1dof-5mm", [*settings, "stack.balloons=2"]), tmp_path)
+    run = generate(RunRequest(load_design("1dof-5mm", [*settings, "stack.balloons=2"]), tmp_path))
     assert not run.failed
     said = ["bond_width 0.6 (paper 0.75)", "worst_bond_width 0 (default 0.5)"]
     manifest = manifest_of(run.folder)
@@ -113,7 +113,9 @@ def test_lowered_limits_stand_in_every_file(tmp_path: Path) -> None:
 
 
 def test_usual_limits_are_not_spoken_of(tmp_path: Path) -> None:
-    run = generate(load_design("1dof-5mm", ["stack.balloons=2"]), tmp_path, ["cut", "press"])
+    run = generate(
+        RunRequest(load_design("1dof-5mm", ["stack.balloons=2"]), tmp_path, ["cut", "press"])
+    )
     assert manifest_of(run.folder)["lowered_limits"] == []
     for path in run.folder.rglob("*.*"):
         if path.suffix in (".dxf", ".csv") or path.name in ("press.json", "checks.json"):
@@ -123,29 +125,29 @@ def test_usual_limits_are_not_spoken_of(tmp_path: Path) -> None:
 
 def test_a_waiver_that_was_not_needed_is_not_claimed(tmp_path: Path) -> None:
     waive = 'rules.waive=["bond-width", "mask-overhang"]'
-    run = generate(load_design("1dof-5mm", [waive]), tmp_path, ["cut"])
+    run = generate(RunRequest(load_design("1dof-5mm", [waive]), tmp_path, ["cut"]))
     assert manifest_of(run.folder)["waived"] == []
 
 
 def test_parts_keep_what_is_of_the_same_design(tmp_path: Path) -> None:
-    whole = generate(load_design("1dof-5mm"), tmp_path)
+    whole = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
     before = hashes(whole.folder)
-    generate(load_design("1dof-5mm"), tmp_path, ["press"])
+    generate(RunRequest(load_design("1dof-5mm"), tmp_path, ["press"]))
     assert hashes(whole.folder) == before
 
 
 def test_a_run_that_dies_half_way_leaves_the_old_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run = generate(load_design("1dof-5mm"), tmp_path)
+    run = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
     before = hashes(run.folder)
 
     def dies(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(contents, "write_meshes", dies)
+    monkeypatch.setattr(artefacts, "write_meshes", dies)
     with pytest.raises(KeyboardInterrupt):
-        generate(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path)
+        generate(RunRequest(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path))
     assert hashes(run.folder) == before
     assert sorted(os.listdir(tmp_path)) == [".1dof-5mm.lock", "1dof-5mm"]
 
@@ -153,7 +155,7 @@ def test_a_run_that_dies_half_way_leaves_the_old_output(
 @pytest.mark.parametrize(("name", "balloons"), [("3dof-15mm", 2), ("radial-15mm", 1)])
 def test_same_input_same_bytes(name: str, balloons: int, tmp_path: Path) -> None:
     size = f"stack.balloons={balloons}"
-    here = hashes(generate(load_design(name, [size]), tmp_path / "here").folder)
+    here = hashes(generate(RunRequest(load_design(name, [size]), tmp_path / "here")).folder)
     script = f"import sys, sbafab; sbafab.generate(sys.argv[1], {size!r}, out=sys.argv[2])"
     environment = {**os.environ, "PYTHONHASHSEED": "4711", "TZ": "Pacific/Kiritimati"}
     subprocess.run(
@@ -171,7 +173,7 @@ def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
     toml = tmp_path / "drop.toml"
     toml.write_text('family = "1dof"\n[chamber]\noutline = "drop.svg"\n[stack]\nballoons = 2\n')
     design = load_design(toml)
-    run = generate(design, tmp_path / "out", ["cut"])
+    run = generate(RunRequest(design, tmp_path / "out", ["cut"]))
     again = load_design(run.folder / "design.toml")
     assert design_sha256(again) == design_sha256(design)
     assert run.manifest["sizes"]["outline_diameter"] == pytest.approx(9.5)
@@ -180,15 +182,15 @@ def test_a_drawn_outline_travels_with_the_output(tmp_path: Path) -> None:
 def test_conforming_meshes_stay_beside_those_of_a_later_run(tmp_path: Path) -> None:
     design = load_design("1dof-5mm", ["stack.balloons=1"])
     asked = Conforming(MeshSettings(h=0.7, symmetry="quarter"), ("vtu",))
-    made = generate(design, tmp_path, ("mesh",), extras=Extras(asked))
+    made = generate(RunRequest(design, tmp_path, ("mesh",), conforming=asked))
     figures = made.manifest["mesh_statistics"]
     assert figures["volume"]["least_scaled_jacobian"] > 0
     assert made.manifest["meshes"][-1]["kind"] == "shell"
-    later = generate(design, tmp_path)
+    later = generate(RunRequest(design, tmp_path))
     assert {mesh["file"] for mesh in later.manifest["meshes"]} == {
         mesh["file"] for mesh in made.manifest["meshes"]
     }
     assert later.manifest["mesh_statistics"] == figures
     assert (later.folder / "mesh" / "volume.vtu").is_file()
-    other = generate(load_design("1dof-5mm"), tmp_path)
+    other = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
     assert not (other.folder / "mesh" / "volume.vtu").exists()

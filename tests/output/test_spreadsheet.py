@@ -11,7 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.actuators import build
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.pressing.tables import press_csv
 from sbafab.spreadsheet import csv_text, plain_text

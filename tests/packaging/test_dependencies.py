@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from sbafab.cli import EXTRAS
 
@@ -40,8 +41,9 @@ OUR_OWN = {
 }
 
 
-APART = {"all", "dev", "docs"}
-"""All extras together, what the tests take, and what the site does."""
+TESTING = ("dev", "interop")
+APART = {"all", "docs", *TESTING}
+"""All extras together, the site's, and those of the tests."""
 
 
 def names(requirements: list[str]) -> set[str]:
@@ -53,6 +55,10 @@ def third_party(folder: Path) -> set[str]:
     return {INSTALLED_AS.get(name, name) for name in modules} - OUR_OWN
 
 
+def _testing(project: dict[str, Any]) -> set[str]:
+    return {name for extra in TESTING for name in names(project["optional-dependencies"][extra])}
+
+
 def test_the_package_needs_what_it_imports_and_no_more() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = {
@@ -62,12 +68,12 @@ def test_the_package_needs_what_it_imports_and_no_more() -> None:
         for name in names(needed)
     }
     assert third_party(ROOT / "sbafab") == names(project["dependencies"]) | extras
-    assert extras <= names(project["optional-dependencies"]["dev"])
+    assert extras <= _testing(project)
 
 
 def test_the_tests_need_nothing_undeclared() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = names(project["dependencies"]) | names(project["optional-dependencies"]["dev"])
+    declared = names(project["dependencies"]) | _testing(project)
     assert third_party(ROOT / "tests") <= declared
 
 

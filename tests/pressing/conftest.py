@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer, Pin, Role
 

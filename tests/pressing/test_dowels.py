@@ -19,7 +19,7 @@ from sbafab.laminate.base_plate import (
     pin_error,
 )
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.dowels import PinHole, chamfer, hole_notes, lengths_sold
 from sbafab.pressing.schedule import PressSettings, Schedule, Step, plate_holes, schedule
 

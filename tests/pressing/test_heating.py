@@ -10,7 +10,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import PressSettings, Schedule, schedule
 from sbafab.pressing.tables import press_csv, press_json
 

@@ -9,7 +9,7 @@ from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.dowels import chamfer, least_seat
 from sbafab.pressing.schedule import Schedule, schedule
 from sbafab.reports.traveller.job import Job

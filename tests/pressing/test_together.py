@@ -8,16 +8,16 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import fixture
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import footprint
-from sbafab.pressing.schedule import PressSettings, schedule
-from sbafab.pressing.together import (
+from sbafab.pressing.cycles import (
     Runs,
-    a_day,
     are_apart,
     batch_json,
     batch_times,
+    copies_a_day,
     press_runs,
     runs_of,
 )
+from sbafab.pressing.schedule import PressSettings, schedule
 
 INCH = 25.4
 
@@ -68,9 +68,9 @@ def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
     times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
     assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
     # 480 min: 4 x 105 fit and 5 x 105 do not; 45 + 7 x 60 = 465 fits and 45 + 8 x 60 does not.
-    assert (a_day(plan, 1, 480), a_day(plan, 12, 480)) == (4, 7)
+    assert (copies_a_day(plan, 1, 480), copies_a_day(plan, 12, 480)) == (4, 7)
     # Two cycles of 4: 90 + 60 n.
-    assert a_day(plan, 4, 480) == 6
+    assert copies_a_day(plan, 4, 480) == 6
 
 
 def test_one_plate_has_every_hole_of_every_place() -> None:

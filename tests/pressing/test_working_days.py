@@ -7,10 +7,9 @@ import math
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
+from sbafab.pressing.cycles import Entry, Task, batch_times, by_day, design_runs, working_days
 from sbafab.pressing.schedule import Schedule, schedule
-from sbafab.pressing.together import batch_times, design_runs, working_days
-from sbafab.pressing.working_days import Entry, Task, by_day
 
 
 def planned(template: str, *changes: str) -> tuple[tuple[int, ...], tuple[Entry, ...], Schedule]:

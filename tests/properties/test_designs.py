@@ -17,11 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
 from sbafab.cli import main
 from sbafab.errors import DesignError
-from sbafab.output.checking import check
-from sbafab.output.run import generate
+from sbafab.output.checked import check
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.properties.designs import Draft, lobed, one_dof, radial, valid
 from tests.properties.faults import REFUSALS, RULES
 
@@ -35,7 +35,7 @@ def share(few: int, parts: int) -> settings:
 
 def failures(draft: Draft) -> list[str]:
     with TemporaryDirectory() as folder:
-        _, findings = check(load_design(draft.write(Path(folder))))
+        findings = check(load_design(draft.write(Path(folder)))).findings
     return [finding.message for finding in findings if finding.verdict == "fail"]
 
 
@@ -86,7 +86,9 @@ def test_valid_radial_designs_break_no_rule(draft: Draft) -> None:
 @given(valid())
 def test_valid_designs_break_no_rule_as_they_lie_on_disk(draft: Draft) -> None:
     with TemporaryDirectory() as name:
-        run = generate(load_design(draft.write(Path(name))), Path(name) / "out", ("cut",))
+        run = generate(
+            RunRequest(load_design(draft.write(Path(name))), Path(name) / "out", ("cut",))
+        )
         findings = check_folder(run.folder)
     assert [finding.message for finding in findings if finding.verdict == "fail"] == []
 

@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from sbafab.geometry.boolean import union
 from sbafab.geometry.offset import fillet, grow, shrink
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle, stadium, strip
+from sbafab.geometry.region import Region, disc, rectangle, stadium, strip, union
 
 SAGITTA = 2e-5
 QUADRANT = 128

@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.as_built.check import check_folder
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
-from sbafab.output.run import generate
-from sbafab.reports.traveller.placing import over_tab
+from sbafab.geometry.region import Region, disc
+from sbafab.reports.traveller.lay_up import over_tab
 from sbafab.rules.finding import Finding
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
 AXIS = (0.0, 0.0)
@@ -22,7 +21,7 @@ AXIS = (0.0, 0.0)
 def waisted(tmp_path_factory: pytest.TempPathFactory) -> Doctor:
     sizes = ["stack.balloons=3", "chamber.diameter=[8, 5, 8]", "name=waisted"]
     design = load_design("1dof-5mm", [*sizes, "rules.yield_builds=100"])
-    generate(design, tmp_path_factory.mktemp("out"), ("cut",))
+    generate(RunRequest(design, tmp_path_factory.mktemp("out"), ("cut",)))
     return Doctor(next(tmp_path_factory.getbasetemp().glob("out*/waisted")))
 
 

@@ -9,8 +9,8 @@ import ezdxf
 import pytest
 
 from sbafab.actuators import load_design
-from sbafab.as_built.check import check_folder
-from sbafab.output.run import generate
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
 
 FEW = ("rules.yield_builds=100", "registration.method=ears")
 UNEVEN = ("laser.kerf_tpe=[0.12, 0.1]", "laser.kerf_ptfe=[0.08, 0.12]")
@@ -53,6 +53,6 @@ def test_what_was_written_holds_as_built(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     draw_bone(Path("bone.dxf"))
-    run = generate(load_design(template, [*FEW, *settings]), tmp_path, ("cut",))
+    run = generate(RunRequest(load_design(template, [*FEW, *settings]), tmp_path, ("cut",)))
     assert not run.failed
     assert [f.message for f in check_folder(run.folder) if f.verdict == "fail"] == []

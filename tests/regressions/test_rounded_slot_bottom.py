@@ -8,8 +8,7 @@ import pytest
 
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import fillet
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, polygon, rectangle
+from sbafab.geometry.region import Region, disc, polygon, rectangle
 from sbafab.geometry.width import least_gap, least_width
 
 SHARP = 15.0

@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules import bond_width
+from sbafab.rules.measures import Measures
 
 POCKET = """\
 M7.4385,-0.5690 L7.1693,0.5514 L6.4333,1.4903 L5.4036,2.1357 L4.2995,2.4855 L3.3106,2.6463
@@ -64,7 +65,7 @@ def test_the_web_is_as_wide_as_shapely_finds_it(tmp_path: Path) -> None:
     laminate = build(design)
     (bond,) = laminate.interfaces[0].bond.shapely().geoms
     web = min(bond.exterior.distance(hole) for hole in bond.interiors)
-    (finding,) = bond_width.check(laminate, limits(design))
+    (finding,) = bond_width.check(Measures(laminate, limits(design)))
     assert finding.verdict == "fail"
     assert finding.measured == pytest.approx(web, abs=2e-3)
     assert web < 0.6

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.geometry.offset import grow
-from sbafab.geometry.shapes import rectangle
+from sbafab.geometry.region import rectangle
 from sbafab.geometry.width import least_width
 
 

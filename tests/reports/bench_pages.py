@@ -11,7 +11,7 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html

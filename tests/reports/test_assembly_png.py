@@ -10,12 +10,12 @@ import pytest
 from PIL import Image
 
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.colours import BOUGHT, FILMS, linear
-from sbafab.assemblies.reading import load_assembly
-from sbafab.geometry.shapes import disc, rectangle
-from sbafab.meshing.prisms import Slab, fuse
+from sbafab.assemblies.files import load_assembly
+from sbafab.assemblies.shapes import BOUGHT, FILMS, linear
+from sbafab.geometry.region import disc, rectangle
+from sbafab.meshing.solid import Slab, fuse
 from sbafab.reports.assembly_png import assembly_png
-from sbafab.reports.depth import View, seen
+from sbafab.reports.canvas import View, rasterize
 
 DOWN = View(np.eye(3), 10.0, (200.0, 150.0))
 """From straight above, 10 pixels a mm."""
@@ -25,7 +25,7 @@ def test_a_body_covers_its_area_and_hides_what_lies_below() -> None:
     plate = fuse([Slab(rectangle((-15, -10), (15, 10)), 0, 1)], 0.01)
     pillar = fuse([Slab(disc((3, 2), 4), 1, 5)], 0.001)
     for order in ([plate, pillar], [pillar, plate]):
-        buffer = seen(order, DOWN, 400, 300, (0, 0, 1))
+        buffer = rasterize(order, DOWN, 400, 300, (0, 0, 1))
         pixels = [int((buffer.body == number).sum()) for number in (0, 1)]
         areas = dict(zip(map(id, order), pixels, strict=True))
         circle = math.pi * 16 * 100
@@ -38,15 +38,15 @@ def test_a_body_covers_its_area_and_hides_what_lies_below() -> None:
 
 def test_no_pixel_of_a_body_is_missed() -> None:
     sliver = fuse([Slab(rectangle((-15, -0.5), (15, 0.5)), 0, 1)], 0.01)
-    body = seen([sliver], DOWN, 400, 300, (0, 0, 1)).body
+    body = rasterize([sliver], DOWN, 400, 300, (0, 0, 1)).body
     assert (body[146:154, 52:348] == 0).all()
     assert (body[:143] == -1).all()
 
 
 def test_light_falls_from_the_lamp() -> None:
     plate = fuse([Slab(rectangle((-5, -5), (5, 5)), 0, 1)], 0.01)
-    bright = seen([plate], DOWN, 400, 300, (0, 0, 1)).light.max()
-    dim = seen([plate], DOWN, 400, 300, (1, 0, 0)).light.max()
+    bright = rasterize([plate], DOWN, 400, 300, (0, 0, 1)).light.max()
+    dim = rasterize([plate], DOWN, 400, 300, (1, 0, 0)).light.max()
     assert bright == pytest.approx(1)
     assert dim < 0.7
 

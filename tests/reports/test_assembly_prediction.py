@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.reading import assembly_of
+from sbafab.assemblies.files import assembly_of
 from sbafab.cli import app
 from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip, predict_assembly
 

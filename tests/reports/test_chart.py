@@ -7,8 +7,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import sbafab
-from sbafab.reports.chart import COLOURS, ChartCurve, ChartPoints, Panel, chart_svg
-from sbafab.reports.relation_svg import relation_svg
+from sbafab.reports.charts import COLOURS, ChartCurve, ChartPoints, Panel, chart_svg, relation_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -8,7 +8,7 @@ from typing import Any
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.reports.traveller.findings import Inspected, findings_html
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding, Place
@@ -47,7 +47,7 @@ def test_a_rougher_hand_has_fewer_good_builds() -> None:
 def test_with_ears_no_hand_decides() -> None:
     tree = page("stack.balloons=2", 'registration.method="ears"', "rules.yield_builds=100")
     assert table(tree, "hands") == []
-    assert "No hand decides a limit" in tree.text_content()
+    assert "Hand placement decides no limit" in tree.text_content()
 
 
 def test_words_from_outside_stay_words() -> None:
@@ -63,5 +63,5 @@ def test_no_pin_is_offered_that_the_press_could_not_have_out() -> None:
     laminate, asked = build(design), limits(design)
     one = Inspected(design.name, run_deck(laminate, asked), laminate, asked)
     text = findings_html(design.name, "0" * 64, "sbafab 1", [one])
-    assert "What helps" in text
-    assert "lumen" not in text[text.index("What helps") : text.index("What holds")]
+    assert "Remedies" in text
+    assert "lumen" not in text[text.index("Remedies") : text.index("Passes")]

@@ -12,7 +12,7 @@ import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
 from tests.reports.bench_pages import page, words_of
 
 FREE = r"{}, [\d.]+ mm thick: (.*?) No tab holds a part: (\d+) come free, the lightest of ([\d.]+)"
@@ -26,7 +26,7 @@ def test_every_free_part_of_every_film_is_counted(
 ) -> None:
     few = ["stack.balloons=3"] if template != "radial-15mm" else []
     design = load_design(template, [*few, f"order.copies={copies}", "rules.yield_builds=100"])
-    run = generate(design, tmp_path, ("cut", "press", "preview"))
+    run = generate(RunRequest(design, tmp_path, ("cut", "press", "preview")))
     page = lxml_html.fromstring((run.folder / "traveller.html").read_text())
     cut = words_of(page.get_element_by_id("cut").getparent())
     for material in ("TPE", "PTFE"):

@@ -16,16 +16,15 @@ from PIL import Image
 import sbafab
 from sbafab.cli import app
 from sbafab.errors import DesignError
-from sbafab.laminate.extent import outline_diameter
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, outline_diameter
 from sbafab.models.stack import Stack
 from sbafab.reports.inflated import InflatedPart, inflated, pressed
-from sbafab.reports.inflated_picture import PictureWish, picture_png, pose_of, write_picture
+from sbafab.reports.inflated_picture import PictureRequest, picture_png, pose_of, write_picture
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 CHANGES = ("stack.balloons=4",)
 TWO = {"chamber1": 5.0, "chamber2": 5.0}
-SMALL = PictureWish(TWO, width=160, height=128, frames=4)
+SMALL = PictureRequest(TWO, width=160, height=128, frames=4)
 
 
 @pytest.fixture(scope="module")
@@ -118,10 +117,10 @@ def test_chambers_that_no_volume_names_are_said_to_be_empty(
     laminate: Laminate, stack: Stack
 ) -> None:
     with pytest.raises(DesignError, match=r"empty: name chamber2 and chamber3$"):
-        pose_of(laminate, stack, PictureWish({}, {"chamber1": 900.0}))
+        pose_of(laminate, stack, PictureRequest({}, {"chamber1": 900.0}))
     every = {f"chamber{number}": 900.0 * (number == 1) for number in (1, 2, 3)}
     with pytest.raises(DesignError, match=r"nearer together$"):
-        pose_of(laminate, stack, PictureWish({}, every))
+        pose_of(laminate, stack, PictureRequest({}, every))
 
 
 def test_the_picture_shows_full_chambers_and_is_the_same_again(
@@ -169,7 +168,7 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
         (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--to", str(tmp_path / "no" / "a.png")], "cannot be written"),
-        (["--motion", "circle", "--to", "a.png"], "--motion is for a moving picture"),
+        (["--motion", "circle", "--to", "a.png"], "--motion is for an animation"),
     ):
         refused = run(app, [*asked, *extra])
         assert refused.exit_code != 0
@@ -186,7 +185,7 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
         path = tmp_path / f"shown{ending}"
         result = CliRunner().invoke(app, [*arguments, str(path), *wide])
         assert result.exit_code == 0, result.output
-        assert f"{name}, flat, not inflated: no model inflates pockets" in result.output
+        assert f"{name} drawn flat, since no model inflates pockets" in result.output
     with Image.open(tmp_path / "shown.png") as image:
         assert image.size == (160, 128)
     # Unnamed, it is named as what it is.

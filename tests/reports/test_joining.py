@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.reading import assembly_of
-from sbafab.assemblies.supply import runs
-from sbafab.design.reading import read_toml
-from sbafab.design.templates import templates_folder
-from sbafab.reports.traveller.joining import join_pages
+from sbafab.assemblies.checks import supply_runs
+from sbafab.assemblies.files import assembly_of
+from sbafab.design.files import read_toml, templates_folder
+from sbafab.reports.traveller.assembly_page import join_pages
 
 
 def together(template: str, **parts: dict[str, Any]) -> Assembled:
@@ -111,7 +110,7 @@ def test_the_gaps_are_those_of_the_sheet(turn: float) -> None:
     made = together("brace", arm={"turn": turn})
     # 11.5 of 15.708 mm are covered; a tube 1.016 wide needs room on both sides.
     half = math.degrees((11.5 / 2 + 1.016 / 2) / 7.5)
-    for run in runs(made["arm"], made):
+    for run in supply_runs(made["arm"], made):
         off = min(run.angle % 120, 120 - run.angle % 120)
         assert bool(run.over) == (off < half)
 

@@ -12,7 +12,7 @@ from svgelements import Path
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.features import layer_numbers
+from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.layers_svg import layers_svg
 
 SVG = "{http://www.w3.org/2000/svg}"

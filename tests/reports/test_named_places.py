@@ -5,8 +5,8 @@ from __future__ import annotations
 import random
 
 from sbafab.geometry.edges import Bounds
-from sbafab.reports.traveller import named_places
-from sbafab.reports.traveller.named_places import FAR, STEPS, PlanName
+from sbafab.reports.traveller import step_pictures
+from sbafab.reports.traveller.step_pictures import FAR, STEPS, PlanName
 
 HALF = 3.0, 1.0
 ROOM: Bounds = (-20.0, -15.0, 20.0, 15.0)
@@ -24,11 +24,11 @@ def test_a_name_stands_where_it_costs_least() -> None:
     for seed in range(12):
         taken = crowd(seed)
         costs = {
-            (middle, away): named_places._cost(name, middle, HALF, ROOM, taken) + FAR * away
+            (middle, away): step_pictures._cost(name, middle, HALF, ROOM, taken) + FAR * away
             for away in STEPS
-            for middle in named_places._places(name, HALF, away)
+            for middle in step_pictures._places(name, HALF, away)
         }
-        best = named_places._best(name, HALF, ROOM, taken)
+        best = step_pictures._best(name, HALF, ROOM, taken)
         assert costs[best] == min(costs.values())
         distances.add(best[1])
     assert len(distances) > 2

@@ -6,7 +6,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region
-from sbafab.reports.traveller.part_labels import HOLE, OUTSIDE, PlacedLabel, labels
+from sbafab.reports.traveller.sheet_map import HOLE, OUTSIDE, PlacedLabel, labels
 
 
 def profiles() -> list[Region]:

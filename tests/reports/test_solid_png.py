@@ -12,11 +12,10 @@ from shapely.geometry import Polygon
 
 from sbafab.actuators import build, load_design
 from sbafab.geometry.edges import Point
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.canvas import COLOURS, keyhole
-from sbafab.reports.cutaway import cutaway
-from sbafab.reports.solid_png import solid_png
+from sbafab.reports.solid_png import cutaway, solid_png
 
 SIZE = (480, 360)
 

@@ -12,8 +12,7 @@ from PIL import ImageFont
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.stack_section import chamber_section, opening
-from sbafab.reports.stack_svg import BOND, stack_svg
+from sbafab.reports.stack_svg import BOND, chamber_section, opening, stack_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -22,14 +22,14 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
-from sbafab.reports.traveller import quantities as say
+from sbafab.reports.traveller import units
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.layup import rounds
 from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.traveller.shapes import rounds
 from sbafab.rules.finding import Finding, Place
 
 SHA = hashlib.sha256(b"design").hexdigest()
@@ -111,10 +111,12 @@ def test_the_page_is_whole_in_itself(sheet_files: Any, given: tuple[str, ...]) -
 
 
 def test_dials_are_the_papers() -> None:
-    assert say.temperature(135.0) == "135 °C (275 °F)"
-    assert say.force(110.0 * 152.4**2 / 1000) == "2555 N = 2.555 kN = 574 lbf"
+    assert units.temperature(135.0) == "135 °C (275 °F)"
+    assert units.force(110.0 * 152.4**2 / 1000) == "2555 N = 2.555 kN = 574 lbf"
     # 1 psi is the weight of 0.45359237 kg on a square inch.
-    assert say.pressure(110.0) == f"110 kPa ({110e3 * 0.0254**2 / (0.45359237 * 9.80665):.1f} psi)"
+    assert (
+        units.pressure(110.0) == f"110 kPa ({110e3 * 0.0254**2 / (0.45359237 * 9.80665):.1f} psi)"
+    )
 
 
 def test_each_step_shows_its_dials(sheet_files: Any) -> None:
@@ -205,7 +207,7 @@ def test_a_blank_stands_where_nobody_is_named(sheet_files: Any) -> None:
 PRINTS = """
 import hashlib
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html
@@ -231,6 +233,18 @@ def test_the_same_design_gives_the_same_bytes() -> None:
         for seed in ("1", "2")
     }
     assert len(printed) == 1
+
+
+def test_release_films_count_every_press_cycle(sheet_files: Any) -> None:
+    """Two new ones each time the press closes; nine copies, four at most in a shift, take three."""
+    for copies, assignment, cycles in ((1, "", 1), (3, "", 1), (9, "order.shift_hours=5", 3)):
+        work = work_of(sheet_files, "1dof-5mm", *filter(None, [assignment]), copies=copies)
+        assert work.runs.count == cycles
+        closings = cycles * len(work.schedule.steps)
+        rows = parsed(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
+        [films] = [row for row in rows if words_of(row[1]) == "Release film"]
+        assert words_of(films[3]) == f"{2 * closings}"
+        assert f"{2 * closings} release films and the press pad" in page_of(work)
 
 
 def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
@@ -384,4 +398,4 @@ def test_ears_are_trimmed_and_tubes_wrapped(sheet_files: Any) -> None:
     other = page_of(work_of(sheet_files, "radial-15mm", 'tube.glue="Sil-Poxy"'))
     assert other.count("Sil-Poxy") == 2
     for page in (ears, plain, radial):
-        assert "Snip off what of the strip stands out of the tab" in page
+        assert "Snip the strip off flush with the tab" in page

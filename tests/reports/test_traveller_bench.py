@@ -14,9 +14,9 @@ from lxml import html as lxml_html
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.nesting.records import Nest
-from sbafab.output.settings import limits, press_settings
+from sbafab.output.checked import limits, press_settings
+from sbafab.pressing.cycles import design_runs
 from sbafab.pressing.schedule import schedule
-from sbafab.pressing.together import design_runs
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
@@ -106,7 +106,8 @@ def test_the_plate_says_how_its_holes_are_made_and_how_true(sheet_files: Any) ->
     assert "on that shoulder the pin stands" in said
     assert "lap it to its own pins" in said
     assert (
-        "within 0.003 mm of its place in the table, in any direction: that is a jig borer" in said
+        "within 0.003 mm of its place in the table, in any direction: which takes a jig borer"
+        in said
     )
     assert "The rules count 0.004 mm for both" in said
     mill = 'registration.plate_made_by="cnc-mill"'
@@ -117,7 +118,7 @@ def test_the_plate_says_how_its_holes_are_made_and_how_true(sheet_files: Any) ->
     assert "up to 0.008 mm of play in its hole. The rules count 0.029 mm for both" in said
     # One pin alone may stand where it will.
     said = words_of(page(sheet_files, "1dof-5mm").get_element_by_id("cut").getparent())
-    assert "a drill press does, marked out to 0.2 mm. The rules count 0.004 mm" in said
+    assert "a drill press is good enough, marked out to 0.2 mm. The rules count 0.004 mm" in said
 
 
 def test_films_pins_and_paper_come_off_in_order(sheet_files: Any) -> None:
@@ -191,7 +192,7 @@ def test_every_piece_on_a_sheet_has_its_place(sheet_files: Any) -> None:
     (table,) = tree.findall(".//table[@class='places']")
     rows = [[words_of(cell) for cell in row] for row in table.findall("./tbody/tr")]
     pitch = 15 * math.pi / 3
-    assert f"from piece to piece {pitch:.3f}" in steps(tree)[-1]
+    assert f"pitch {pitch:.3f}" in steps(tree)[-1]
     expected = [
         (what, piece, (piece - 0.5) * pitch, out)
         for what, out in (
@@ -272,7 +273,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", underlay="underlay.pdf")
     tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
-    told = [re.search(r"It has the edges of ([^.:]*)[.:]", step) for step in steps(tree)]
+    told = [re.search(r"The print shows the edges of ([^.:]*)[.:]", step) for step in steps(tree)]
     assert [found and found[1] for found in told] == [
         None,
         "P01 and P03",
@@ -283,7 +284,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     assert "underlay" not in words_of(page(sheet_files, "1dof-5mm", EARS))
     whole = words_of(tree)
     # Three steps, one copy: three prints. Tape, trim line and toner are said.
-    assert "A fresh print for each of 3 times" in whole
+    assert "A fresh print for each of 3 closings" in whole
     assert "polyimide tape (silicone adhesive, rated 260 °C)" in whole
     assert "cut out along its dotted line" in whole
     assert "Toner on the underlay: laser toner softens in the press" in whole

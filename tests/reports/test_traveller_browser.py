@@ -13,11 +13,10 @@ import pytest
 from PIL import Image
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.code import record_text
 from sbafab.reports.traveller.job import Job
-from sbafab.reports.traveller.page import traveller_html
+from sbafab.reports.traveller.page import record_text, traveller_html
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)

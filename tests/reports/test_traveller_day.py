@@ -11,8 +11,8 @@ import shapely
 
 from sbafab.laminate.assembly import assembly
 from sbafab.reports.drawing import text_width
-from sbafab.reports.traveller.layup import beds
-from sbafab.reports.traveller.plan import plan
+from sbafab.reports.traveller.shapes import beds
+from sbafab.reports.traveller.step_pictures import plan
 from tests.reports.bench_pages import EARS, built, page, words_of
 
 

@@ -11,7 +11,7 @@ import pytest
 from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import DesignError
-from sbafab.results.batch import read_batch
+from sbafab.results.recording import read_batch
 from sbafab.results.records import LabResult
 
 POINTS = """\

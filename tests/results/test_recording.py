@@ -8,14 +8,13 @@ import pytest
 
 import sbafab
 from sbafab.assemblies.build import assemble
-from sbafab.assemblies.loading import load
+from sbafab.assemblies.files import assembly_sha256, assembly_toml, load
 from sbafab.assemblies.records import Assembly
-from sbafab.assemblies.writing import assembly_sha256, assembly_toml
-from sbafab.design.writing import design_toml
+from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
-from sbafab.reports.traveller.code import record_text
-from sbafab.results.builds import promised
-from sbafab.results.finding import found_by
+from sbafab.reports.traveller.page import record_text
+from sbafab.results.recording import found_by
+from sbafab.results.records import promised
 from sbafab.results.store import Lab
 
 SMALL = {"stack": {"balloons": 2}, "rules": {"yield_builds": 100}}

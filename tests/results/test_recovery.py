@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import pytest
 
-from sbafab.results.intervals import most_of
 from sbafab.results.records import Build, Record
-from sbafab.results.report import Report, report
+from sbafab.results.report import Report, most_of, report
 
 Make = Callable[..., Build]
 

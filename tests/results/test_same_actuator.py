@@ -13,15 +13,12 @@ from pathlib import Path
 import pytest
 
 import sbafab
-from sbafab.design.writing import actuator_sha256, design_sha256
+from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.errors import DesignError
-from sbafab.results.builds import promised
-from sbafab.results.finding import found_by
-from sbafab.results.intervals import most_of
-from sbafab.results.rebuilt import rebuilt, yield_with
-from sbafab.results.records import Build, LabResult, Record
-from sbafab.results.report import report
-from sbafab.results.store import Lab
+from sbafab.results.recording import found_by
+from sbafab.results.records import Build, LabResult, Record, promised
+from sbafab.results.report import most_of, report
+from sbafab.results.store import Lab, rebuilt, yield_with
 
 SMALL = {"stack": {"balloons": 2}, "rules": {"yield_builds": 100}}
 Make = Callable[..., Build]

@@ -10,9 +10,9 @@ import pytest
 from sbafab.geometry.edge_table import EdgeTable
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.nearby import EdgeIndex
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.rules.boundary import beside, edges_along, outward_reach
-from sbafab.rules.narrow_places import Rays, first_met
+from sbafab.rules.margins import Rays, first_met
 
 AXIS = (0.0, 0.0)
 UP = Line((1.0, 0.0), (1.0, 4.0))

@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle, strip
+from sbafab.geometry.region import disc, rectangle, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import channel_clear, sealing, tube_fit
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 from tests.rules.compared import only, same
 
 AXIS = (0.0, 0.0)
@@ -29,7 +30,7 @@ Spoil = Callable[..., Laminate]
 def test_channel_clear_of_a_narrow_bore(good: Good, spoil: Spoil) -> None:
     narrow = spoil(good(*ONE), 6, disc(AXIS, 2.5) - disc(AXIS, 0.4))
     assert same(
-        only(channel_clear.check(narrow, LIMITS)),
+        only(channel_clear.check(Measures(narrow, LIMITS))),
         Finding(
             "channel-clear",
             "fail",
@@ -47,7 +48,7 @@ def test_channel_clear_of_the_lumen_in_the_cap(good: Good, spoil: Spoil) -> None
     laminate = good(*LOBED)
     cap = (laminate.layer(11).profile | disc(AXIS, 1.5)) - disc(AXIS, 0.9)
     assert same(
-        only(channel_clear.check(spoil(laminate, 11, cap), LIMITS)),
+        only(channel_clear.check(Measures(spoil(laminate, 11, cap), LIMITS))),
         Finding(
             "channel-clear",
             "fail",
@@ -63,7 +64,7 @@ def test_channel_clear_of_the_lumen_in_the_cap(good: Good, spoil: Spoil) -> None
 
 def test_channel_clear_of_an_open_bore(good: Good) -> None:
     assert same(
-        only(channel_clear.check(good(*ONE), LIMITS)),
+        only(channel_clear.check(Measures(good(*ONE), LIMITS))),
         Finding(
             "channel-clear",
             "pass",
@@ -80,14 +81,14 @@ def test_channel_clear_beside_an_island_in_a_wide_bore(good: Good, spoil: Spoil)
     # The island's edge lies 0.4 from the axis; 0.05 to its other side both it and the other
     # layers' bores of 1.0 leave 0.45.
     island = (disc(AXIS, 2.5) - disc(AXIS, 0.9)) | disc((0.6, 0.0), 0.2)
-    found = only(channel_clear.check(spoil(good(*ONE), 6, island), LIMITS))
+    found = only(channel_clear.check(Measures(spoil(good(*ONE), 6, island), LIMITS)))
     assert found.measured == pytest.approx(0.9, abs=1e-4)
     assert found.where.x == pytest.approx(-0.05, abs=1e-3)
 
 
 def test_channel_clear_without_channels(good: Good) -> None:
     bare = replace(good(*ONE), bores=())
-    assert channel_clear.check(bare, LIMITS) == [
+    assert channel_clear.check(Measures(bare, LIMITS)) == [
         Finding(
             "channel-clear",
             "pass",
@@ -103,7 +104,7 @@ def test_channel_clear_without_channels(good: Good) -> None:
 def test_a_bore_ends_below_the_cap(good: Good, spoil: Spoil) -> None:
     # Neither base nor cap has a hole; the topmost mask must have one.
     closed = spoil(good(*ONE), 10, disc(AXIS, 2.5))
-    found = only(channel_clear.check(closed, LIMITS))
+    found = only(channel_clear.check(Measures(closed, LIMITS)))
     assert (found.measured, found.where) == (0.0, Place(None, (10,), 0.0, 0.0))
 
 
@@ -117,7 +118,7 @@ def test_a_channel_through_a_slit(
     slit = rectangle((4.25 + left, -2.0), (4.25 + right, 2.0)).turned(turn)
     wall = laminate.layer(7).profile
     bore = disc((4.25, 0.0), 0.6).turned(turn)
-    found = only(channel_clear.check(spoil(laminate, 7, (wall | bore) - slit), LIMITS))
+    found = only(channel_clear.check(Measures(spoil(laminate, 7, (wall | bore) - slit), LIMITS)))
     assert found.measured == pytest.approx(right - left, abs=1e-4)
     assert found.where.layers == (7,)
 
@@ -128,18 +129,20 @@ def test_channels_of_other_diameters(diameter: float, good: Good, spoil: Spoil) 
     radius = diameter / 2
     for layer, y in ((5, 0.1), (7, -0.1)):
         laminate = spoil(laminate, layer, disc(AXIS, 3.25) - disc((0.0, y), radius))
-    found = only(channel_clear.check(laminate, LIMITS))
+    found = only(channel_clear.check(Measures(laminate, LIMITS)))
     assert found.measured == pytest.approx(diameter - 0.2, abs=1e-4)
 
 
 def test_a_round_hole_is_measured_exactly(good: Good, spoil: Spoil) -> None:
     narrow = spoil(good(*ONE), 6, disc(AXIS, 2.5) - disc(AXIS, 0.3))
-    assert only(channel_clear.check(narrow, LIMITS)).measured == pytest.approx(0.6, abs=1e-12)
+    assert only(channel_clear.check(Measures(narrow, LIMITS))).measured == pytest.approx(
+        0.6, abs=1e-12
+    )
 
 
 def test_tube_fit_at_the_mouth(good: Good) -> None:
     assert same(
-        only(tube_fit.check(good(*ONE), LIMITS)),
+        only(tube_fit.check(Measures(good(*ONE), LIMITS))),
         Finding(
             "tube-fit",
             "pass",
@@ -155,7 +158,7 @@ def test_tube_fit_at_the_mouth(good: Good) -> None:
 
 def test_tube_fit_of_a_strip_with_a_narrow_place(good: Good, spoil: Spoil) -> None:
     mask = good(*ONE).layer(2).profile - rectangle((5.0, 0.65), (6.0, 1.0))
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
+    found = only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS)))
     assert (found.verdict, found.where.interface) == ("fail", 1)
     assert found.message.startswith("the strip of chamber1 is drawn 1.450 mm wide, x ")
     assert found.message.endswith("; a tube of 0.8 beside its strip needs 1.296: widen inlet.width")
@@ -164,7 +167,7 @@ def test_tube_fit_of_a_strip_with_a_narrow_place(good: Good, spoil: Spoil) -> No
 def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
     mask = (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), 1.4)) - disc(AXIS, 0.5)
     assert same(
-        only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS)),
+        only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS))),
         Finding(
             "tube-fit",
             "fail",
@@ -182,7 +185,7 @@ def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
 def test_tube_fit_of_a_closed_mouth(good: Good, spoil: Spoil) -> None:
     mask = (disc(AXIS, 2.5) | strip(AXIS, (7.0, 0.0), 1.6)) - disc(AXIS, 0.5)
     assert same(
-        only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS)),
+        only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS))),
         Finding(
             "tube-fit",
             "fail",
@@ -199,7 +202,7 @@ def test_tube_fit_of_a_closed_mouth(good: Good, spoil: Spoil) -> None:
 
 def test_tube_fit_of_a_narrow_bond(good: Good, spoil: Spoil) -> None:
     mask = (disc(AXIS, 2.5) | strip((0.0, 0.1), (8.75, 0.1), 1.6)) - disc(AXIS, 0.5)
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
+    found = only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS)))
     assert found.message.startswith("the bond beside the strip of chamber1 is 0.650 mm wide, x ")
     assert found.message.endswith(
         "; to hold the tube it needs 0.750: raise bond.width, which makes the tab wider"
@@ -210,13 +213,13 @@ def test_tube_fit_of_two_faults_tells_the_worse(good: Good, spoil: Spoil) -> Non
     # A strip cut 1.0 wide is 0.296 too narrow;
     # 0.25 off the tab's middle it leaves 0.1 too little bond.
     mask = (disc(AXIS, 2.5) | strip((0.0, 0.25), (8.75, 0.25), 1.3)) - disc(AXIS, 0.5)
-    found = only(tube_fit.check(spoil(good(*ONE), 2, mask), LIMITS))
+    found = only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS)))
     assert found.limit == pytest.approx(TUBE)
     assert found.measured == pytest.approx(1.0)
 
 
 def test_tube_fit_counts_no_kerf_that_is_known(good: Good) -> None:
-    found = only(tube_fit.check(good(*ONE), Limits(kerf={"PTFE": 0.12})))
+    found = only(tube_fit.check(Measures(good(*ONE), Limits(kerf={"PTFE": 0.12}))))
     assert found.measured == pytest.approx(1.4)
     assert "cut 1.400 at worst (0.1 on each edge); " in found.message
 
@@ -225,14 +228,14 @@ def test_tube_fit_of_a_mouth_off_its_place(good: Good, spoil: Spoil) -> None:
     # Its middle 0.6 from the inlet's, still within half the strip's width: 0.15 of bond is left.
     mask = (disc(AXIS, 2.5) | strip((0.0, 0.6), (8.75, 0.6), 1.6)) - disc(AXIS, 0.5)
     shifted = spoil(good(*ONE), 2, mask)
-    found = only(tube_fit.check(shifted, LIMITS))
+    found = only(tube_fit.check(Measures(shifted, LIMITS)))
     assert found.measured == pytest.approx(0.15)
     assert (found.where.interface, found.where.layers) == (1, (1, 2, 3))
-    assert only(sealing.check(shifted, LIMITS)).verdict == "pass"
+    assert only(sealing.check(Measures(shifted, LIMITS))).verdict == "pass"
 
 
 def test_tube_fit_without_inlets(good: Good) -> None:
-    assert tube_fit.check(replace(good(*ONE), inlets=()), LIMITS) == [
+    assert tube_fit.check(Measures(replace(good(*ONE), inlets=()), LIMITS)) == [
         Finding(
             "tube-fit",
             "fail",
@@ -257,7 +260,7 @@ def test_a_strip_that_opens_beside_its_inlet_is_no_mouth(good: Good, spoil: Spoi
     run = strip(at(inlet.length, 0.0), at(-5.0, 0.0), inlet.width)
     aside = strip(at(inlet.length, 0.9), at(-5.0, 0.9), inlet.width)
     mask = (laminate.layer(2).profile - run) | aside
-    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    (found,) = tube_fit.check(Measures(spoil(laminate, 2, mask), LIMITS))
     assert (found.verdict, found.measured) == ("fail", 0.0)
     assert "open a mask strip to the tab's end" in found.message
 
@@ -280,7 +283,7 @@ def test_a_slit_farther_off_than_the_strip_is_wide_is_none_of_its_sides(
     # A strip that bulges, which no shortcut for straight ones takes.
     bulge = disc(at(inlet.length / 2, 0.8), 0.1)
     laminate = spoil(laminate, 2, laminate.layer(2).profile | slit | bulge)
-    (found,) = tube_fit.check(laminate, LIMITS)
+    (found,) = tube_fit.check(Measures(laminate, LIMITS))
     assert (found.verdict, found.measured) == ("pass", pytest.approx(1.6 - 0.3))
 
 
@@ -295,5 +298,5 @@ def test_a_strip_that_is_narrow_inside_the_mouth_is_so_wide_less_the_errors(
     for off in (0.45 + 0.5, -0.45 - 0.5):
         ends = [(x - d * dx - off * dy, y - d * dy + off * dx) for d in (1.2, inlet.length + 5.0)]
         mask = mask - strip(*ends, 1.0)
-    (found,) = tube_fit.check(spoil(laminate, 2, mask), LIMITS)
+    (found,) = tube_fit.check(Measures(spoil(laminate, 2, mask), LIMITS))
     assert (found.verdict, found.measured) == ("fail", pytest.approx(0.6))

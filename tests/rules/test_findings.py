@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bond_width, film_limits, mask_overhang, piece_count
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 from tests.rules.compared import only, same
 
 AXIS = (0.0, 0.0)
@@ -27,7 +27,7 @@ Spoil = Callable[..., Laminate]
 def test_bond_width_of_a_narrow_ring(good: Good, spoil: Spoil) -> None:
     narrow = spoil(good(*ONE), 10, disc((0.1, 0.0), 2.5) - disc(AXIS, 0.5))
     assert same(
-        only(bond_width.check(narrow, LIMITS)),
+        only(bond_width.check(Measures(narrow, LIMITS))),
         Finding(
             "bond-width",
             "fail",
@@ -46,14 +46,14 @@ def test_bond_width_of_interfaces_that_are_alike(good: Good, spoil: Spoil) -> No
     laminate = good("1dof-5mm", "stack.balloons=4")
     for layer in (6, 10):
         laminate = spoil(laminate, layer, disc((0.1, 0.0), 2.5) - disc(AXIS, 0.5))
-    found = only(bond_width.check(laminate, LIMITS))
+    found = only(bond_width.check(Measures(laminate, LIMITS)))
     assert "chamber interface 3 (layers 5 and 7) (and 1 like it), x 2.925" in found.message
 
 
 def test_bond_width_where_nothing_bonds(good: Good, spoil: Spoil) -> None:
     covered = spoil(good(*ONE), 10, disc(AXIS, 4.0) - disc(AXIS, 0.5))
     assert same(
-        only(bond_width.check(covered, LIMITS)),
+        only(bond_width.check(Measures(covered, LIMITS))),
         Finding(
             "bond-width",
             "fail",
@@ -69,14 +69,14 @@ def test_bond_width_where_nothing_bonds(good: Good, spoil: Spoil) -> None:
 
 def test_bond_width_of_a_cusp_asks_for_round_corners(good: Good, spoil: Spoil) -> None:
     touching = spoil(good(*ONE), 6, disc((1.0, 0.0), 2.25) - disc(AXIS, 0.5))
-    assert only(bond_width.check(touching, LIMITS)).message.endswith(
+    assert only(bond_width.check(Measures(touching, LIMITS))).message.endswith(
         "; it needs 0.75: round the sharp corner there"
     )
 
 
 def test_bond_width_without_any_interface(good: Good) -> None:
     single = replace(good(*ONE), layers=good(*ONE).layers[:1])
-    assert only(bond_width.check(single, LIMITS)) == Finding(
+    assert only(bond_width.check(Measures(single, LIMITS))) == Finding(
         "bond-width", "fail", 0.75, None, "mm", NOWHERE, "the laminate has no bond to measure"
     )
 
@@ -85,7 +85,7 @@ def test_mask_overhang_that_is_short(good: Good, spoil: Spoil) -> None:
     # Film 3.25 across, its edge 3.55 away on one side only.
     moved = spoil(good(*ONE), 8, disc((0.0, 0.2), 3.75) - disc(AXIS, 1.25))
     assert same(
-        mask_overhang.check(moved, LIMITS)[0],
+        mask_overhang.check(Measures(moved, LIMITS))[0],
         Finding(
             "mask-overhang",
             "fail",
@@ -102,7 +102,7 @@ def test_mask_overhang_that_is_short(good: Good, spoil: Spoil) -> None:
 
 def test_mask_overhang_beside_the_film(good: Good, spoil: Spoil) -> None:
     beside = spoil(good(*ONE), 6, disc((20.0, 0.0), 2.0))
-    assert mask_overhang.check(beside, LIMITS)[0] == Finding(
+    assert mask_overhang.check(Measures(beside, LIMITS))[0] == Finding(
         "mask-overhang",
         "fail",
         0.5,
@@ -116,7 +116,7 @@ def test_mask_overhang_beside_the_film(good: Good, spoil: Spoil) -> None:
 
 def test_mask_overhang_without_masks(good: Good) -> None:
     films = tuple(layer for layer in good(*ONE).layers if not layer.is_mask)
-    assert mask_overhang.check(replace(good(*ONE), layers=films), LIMITS) == [
+    assert mask_overhang.check(Measures(replace(good(*ONE), layers=films), LIMITS)) == [
         Finding(
             "mask-overhang", "pass", 0.5, None, "mm", NOWHERE, "no free film edge lies on a mask"
         )
@@ -137,19 +137,19 @@ def test_mask_overhang_waived_for_a_pin(
         f"the dowel pin {pin} holds the layers by this opening, so at {where} the mask may end "
         "0.000 mm past its edge"
     )
-    waived = mask_overhang.check(good(*design), LIMITS)[-1]
+    waived = mask_overhang.check(Measures(good(*design), LIMITS))[-1]
     assert same(waived, Finding("mask-overhang", "waived", 0.5, 0.0, "mm", place, message))
 
 
 def test_mask_overhang_counts_the_interfaces_of_each_pattern(good: Good, spoil: Spoil) -> None:
     # A mask that does reach past its bore's edge is not among the waived.
     reaching = spoil(good(*ONE), 6, disc(AXIS, 2.5))
-    _, waived = mask_overhang.check(reaching, LIMITS)
+    _, waived = mask_overhang.check(Measures(reaching, LIMITS))
     assert "at 2 interfaces" in waived.message
 
 
 def test_every_layer_in_its_pieces(good: Good) -> None:
-    assert piece_count.check(good(*ONE), LIMITS) == [
+    assert piece_count.check(Measures(good(*ONE), LIMITS)) == [
         Finding(
             "piece-count",
             "pass",
@@ -199,13 +199,13 @@ def test_a_layer_in_other_pieces(
     good: Good,
     spoil: Spoil,
 ) -> None:
-    found = only(piece_count.check(spoil(good(*ONE), 7, profile, pieces), LIMITS))
+    found = only(piece_count.check(Measures(spoil(good(*ONE), 7, profile, pieces), LIMITS)))
     message = f"layer 7 (007_TPE_wall) falls into {says}"
     assert same(found, Finding("piece-count", "fail", 0.0, off, "pieces", place, message))
 
 
 def test_film_limits_of_a_wide_kerf(good: Good) -> None:
-    found = only(film_limits.check(good(*ONE), Limits(kerf={"PTFE": 1.01})))
+    found = only(film_limits.check(Measures(good(*ONE), Limits(kerf={"PTFE": 1.01}))))
     assert (found.verdict, found.limit, found.measured, found.unit) == ("fail", 1.01, None, "mm")
     assert found.where.layers == (2,)
     assert found.message.startswith("layer 2 (002_PTFE_chamber-mask) ")
@@ -214,7 +214,7 @@ def test_film_limits_of_a_wide_kerf(good: Good) -> None:
 
 def test_film_limits_of_a_coarse_laser(good: Good) -> None:
     assert same(
-        only(film_limits.check(good(*ONE), Limits(least_feature=1.2))),
+        only(film_limits.check(Measures(good(*ONE), Limits(least_feature=1.2)))),
         Finding(
             "film-limits",
             "fail",

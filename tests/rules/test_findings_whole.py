@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules import press_fit, registration_nominal
-from sbafab.rules.deck import Rule, run_rule
+from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
 
 AXIS = (0.0, 0.0)
 LIMITS = Limits()
@@ -29,7 +31,7 @@ def only(findings: list[Finding]) -> Finding:
 
 def test_a_laminate_that_lies_on_the_platen(good: Good) -> None:
     # From the base's bond at -3.25 and the separators at 3.75 to the strip's end at 8.75.
-    assert press_fit.check(good(*ONE), LIMITS) == [
+    assert press_fit.check(Measures(good(*ONE), LIMITS)) == [
         Finding(
             "press-fit",
             "pass",
@@ -55,7 +57,7 @@ def test_a_laminate_that_lies_on_the_platen(good: Good) -> None:
 def test_a_layer_that_is_too_large(
     low: tuple[float, float], high: tuple[float, float], size: str, good: Good, spoil: Spoil
 ) -> None:
-    found = only(press_fit.check(spoil(good(*ONE), 7, rectangle(low, high)), LIMITS))
+    found = only(press_fit.check(Measures(spoil(good(*ONE), 7, rectangle(low, high)), LIMITS)))
     assert (found.verdict, found.limit, found.measured) == ("fail", 152.4, pytest.approx(210.0))
     assert found.where == Place(None, (7,), max(high[0], 8.75), max(high[1], 3.75))
     width, length = size.split(" x ")
@@ -66,7 +68,9 @@ def test_a_layer_that_is_too_large(
 
 
 def test_more_balloons_than_were_ever_built(good: Good) -> None:
-    _, warning = press_fit.check(good("1dof-5mm", "stack.balloons=3"), Limits(validated_balloons=2))
+    _, warning = press_fit.check(
+        Measures(good("1dof-5mm", "stack.balloons=3"), Limits(validated_balloons=2))
+    )
     assert warning == Finding(
         "press-fit",
         "warn",
@@ -81,7 +85,7 @@ def test_more_balloons_than_were_ever_built(good: Good) -> None:
 
 
 def test_holes_on_their_axes(good: Good) -> None:
-    found = only(registration_nominal.check(good(*ONE), LIMITS))
+    found = only(registration_nominal.check(Measures(good(*ONE), LIMITS)))
     assert (found.verdict, found.limit, found.unit) == ("pass", 0.001, "mm")
     assert found.measured == pytest.approx(0.0, abs=1e-9)
     assert found.message == "bores are coaxial and outlines congruent to 0.000001 mm"
@@ -89,7 +93,7 @@ def test_holes_on_their_axes(good: Good) -> None:
 
 def test_a_bore_off_its_axis(good: Good, spoil: Spoil) -> None:
     off = disc(AXIS, 3.25) - disc((0.03, 0.04), 0.5)
-    assert only(registration_nominal.check(spoil(good(*ONE), 7, off), LIMITS)) == Finding(
+    assert only(registration_nominal.check(Measures(spoil(good(*ONE), 7, off), LIMITS))) == Finding(
         "registration-nominal",
         "fail",
         0.001,
@@ -105,13 +109,13 @@ def test_a_smaller_hole_in_a_larger_one_decides(good: Good, spoil: Spoil) -> Non
     # A ring loose in a wide bore: of the two circles about the axis the inner one is the bore,
     # though the outer one lies farther off and comes first along x.
     mask = (disc(AXIS, 2.5) - disc((-0.2, 0.0), 1.5)) | (disc(AXIS, 1.0) - disc((0.02, 0.0), 0.5))
-    found = only(registration_nominal.check(spoil(good(*ONE), 6, mask), LIMITS))
+    found = only(registration_nominal.check(Measures(spoil(good(*ONE), 6, mask), LIMITS)))
     assert found.measured == pytest.approx(0.02)
 
 
 def test_outlines_of_one_balloon_that_differ(good: Good, spoil: Spoil) -> None:
     cap = disc((0.0, 0.3), 3.25)
-    found = only(registration_nominal.check(spoil(good(*ONE), 11, cap), LIMITS))
+    found = only(registration_nominal.check(Measures(spoil(good(*ONE), 11, cap), LIMITS)))
     assert (found.measured, found.where.layers) == (pytest.approx(0.3), (9, 11))
     assert found.message.startswith(
         "the outlines of layers 9 and 11, one balloon, depart from each other by 0.3000 mm, x 0.000"
@@ -121,7 +125,7 @@ def test_outlines_of_one_balloon_that_differ(good: Good, spoil: Spoil) -> None:
 def test_an_outline_with_a_nose_departs_by_its_length(good: Good, spoil: Spoil) -> None:
     # Every end of the plain outline lies on the other; the nose is seen from the other side only.
     cap = disc(AXIS, 3.25) | rectangle((0.0, -0.1), (4.25, 0.1))
-    found = only(registration_nominal.check(spoil(good(*ONE), 11, cap), LIMITS))
+    found = only(registration_nominal.check(Measures(spoil(good(*ONE), 11, cap), LIMITS)))
     # Its corners: sqrt(4.25^2 + 0.1^2) - 3.25.
     assert found.measured == pytest.approx((4.25**2 + 0.1**2) ** 0.5 - 3.25)
 
@@ -139,7 +143,9 @@ def tooled(good: Good, spoil: Spoil, holes: dict[int, tuple[float, float]]) -> L
 
 def test_a_tooling_hole_off_its_pin(good: Good, spoil: Spoil) -> None:
     places = dict.fromkeys((1, 3, 5, 7, 9, 11), (2.0, 2.0)) | {7: (2.03, 2.04)}
-    assert only(registration_nominal.check(tooled(good, spoil, places), LIMITS)) == Finding(
+    assert only(
+        registration_nominal.check(Measures(tooled(good, spoil, places), LIMITS))
+    ) == Finding(
         "registration-nominal",
         "fail",
         0.001,
@@ -153,7 +159,7 @@ def test_a_tooling_hole_off_its_pin(good: Good, spoil: Spoil) -> None:
 
 def test_a_tooling_hole_left_out_is_off_by_the_pins_diameter(good: Good, spoil: Spoil) -> None:
     places = dict.fromkeys((1, 3, 5, 7, 9), (2.0, 2.0))
-    found = only(registration_nominal.check(tooled(good, spoil, places), LIMITS))
+    found = only(registration_nominal.check(Measures(tooled(good, spoil, places), LIMITS)))
     assert (found.measured, found.where.layers) == (0.5, (11,))
 
 
@@ -162,12 +168,12 @@ def test_a_pin_that_half_the_films_lack_is_not_theirs(
     holed: tuple[int, ...], good: Good, spoil: Spoil
 ) -> None:
     laminate = tooled(good, spoil, dict.fromkeys(holed, (2.0, 2.0)))
-    assert only(registration_nominal.check(laminate, LIMITS)).verdict == "pass"
+    assert only(registration_nominal.check(Measures(laminate, LIMITS))).verdict == "pass"
 
 
 def test_a_laminate_without_twins_has_nothing_to_register(good: Good) -> None:
     sheet = replace(good(*ONE), layers=good(*ONE).layers[:1], bores=(), pins=())
-    assert registration_nominal.check(sheet, LIMITS) == [
+    assert registration_nominal.check(Measures(sheet, LIMITS)) == [
         Finding(
             "registration-nominal",
             "pass",
@@ -182,7 +188,7 @@ def test_a_laminate_without_twins_has_nothing_to_register(good: Good) -> None:
 
 def test_a_failure_that_the_user_waives_is_marked_as_the_users() -> None:
     failure = Finding("sealing", "fail", 0.0, 2.0, "voids", Place(3, (5, 6, 7)), "two pockets leak")
-    rule = Rule("sealing", lambda *_: [failure])
+    rule = Rule("sealing", lambda _: [failure], Explanation("", "", ""))
     assert run_rule(rule, None, Limits(waive=frozenset({"sealing"}))) == [  # type: ignore[arg-type]
         replace(
             failure,

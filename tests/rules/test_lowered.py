@@ -6,11 +6,10 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.actuators.one_dof import OneDofDesign
-from sbafab.design.records import Laser, Rules
-from sbafab.output.settings import limits
+from sbafab.design.sections import Laser, Rules
+from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
-from sbafab.rules.limits import Limits
-from sbafab.rules.lowered import lowered
+from sbafab.rules.limits import Limits, lowered
 
 WEAKER = [
     ("rules.bond_width=0.3", "bond_width 0.3 (paper 0.75)"),

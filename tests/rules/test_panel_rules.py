@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import Region, disc, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import bridges, scrap
 from sbafab.rules.deck import run_deck
 from sbafab.rules.freedoms import Part, freedoms
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import simulate
 from tests.faults.panels import narrowed, over_the_tab, torn
 from tests.rules.conftest import built
@@ -75,7 +75,7 @@ def test_a_second_cut_nearer_to_a_pocket_than_its_error_allows_fails_bridges_alo
 def test_a_second_cut_that_leaves_welded_bridges_is_refused() -> None:
     for error, verdict in ((0.45, "pass"), (0.6, "fail")):
         limits = replace(FEW, tolerances=Tolerances(second_cut=error))
-        (found,) = bridges.check(good("panel.stub=0.7"), limits)
+        (found,) = bridges.check(Measures(good("panel.stub=0.7"), limits))
         assert found.verdict == verdict
     assert "weld together" in found.message
 
@@ -83,7 +83,9 @@ def test_a_second_cut_that_leaves_welded_bridges_is_refused() -> None:
 def test_a_bridge_that_is_not_severed_holds_its_part() -> None:
     laminate = good()
     assert laminate.panel is not None
-    (found,) = bridges.check(with_second(laminate, Region(laminate.panel.second.contours[1:])), FEW)
+    (found,) = bridges.check(
+        Measures(with_second(laminate, Region(laminate.panel.second.contours[1:])), FEW)
+    )
     assert found.verdict == "fail"
     assert "still held" in found.message
 
@@ -92,7 +94,7 @@ def test_scrap_between_two_parts_is_locked_in() -> None:
     laminate = good()
     # Without window the wall of the first balloon is all sheet in the copy at the origin.
     shut = with_sheet(laminate, 3, lambda sheet, own: sheet | disc((0.0, 0.0), 9.0))
-    (found,) = scrap.check(shut, FEW)
+    (found,) = scrap.check(Measures(shut, FEW))
     assert found.verdict == "fail"
 
 
@@ -132,12 +134,12 @@ def test_a_tongue_of_scrap_far_smaller_than_a_tab_is_found(reach: float) -> None
     closing = strip(aside(scrap.AHEAD - reach, 0.0), aside(5.0, 0.0), 0.2)
     for tongue, said in ((held, "bonds to the part of layer 3"), (closing, "closes the inlet")):
         (found,) = scrap.check(
-            with_sheet(laminate, 5, lambda sheet, _, tongue=tongue: sheet | tongue), FEW
+            Measures(with_sheet(laminate, 5, lambda sheet, _, tongue=tongue: sheet | tongue), FEW)
         )
         assert found.measured == 1.0
         assert said in found.message
     # A mask sheet that reaches between the tongue and the tab keeps them apart.
     shut = with_sheet(laminate, 5, lambda sheet, _: sheet | held)
     cover = strip(aside(-1.5, tab - 1.0), aside(-1.5, tab + 4.0), 1.0)
-    (found,) = scrap.check(with_sheet(shut, 4, lambda sheet, _: sheet | cover), FEW)
+    (found,) = scrap.check(Measures(with_sheet(shut, 4, lambda sheet, _: sheet | cover), FEW))
     assert found.verdict == "pass"

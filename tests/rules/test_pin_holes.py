@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin
 from sbafab.rules import pin_holes
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -22,7 +22,7 @@ LIMITS = Limits(tolerances=Tolerances(0, 0, 0, 0), yield_builds=100)
 
 
 def found(laminate: Laminate) -> Finding:
-    (finding,) = pin_holes.check(laminate, LIMITS)
+    (finding,) = pin_holes.check(Measures(laminate, LIMITS))
     return finding
 
 
@@ -105,7 +105,7 @@ def test_film_in_the_way_of_a_pin(aside: float, good: Good, spoil: Spoil) -> Non
     over = laminate.layer(3).profile | rectangle((x - 6, y + aside), (x + 6, y + 3))
     finding = found(spoil(laminate, 3, over))
     assert finding.verdict == "fail"
-    blocked = [miss.what for miss in pin_holes._blocked(spoil(laminate, 3, over))]
+    blocked = [miss.fault for miss in pin_holes._blocked(spoil(laminate, 3, over))]
     assert any(
         what.startswith("layer 3 (003_TPE_wall) stands in the way of the pin strip1")
         and what.endswith("which layer 2 is laid on in step 1")

@@ -14,6 +14,7 @@ from sbafab.rules.finding import Finding, Place
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import Push
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import costs
 from sbafab.rules.registration_yield import Share, Yield, finding_of, simulate
 
@@ -31,7 +32,7 @@ def films_only(laminate: Laminate) -> Laminate:
 
 
 def worst_of(laminate: Laminate, limits: Limits) -> tuple[Finding, Finding]:
-    bond, overhang = registration_worst_case.check(laminate, limits)
+    bond, overhang = registration_worst_case.check(Measures(laminate, limits))
     return bond, overhang
 
 

@@ -11,14 +11,14 @@ import shapely
 from shapely import affinity
 
 from sbafab.actuators import load_design
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
 from sbafab.rules.freedoms import Part, freedoms
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import check, least_remaining
 
 Good = Callable[..., Laminate]
@@ -34,7 +34,7 @@ STRIP_END = 2.5 + 0.75 + 5  # pocket, bond and tab
 
 
 def measured(laminate: Laminate, tolerances: Tolerances) -> tuple[float, float]:
-    bond, overhang = check(laminate, Limits(tolerances=tolerances))
+    bond, overhang = check(Measures(laminate, Limits(tolerances=tolerances)))
     assert bond.measured is not None
     assert overhang.measured is not None
     return bond.measured, overhang.measured
@@ -192,12 +192,12 @@ def test_what_is_short_as_drawn_only_warns_here(good: Good, spoil: Spoil) -> Non
 
 @pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
 def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None:
-    bond, overhang = check(good(template), Limits())
+    bond, overhang = check(Measures(good(template), Limits()))
     assert {bond.verdict, overhang.verdict} == {"warn"}
     assert "hand placement of" in bond.message
     assert "in step" in bond.message
     assert 'set registration.method = "ears", which pins it: at worst' in bond.message
-    steady = check(good(template), Limits(tolerances=Tolerances(placement=0, turn=0)))
+    steady = check(Measures(good(template), Limits(tolerances=Tolerances(placement=0, turn=0))))
     assert {finding.verdict for finding in steady} == {"pass"}
 
 
@@ -215,14 +215,14 @@ def test_templates_are_short_by_the_hand_only(template: str, good: Good) -> None
 )
 def test_ears_leave_nothing_to_the_hand(design: tuple[str, ...], good: Good) -> None:
     laminate = good(*design, EARS)
-    held = check(laminate, Limits())
+    held = check(Measures(laminate, Limits()))
     assert {finding.verdict for finding in held} == {"pass"}
-    clumsy = check(laminate, Limits(tolerances=Tolerances(placement=5, turn=3)))
+    clumsy = check(Measures(laminate, Limits(tolerances=Tolerances(placement=5, turn=3))))
     assert [f.measured for f in clumsy] == pytest.approx([f.measured for f in held])
 
 
 def test_without_its_tails_pin_the_strip_turns(good: Good) -> None:
-    bond, overhang = check(without_tails(good("3dof-15mm", EARS)), Limits())
+    bond, overhang = check(Measures(without_tails(good("3dof-15mm", EARS)), Limits()))
     assert (bond.verdict, overhang.verdict) == ("warn", "pass")
     assert "turn about the only pin of layer 2 in step 1" in bond.message
     assert "at 1 interface," in bond.message
@@ -236,7 +236,7 @@ def test_an_oblong_mask_turns_about_its_only_pin(good: Good) -> None:
 
 
 def test_a_place_is_where_the_worst_is(good: Good) -> None:
-    bond, _ = check(without_tails(good(*ONE, EARS)), Limits())
+    bond, _ = check(Measures(without_tails(good(*ONE, EARS)), Limits()))
     assert bond.where.interface == 1
     assert bond.where.layers == (1, 2, 3)
     # Half way between the strip's edge and the tab's, at the tab's end.

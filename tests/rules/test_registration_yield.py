@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, rectangle
+from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import Share, check, simulate
 
 Good = Callable[..., Laminate]
@@ -130,16 +131,16 @@ def test_a_target_decides_by_the_intervals_lower_end(good: Good) -> None:
     whole = simulate(laminate, Limits()).whole
     low, _ = whole.interval
     assert low < whole.value < 1
-    (reached,) = check(laminate, Limits(target_yield=low))
-    (missed,) = check(laminate, Limits(target_yield=whole.value))
+    (reached,) = check(Measures(laminate, Limits(target_yield=low)))
+    (missed,) = check(Measures(laminate, Limits(target_yield=whole.value)))
     assert (reached.verdict, missed.verdict) == ("pass", "fail")
     assert missed.limit == missed.measured == whole.value
     assert missed.where.interface == 1
 
 
 def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None:
-    (many,) = check(with_a_free_strip(good(*ONE, EARS)), Limits())
-    (few,) = check(good(*ONE), Limits(tolerances=Tolerances(placement=0.2, turn=1.0)))
+    (many,) = check(Measures(with_a_free_strip(good(*ONE, EARS)), Limits()))
+    (few,) = check(Measures(good(*ONE), Limits(tolerances=Tolerances(placement=0.2, turn=1.0))))
     assert (many.verdict, few.verdict) == ("pass", "warn")
     assert many.measured is not None
     assert few.measured is not None

@@ -10,7 +10,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.settings import limits
+from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.shapes import disc, strip
+from sbafab.geometry.region import disc, strip
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
 from sbafab.rules.sealing import check
 
 AXIS = (0.0, 0.0)
@@ -25,7 +26,7 @@ Spoil = Callable[..., Laminate]
 
 
 def found_in(laminate: Laminate) -> Finding:
-    (finding,) = check(laminate, Limits())
+    (finding,) = check(Measures(laminate, Limits()))
     return finding
 
 

@@ -11,26 +11,31 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sbafab.geometry.boolean import divided, union
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Contour, Region
-from sbafab.geometry.shapes import disc, polygon, rectangle, strip
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, draws, facing, freedoms, likely_builds, margins, tube_fit, voids
-from sbafab.rules.boundary import outward_reach
-from sbafab.rules.draws import CutContour, DrawnBuilds, numbers, rows_by_error
-from sbafab.rules.facing import facing_films
-from sbafab.rules.forms import linear_forms
+from sbafab.rules import boundary, freedoms, margins, registration_yield, sealing, tube_fit
+from sbafab.rules.boundary import facing_films, outward_reach
 from sbafab.rules.freedoms import Freedom
-from sbafab.rules.likely_builds import ErrorsAsked
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
-from sbafab.rules.margin_rows import MarginRows, RowKind, rows_of
-from sbafab.rules.margins import pushes
+from sbafab.rules.margins import linear_forms, pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.random_builds import RandomBuilds, RowsAsked
 from sbafab.rules.registration_worst_case import least_remaining
-from sbafab.rules.registration_yield import simulate
-from sbafab.rules.voids import _around
+from sbafab.rules.registration_yield import (
+    CutContour,
+    DrawnBuilds,
+    ErrorsQuery,
+    MarginRows,
+    RandomBuilds,
+    RowKind,
+    RowsQuery,
+    numbers,
+    rows_by_error,
+    rows_of,
+    simulate,
+)
+from sbafab.rules.sealing import _around
 
 Good = Callable[..., Laminate]
 BUILDS = 400
@@ -73,7 +78,7 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     batch = DrawnBuilds(5, 0, 2 * count, BUILDS)
     drawn = batch.numbers
     every = [
-        RowsAsked(kind, [count * interface + first[error] for error in errors])
+        RowsQuery(kind, [count * interface + first[error] for error in errors])
         for kind in (0, 1)
         for interface in (0, 1)
     ]
@@ -103,12 +108,12 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
 
 def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
     plain = np.random.default_rng(7).random(60)
-    monkeypatch.setattr(draws, "KEPT", 30)
-    draws._stream.cache_clear()
+    monkeypatch.setattr(registration_yield, "STREAM_LENGTH", 30)
+    registration_yield._stream.cache_clear()
     for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
         found = numbers(7, first, rows, builds)
         assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
-    draws._stream.cache_clear()
+    registration_yield._stream.cache_clear()
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
@@ -196,13 +201,17 @@ def test_builds_found_for_another_laminate_serve_this_one(
     ]
     found = []
     for own in limits:
-        likely_builds._kept.cache_clear()
+        registration_yield._latest.cache_clear()
         found.append(simulate(laminate, own))
     assert len({one.whole.good for one in found}) == 5
-    for most, slack in ((likely_builds.MOST_KEPT, likely_builds.SLACK), (0, 0.02), (300, 0.5)):
-        monkeypatch.setattr(likely_builds, "MOST_KEPT", most)
-        monkeypatch.setattr(likely_builds, "SLACK", slack)
-        likely_builds._kept.cache_clear()
+    for most, slack in (
+        (registration_yield.MOST_CACHED, registration_yield.SLACK),
+        (0, 0.02),
+        (300, 0.5),
+    ):
+        monkeypatch.setattr(registration_yield, "MOST_CACHED", most)
+        monkeypatch.setattr(registration_yield, "SLACK", slack)
+        registration_yield._latest.cache_clear()
         assert [simulate(laminate, own) for own in limits] == found
 
 
@@ -210,7 +219,7 @@ def test_builds_found_for_another_laminate_serve_this_one(
 def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
     batch = DrawnBuilds(3, 40, 8, 200)
     first = np.array([[0, 1], [1, 0], [2, 4], [4, 2], [6, 7]])
-    errors = ErrorsAsked(
+    errors = ErrorsQuery(
         first,
         signs=np.array([[1.0, -1.0], [1.0, 1.0]]),
         shift=np.array([[0.2, 0.1], [0.0, 0.3], [0.0, 0.0]]),
@@ -219,9 +228,9 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
         cutting=0.1,
     )
     drawn = batch.numbers
-    likely = likely_builds._found(batch, errors, np.full(2, need))
-    told = zip(likely.asked.tolist(), likely.build.tolist(), strict=True)
-    found = dict(zip(told, likely.left, strict=True))
+    likely = registration_yield._builds_below(batch, errors, np.full(2, need))
+    told = zip(likely.query.tolist(), likely.build.tolist(), strict=True)
+    found = dict(zip(told, likely.remaining, strict=True))
     places = {one: place for place, one in enumerate(found)}
     for asked in (0, 1):
         for build in range(200):
@@ -250,9 +259,9 @@ def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
     laminate = good(*design)
     frame = rectangle((-50, -50), (50, 50))
     gaps = [(one.unbonded, one.contact, frame) for one in laminate.interfaces]
-    gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
+    gap = sealing._gap.__wrapped__  # type: ignore[attr-defined]
     found = [gap(*one) for one in gaps]
-    monkeypatch.setattr(voids, "_follows", lambda *_: False)
+    monkeypatch.setattr(sealing, "_follows", lambda *_: False)
     assert [gap(*one) for one in gaps] == found
     assert any(len(one.touching) > 3 for one in found)
 
@@ -280,11 +289,11 @@ def test_films_outside_an_outline_face_nothing_within_it(
         asked.append(plain(film, outlines))
         return asked[-1]
 
-    plain = facing._fits_in
-    monkeypatch.setattr(facing, "_fits_in", fits_in)
+    plain = boundary._fits_in
+    monkeypatch.setattr(boundary, "_fits_in", fits_in)
     found = facing_films(laminate)
     assert any(asked) or len(laminate.tpe_layers) < 4
-    monkeypatch.setattr(facing, "_fits_in", lambda *_: False)
+    monkeypatch.setattr(boundary, "_fits_in", lambda *_: False)
     assert facing_films(laminate) == found
 
 

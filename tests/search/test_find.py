@@ -13,28 +13,27 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.cli import app
-from sbafab.design.form import Free
+from sbafab.design.records import Free
 from sbafab.errors import DesignError
-from sbafab.search import space as module
+from sbafab.search import trial as module
 from sbafab.search.find import FindRequest, find, free_keys
-from sbafab.search.free import read_free
 from sbafab.search.quantities import read_quantity
 from sbafab.search.quantity_names import QUANTITIES
-from sbafab.search.requirements import read_all
-from sbafab.search.trial import Trial, Wanted
+from sbafab.search.trial import SearchProblem, Trial, read_all
+from sbafab.search.vary import read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 
 
-def _made_up(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+def _made_up(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Stroke 0.4 d n, mass d^2 n and a force that falls with stroke; small pockets cannot be."""
     d, n = values["chamber.diameter"], values["stack.balloons"]
     if d < 3.4:
         return Trial(values, missed=1e6, refused="too small")
     figures = {"stroke@50kPa": 0.4 * d * n, "mass": d * d * n / 1000, "width": d + 1.5}
     figures["force@5mm@50kPa"] = max(0.0, 0.04 * d * d * (1 - 5 / (0.4 * d * n)))
-    missed = sum(-min(0.0, one.margin(figures[one.quantity.said])) for one in wanted.requirements)
-    cost = wanted.goal.cost(figures[wanted.goal.quantity.said])
+    missed = sum(-min(0.0, one.margin(figures[one.quantity.label])) for one in wanted.requirements)
+    cost = wanted.goal.cost(figures[wanted.goal.quantity.label])
     return Trial(values, figures, {} if with_rules else None, missed, cost)
 
 
@@ -43,12 +42,12 @@ def _made_up(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False
 def test_it_finds_what_trying_every_design_finds(
     stroke: float, force: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(
         [f"stroke@50kPa={stroke}", f"force@5mm@50kPa={force}"], ["width=12"], "mass"
     )
     request = FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE)
-    wanted = Wanted(request.design, requirements, goal)
+    wanted = SearchProblem(request.design, requirements, goal)
     every = [
         _made_up(wanted, {"chamber.diameter": 3 + step / 10, "stack.balloons": n})
         for step, n in itertools.product(range(91), range(2, 21))
@@ -91,7 +90,7 @@ def test_a_range_of_the_family_widens_where_the_best_lies_beyond(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With 20 balloons, 0.4 d n = 200 takes d = 25, beyond 16."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=200"], [], "mass")
     own = tuple(sbafab.load("1dof-5mm").free[:2])
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, own))
@@ -107,7 +106,7 @@ def test_a_range_of_the_family_widens_where_the_best_lies_beyond(
 
 
 def test_no_more_designs_are_tried_than_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=25"], [], "mass")
     told: list[tuple[int, int]] = []
     found = find(
@@ -121,7 +120,7 @@ def test_no_more_designs_are_tried_than_asked_for(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_front_is_shown_from_end_to_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all(["stroke@50kPa=10"], [], "mass")
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
     assert len(found.front) == 8 < found.on_front
@@ -146,12 +145,12 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 1
     assert "Nearest miss: chamber.diameter = 2.6" in ended.output
-    assert "outline_diameter 4.1 mm, not at most 4 mm" in ended.output
+    assert "outline_diameter 4.1 mm; at most 4 mm: MISSED" in ended.output
     assert not target.exists()
     target.write_text("mine")
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 2
-    assert "exists; name another file" in ended.output
+    assert "exists and is not overwritten" in ended.output
     assert target.read_text() == "mine"
 
 
@@ -200,6 +199,9 @@ def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(tmp_path / "new" / "found.toml").name == "found"
     assert CliRunner().invoke(app, asked).exit_code == 2
+    named = [*asked[:-2], "--to", str(tmp_path / "tip.toml")]
+    assert CliRunner().invoke(app, named).exit_code == 0
+    assert sbafab.load(tmp_path / "tip.toml").name == "tip"
     (tmp_path / "file").write_text("mine")
     ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
     assert ended.exit_code == 2
@@ -267,13 +269,13 @@ def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Pat
 def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every design has the same width; more balloons weigh more, and give more stroke."""
 
-    def flat(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def flat(wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
         n = values["stack.balloons"]
         figures = {"width": 5.0, "stroke@10kPa": 1.0 * n}
         missed = max(0.0, 4 - n)
         return Trial(values, figures, {} if with_rules else None, missed, 5.0, 10.0 + n)
 
-    monkeypatch.setattr(module, "tried", flat)
+    monkeypatch.setattr(module, "evaluated", flat)
     requirements, goal = read_all(["stroke@10kPa=4"], [], "width")
     free = (Free("stack.balloons", 2, 9, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
@@ -285,12 +287,12 @@ def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
     ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
-    assert "force@200mm@1kPa none, it does not rise that far, not at least 1 N" in ended.output
+    assert "force@200mm@1kPa none, it does not rise that far; at least 1 N: MISSED" in ended.output
 
 
 def test_what_stops_the_nearest_miss_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Least width of what can be made is 3.4 + 1.5; smaller pockets cannot be."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     requirements, goal = read_all([], ["width=4"], "mass")
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, FREE))
     assert not found.holds
@@ -304,7 +306,7 @@ def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Pockets of 3.3 cannot be made: that stops the least pocket, and not one that is to grow."""
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     design = sbafab.load("1dof-5mm")
     for low, high, bound in ((3.3, 5.0, ["chamber.diameter"]), (3.0, 3.4, [])):
         free = (Free("chamber.diameter", low, high, 0.1), Free("stack.balloons", 5, 5, 1))
@@ -343,12 +345,14 @@ def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None
     """All nine are tried, each better than the one before: only the best is asked for its rules."""
     asked: list[int] = []
 
-    def counted(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def counted(
+        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
+    ) -> Trial:
         if with_rules:
             asked.append(values["stack.balloons"])
         return _made_up(wanted, {"chamber.diameter": 5.0, **values}, with_rules)
 
-    monkeypatch.setattr(module, "tried", counted)
+    monkeypatch.setattr(module, "evaluated", counted)
     requirements, goal = read_all([], [], "stroke@50kPa")
     free = (Free("stack.balloons", 2, 10, 1),)
     found = find(FindRequest(sbafab.load("1dof-5mm"), requirements, goal, free))
@@ -378,7 +382,7 @@ def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
     asked = ["find", "3dof-15mm", "--max", "overall_diameter=10", "--tries", "8"]
     ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
-    assert "overall_diameter counts the inlet tabs" in ended.output
+    assert "overall_diameter includes the inlet tabs" in ended.output
 
 
 def test_keys_are_freed_and_fixed_by_name() -> None:
@@ -389,7 +393,7 @@ def test_keys_are_freed_and_fixed_by_name() -> None:
     for free, fixed, said in (
         (["inlet.tab_length=3:5"], [], "LOW:HIGH:STEP"),
         (["inlet.tab=3:5:1"], [], "inlet.tab_length"),
-        ([], ["order.copies"], "changes only"),
+        ([], ["order.copies"], "by default"),
     ):
         with pytest.raises(DesignError, match=said):
             read_free(design, free, fixed)
@@ -412,17 +416,19 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     )
     seen: list[Mapping[str, Any]] = []
 
-    def stopping(wanted: Wanted, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
+    def stopping(
+        wanted: SearchProblem, values: Mapping[str, Any], with_rules: bool = False
+    ) -> Trial:
         seen.append(values)
         if len(seen) == 8:
             raise KeyboardInterrupt
         return _made_up(wanted, values, with_rules)
 
-    monkeypatch.setattr(module, "tried", stopping)
+    monkeypatch.setattr(module, "evaluated", stopping)
     with pytest.raises(KeyboardInterrupt):
         find(request)
     assert "Traceback" not in capfd.readouterr().err
-    monkeypatch.setattr(module, "tried", _made_up)
+    monkeypatch.setattr(module, "evaluated", _made_up)
     find(request)
     import optuna
 

@@ -12,10 +12,9 @@ from click.testing import CliRunner
 
 import sbafab
 from sbafab.cli import app
-from sbafab.design.form import Free
+from sbafab.design.records import Free
 from sbafab.errors import DesignError
-from sbafab.search.requirements import read_all
-from sbafab.search.trial import Wanted, tried
+from sbafab.search.trial import SearchProblem, evaluated, read_all
 
 CASES = {
     # The paper's 1-DoF actuator (Sec. 4): pockets of 5 in an outline of 6.5, 7 mm at 10 kPa.
@@ -78,9 +77,9 @@ def test_no_real_design_is_better(least: dict[str, float], best: str) -> None:
     found = sbafab.find("1dof-5mm", least=least, best=best, free=free)
     asked = [f"{name}={value}" for name, value in least.items()]
     requirements, goal = read_all(asked, [], best)
-    wanted = Wanted(sbafab.load("1dof-5mm"), requirements, goal)
+    wanted = SearchProblem(sbafab.load("1dof-5mm"), requirements, goal)
     every = (
-        tried(wanted, {"chamber.diameter": round(4 + step / 10, 1), "stack.balloons": n})
+        evaluated(wanted, {"chamber.diameter": round(4 + step / 10, 1), "stack.balloons": n})
         for step, n in itertools.product(range(51), range(2, 13))
     )
     lightest = min(trial.rank for trial in every)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sbafab.search.journal import Journal
+from sbafab.search.sweep import Journal
 
 ROW = {"outcome": "passes", "reason": "", "figures": {"mass [g]": 0.1}}
 

@@ -9,8 +9,8 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.quantities import AskedQuantity, Subject, read_limit, read_quantity
-from sbafab.search.requirements import read_all
+from sbafab.search.quantities import RequestedQuantity, Subject, read_limit, read_quantity
+from sbafab.search.trial import read_all
 
 
 def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
@@ -21,19 +21,19 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("mass", AskedQuantity("mass", "g")),
-        ("overall-diameter", AskedQuantity("overall_diameter", "mm")),
-        ("stroke@0.5bar", AskedQuantity("stroke", "mm", 50.0)),
-        ("Stroke", AskedQuantity("stroke", "mm")),
-        ("bend", AskedQuantity("bend", "deg", 10.0)),
-        ("stroke@50KPA", AskedQuantity("stroke", "mm", 50.0)),
-        ("stroke@0.1MPa", AskedQuantity("stroke", "mm", 100.0)),
-        ("force@12.5mm@50kPa", AskedQuantity("force", "N", 50.0, 12.5)),
-        ("force@50 kPa@0.5 in", AskedQuantity("force", "N", 50.0, 12.7)),
-        ("chamber.diameter", AskedQuantity("chamber.diameter", "")),
+        ("mass", RequestedQuantity("mass", "g")),
+        ("overall-diameter", RequestedQuantity("overall_diameter", "mm")),
+        ("stroke@0.5bar", RequestedQuantity("stroke", "mm", 50.0)),
+        ("Stroke", RequestedQuantity("stroke", "mm")),
+        ("bend", RequestedQuantity("bend", "deg", 10.0)),
+        ("stroke@50KPA", RequestedQuantity("stroke", "mm", 50.0)),
+        ("stroke@0.1MPa", RequestedQuantity("stroke", "mm", 100.0)),
+        ("force@12.5mm@50kPa", RequestedQuantity("force", "N", 50.0, 12.5)),
+        ("force@50 kPa@0.5 in", RequestedQuantity("force", "N", 50.0, 12.7)),
+        ("chamber.diameter", RequestedQuantity("chamber.diameter", "")),
     ],
 )
-def test_a_quantity_is_read(text: str, found: AskedQuantity) -> None:
+def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
     assert read_quantity(text) == found
 
 
@@ -41,13 +41,13 @@ def test_a_quantity_is_read(text: str, found: AskedQuantity) -> None:
     ("text", "said"),
     [
         ("masses", "did you mean mass"),
-        ("weight_of_it", "is no quantity; there are"),
+        ("weight_of_it", "is not a quantity; there are"),
         ("stroke@5mPa", "neither a pressure nor a length"),
         ("force@12.5@50kPa", "12.5kPa or 12.5mm"),
         ("mass@50kPa", "only stroke, bend and force"),
-        ("bend@5mm", "bend is not"),
-        ("force@50kPa", "told at a stroke"),
-        ("stroke@5mm@50kPa", "a stroke is not"),
+        ("bend@5mm", "only a force takes one"),
+        ("force@50kPa", "a force needs a stroke"),
+        ("stroke@5mm@50kPa", "only a force takes one"),
         ("stroke@50 apples", "neither a pressure nor a length"),
         ("stroke@500kPa", "367"),
     ],

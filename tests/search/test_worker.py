@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import OutputError
-from sbafab.search import worker
-from sbafab.search.pool import local_pool, run_jobs
-from sbafab.search.worker import MeasureJob, close_all, guarded, open_all
+from sbafab.search import pool as pool_module
+from sbafab.search.pool import MeasureJob, close_all, guarded, local_pool, open_all, run_jobs
 
 PUPPET = """
 import json, os, signal, sys, time
@@ -34,8 +33,8 @@ for line in sys.stdin:
 @pytest.fixture(autouse=True)
 def puppet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A process that does what its job says, in place of the one that measures."""
-    monkeypatch.setattr(worker, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
-    monkeypatch.setattr(worker, "_own", threading.local())
+    monkeypatch.setattr(pool_module, "COMMAND", (sys.executable, "-S", "-c", PUPPET))
+    monkeypatch.setattr(pool_module, "_thread", threading.local())
     open_all()
     yield
     close_all()
@@ -77,7 +76,7 @@ def test_a_pool_does_every_job_once_and_leaves_no_process(tmp_path: Path) -> Non
         )
     assert sorted(key for key, _ in found) == sorted(jobs)
     assert [outcome for key, outcome in found if key == "7"] == ["crashed"]
-    assert not worker._started.children
+    assert not pool_module._started.children
 
 
 def test_stopped_half_way_it_leaves_no_process() -> None:
@@ -90,7 +89,7 @@ def test_stopped_half_way_it_leaves_no_process() -> None:
     ]
     with pytest.raises(KeyboardInterrupt), local_pool(2) as pool:
         run_jobs(pool, jobs, 60, stop, lambda: None)
-    assert not worker._started.children
+    assert not pool_module._started.children
 
 
 def test_another_program_is_told_apart() -> None:

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-from sbafab.simulators.calculix.deck import started, write_deck
-from sbafab.simulators.calculix.job import deck_mesh
-from sbafab.simulators.calculix.settings import DeckSettings, deck_settings
+from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
+from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.simulators.calculix.deck import DeckSettings, deck_settings, started, write_deck
+from sbafab.simulators.calculix.run import deck_mesh
 
 pytest.importorskip("netgen")
 

@@ -15,11 +15,10 @@ from click.testing import CliRunner
 from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.settings import MeshSettings
+from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
-from sbafab.simulators.calculix.job import History, simulate
-from sbafab.simulators.calculix.run import run_ccx
-from sbafab.simulators.calculix.settings import DeckSettings
+from sbafab.simulators.calculix.deck import DeckSettings
+from sbafab.simulators.calculix.run import History, run_ccx, simulate
 from tests.site.formats import hold
 
 pytest.importorskip("netgen")

@@ -13,10 +13,18 @@ import trimesh
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.coarse.meridian import Meridian, fullest, holding, partly, standing
-from sbafab.simulators.coarse.mesh import CoarseMesh, area, coarse_mesh
 from sbafab.simulators.coarse.rounds import round_stack, why_not_round
-from sbafab.simulators.coarse.web import Triangle
+from sbafab.simulators.coarse.shell import (
+    CoarseMesh,
+    Meridian,
+    Triangle,
+    area,
+    coarse_mesh,
+    fullest,
+    holding,
+    partly,
+    standing,
+)
 
 LOBED = "3dof-15mm"
 DESIGNS = [

@@ -13,9 +13,8 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.coarse.actuator import actuator
-from sbafab.simulators.mujoco.files import why_no_model, write_model
-from sbafab.simulators.mujoco.model import model_text
+from sbafab.simulators.coarse.shell import actuator
+from sbafab.simulators.mujoco.model import model_text, why_no_model, write_model
 
 BALLOON = ("1dof-5mm", "stack.balloons=1")
 LOBED = ("3dof-15mm", "stack.balloons=2")

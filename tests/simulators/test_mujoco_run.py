@@ -14,10 +14,9 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError, OutputError
-from sbafab.simulators.mujoco.files import write_model
-from sbafab.simulators.mujoco.run import MujocoRun, run_model, simulate
-from sbafab.simulators.mujoco.simulator import USES, export, run, why_not
-from sbafab.simulators.simulator import Wish
+from sbafab.simulators.mujoco.model import write_model
+from sbafab.simulators.mujoco.run import USES, MujocoRun, export, run, run_model, simulate, why_not
+from sbafab.simulators.simulator import SimulationRequest
 
 BALLOON = ("1dof-5mm", "stack.balloons=1")
 CALCULIX = {0.95: 0.866, 6.0: 1.557}
@@ -96,9 +95,9 @@ def test_as_one_of_the_simulators(tmp_path: Path) -> None:
     laminate = sbafab.build(*BALLOON)
     assert why_not(laminate) is None
     assert USES == ("seconds",)
-    export(laminate, Wish(3.0), tmp_path)
+    export(laminate, SimulationRequest(3.0), tmp_path)
     assert json.loads((tmp_path / "actuator.json").read_text())["pressures"] == {"chamber1": 3}
-    found = run(laminate, Wish(6.0, seconds=3.0), tmp_path, lambda *_: None)
+    found = run(laminate, SimulationRequest(6.0, seconds=3.0), tmp_path, lambda *_: None)
     rows = {name: value for name, value, _ in found.rows}
     assert rows["stroke"] == pytest.approx(inflated((6.0,), BALLOON, 16, 3).stroke, abs=1e-9)
     assert rows["air chamber1"] == pytest.approx(found.figures["volumes"]["chamber1"])

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from sbafab.cli import app
 from sbafab.cli.simulate import SIMULATORS
 from sbafab.errors import DesignError
-from sbafab.simulators.simulator import NAMES, Wish, chamber_pressures, simulator
+from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures, simulator
 from tests.site.formats import hold
 
 CHAMBERS = ("chamber1", "chamber2")
@@ -25,7 +25,7 @@ def test_the_command_knows_the_simulators() -> None:
 
 
 def test_every_simulator_names_fields_of_a_wish() -> None:
-    fields = set(Wish.__dataclass_fields__)
+    fields = set(SimulationRequest.__dataclass_fields__)
     for name in NAMES:
         assert set(simulator(name).USES) <= fields
 
@@ -33,26 +33,29 @@ def test_every_simulator_names_fields_of_a_wish() -> None:
 @pytest.mark.parametrize(
     ("wish", "pressures"),
     [
-        (Wish(), (6.0, 6.0)),
-        (Wish(2.0), (2.0, 2.0)),
-        (Wish(chambers={"chamber2": 3.0}), (0.0, 3.0)),
-        (Wish(1.0, {"chamber2": 3.0}), (1.0, 3.0)),
+        (SimulationRequest(), (6.0, 6.0)),
+        (SimulationRequest(2.0), (2.0, 2.0)),
+        (SimulationRequest(chambers={"chamber2": 3.0}), (0.0, 3.0)),
+        (SimulationRequest(1.0, {"chamber2": 3.0}), (1.0, 3.0)),
     ],
 )
-def test_chamber_pressures(wish: Wish, pressures: tuple[float, float]) -> None:
+def test_chamber_pressures(wish: SimulationRequest, pressures: tuple[float, float]) -> None:
     assert chamber_pressures(CHAMBERS, wish, 6.0) == dict(zip(CHAMBERS, pressures, strict=True))
 
 
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Wish(chambers={"left": 1.0}), "names chamber left, which is not there; the chambers are"),
-        (Wish(-1.0), "pressure of chamber1 = -1 kPa must be from 0 to 1000 kPa"),
-        (Wish(chambers={"chamber2": 2000.0}), "pressure of chamber2 = 2000 kPa"),
-        (Wish(0.0), "0 kPa in every chamber"),
+        (
+            SimulationRequest(chambers={"left": 1.0}),
+            "names chamber left, which is not there; the chambers are",
+        ),
+        (SimulationRequest(-1.0), "pressure of chamber1 = -1 kPa must be from 0 to 1000 kPa"),
+        (SimulationRequest(chambers={"chamber2": 2000.0}), "pressure of chamber2 = 2000 kPa"),
+        (SimulationRequest(0.0), "0 kPa in every chamber"),
     ],
 )
-def test_pressures_that_cannot_be(wish: Wish, words: str) -> None:
+def test_pressures_that_cannot_be(wish: SimulationRequest, words: str) -> None:
     with pytest.raises(DesignError, match=words):
         chamber_pressures(CHAMBERS, wish, 6.0)
 

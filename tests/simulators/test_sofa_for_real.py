@@ -11,9 +11,8 @@ import pytest
 import sbafab
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.sofa import frames
-from sbafab.simulators.sofa.run import SofaJob, SofaRun, simulate
-from sbafab.simulators.sofa.tip import read_points
+from sbafab.simulators.sofa import scenes
+from sbafab.simulators.sofa.run import SofaJob, SofaRun, read_points, simulate
 
 pytestmark = pytest.mark.skipif(shutil.which("runSofa") is None, reason="runSofa is not installed")
 
@@ -139,7 +138,7 @@ def test_dead_frames_are_told_by_where_the_tip_lies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A weight of 0 before the other ends a node's weights; runSofa's log is clean."""
-    monkeypatch.setattr(frames, "pair_of_frames", lambda z, height, count: ((0, 1), (0.0, 1.0)))
+    monkeypatch.setattr(scenes, "pair_of_frames", lambda z, height, count: ((0, 1), (0.0, 1.0)))
     design = ("3dof-15mm", "stack.balloons=2")
     with pytest.raises(OutputError, match="its result cannot be: the tip lies at 0, 0, 0"):
         ran(tmp_path, design, evenly(5.0), SofaJob("beam", 0.5))

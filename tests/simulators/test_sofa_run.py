@@ -14,10 +14,17 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.coarse.tip import Tip
-from sbafab.simulators.sofa.judge import impossible, limits
-from sbafab.simulators.sofa.run import SofaJob, SofaRun, run_scene, simulate
-from sbafab.simulators.sofa.tip import read_log, read_tips
+from sbafab.simulators.simulator import Tip
+from sbafab.simulators.sofa.run import (
+    SofaJob,
+    SofaRun,
+    impossible,
+    limits,
+    read_log,
+    read_tips,
+    run_scene,
+    simulate,
+)
 
 HALF_TURN = "T= 0.3\n  X= 0 0 5 0 1 5 0 0 6\n"
 """Three points whose plane has the normal (1, 0, 0)."""

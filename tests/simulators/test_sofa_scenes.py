@@ -17,13 +17,17 @@ import trimesh
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.simulators.coarse.actuator import actuator
-from sbafab.simulators.sofa.conforming import conforming_shell
-from sbafab.simulators.sofa.files import write_scenes
-from sbafab.simulators.sofa.frames import beam_of, pair_of_frames, prism
-from sbafab.simulators.sofa.markup import document, root_node
-from sbafab.simulators.sofa.parts import scaled_mass
-from sbafab.simulators.sofa.shell import round_actuator, round_shell
+from sbafab.simulators.coarse.shell import actuator
+from sbafab.simulators.sofa.scenes import (
+    beam_of,
+    document,
+    pair_of_frames,
+    prism,
+    root_node,
+    scaled_mass,
+    write_scenes,
+)
+from sbafab.simulators.sofa.shell import conforming_shell, round_actuator, round_shell
 
 FACTS = json.loads(Path(__file__).with_name("sofa_components.json").read_text(encoding="utf-8"))
 SCENES = ("actuator.scn", "actuator_frames.scn", "actuator_volume.scn", "actuator_beam.scn")

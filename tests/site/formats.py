@@ -7,7 +7,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sbafab.output.schemas import schema_of
+from sbafab.cli.formats import schema_of
 
 
 def hold(name: str, document: Any) -> None:

@@ -9,10 +9,10 @@ import jsonschema
 import pytest
 
 import sbafab
-from sbafab.cli import main
+from sbafab.cli import formats, main
+from sbafab.cli.formats import schema_of
 from sbafab.cli.schema import FORMATS
-from sbafab.output.predicting import prediction_json
-from sbafab.output.schemas import SCHEMAS, schema_of
+from sbafab.output.artefacts import prediction_json
 from tests.site.formats import hold
 
 ONE = "stack.balloons=1"
@@ -24,16 +24,16 @@ def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", SCHEMAS)
+@pytest.mark.parametrize("name", formats.FORMATS)
 def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     schema = json.loads(run(["schema", name], capsys))
     assert schema == schema_of(name)
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["$id"] == f"urn:{SCHEMAS[name][0].replace('/', ':')}"
+    assert schema["$id"] == f"urn:{formats.FORMATS[name].identity.replace('/', ':')}"
 
 
 def test_the_command_offers_every_schema() -> None:
-    assert tuple(SCHEMAS) == FORMATS
+    assert tuple(formats.FORMATS) == FORMATS
 
 
 def test_files_of_a_folder_are_of_their_schemas(tmp_path: Path) -> None:
@@ -90,10 +90,14 @@ def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
 
 
 def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
-    from sbafab.output.printed import ASSEMBLY_PREDICT_SCHEMA
-    from sbafab.reports.assembly_prediction import AssemblyFigure, AssemblyPrediction, Touch
+    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
+    from sbafab.reports.assembly_prediction import (
+        AssemblyFigure,
+        AssemblyPrediction,
+        BentTouch,
+        Touch,
+    )
     from sbafab.reports.assembly_prediction import as_json as told
-    from sbafab.reports.bent_arms import BentTouch
 
     figure = AssemblyFigure("arm", "height, flat", 1.14, "mm", "elastic stack")
     touch, bent = Touch("arm", "cup", 0.1), BentTouch("arm", "cup", "chamber1", 0.1, 5.0, 80.0)
@@ -104,8 +108,8 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
 
 def test_the_reproduction_is_of_its_schema() -> None:
     from sbafab.models.paper import Measured
-    from sbafab.reproduction.records import Row
-    from sbafab.reproduction.write import as_json as told
+    from sbafab.reproduction.page import as_json as told
+    from sbafab.reproduction.rows import Row
 
     rows = [Row("x", Measured(1.0, 0.1, "mm", "Sec. 2"), value, "m", "w") for value in (1.1, None)]
     hold("reproduction", told({"one": rows}))

@@ -1,4 +1,4 @@
-"""Rates in the README and on the pages are those of the record, and the record's are medians."""
+"""Processor times in the README are those of the record, and no page states a rate by hand."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from benchmarks.sections import rate
 from benchmarks.timing import Row, Section
 from benchmarks.versions import Compared
 from docs.scripts.benchmark_runs import growth, other_program, told, versions_table
-from docs.scripts.measured import BLOCK, Table, record
-from docs.scripts.rates import poses, speed, statistic
+from docs.scripts.measured import BLOCK, record
+from docs.scripts.rates import speed, statistic
+from docs.scripts.tables import Table
 
 ROOT = Path(__file__).parents[2]
 README = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
@@ -36,38 +37,19 @@ def stated(pattern: str) -> list[float]:
 
 
 def test_the_readme_s_seconds_are_the_record_s() -> None:
-    (generate,) = stated(r"meshes and decks for simulators, takes ([\d.]+) s")
+    (generate,) = stated(r"`sbafab generate 3dof-15mm` takes ([\d.]+) s")
     now = float(TABLES["versions"].cell("generate 3dof-15mm", "now"))
     assert generate == pytest.approx(now, rel=0.05)
     (usage,) = stated(r"`sbafab --help` ([\d.]+) s")
     assert usage == pytest.approx(recorded("commands", "sbafab --help"), rel=0.05)
-    # The other programs' seconds of the same run stand beside ours.
-    plates = stated(
-        r"one DXF, take ([\d.]+) s, and in the same run ([\d.]+) s in foldable_robotics "
-        r"and ([\d.]+) s in build123d"
-    )
-    assert plates == [
-        pytest.approx(recorded("plates", name), rel=0.05)
-        for name in ("sbafab", "foldable", "build123d")
-    ]
-
-
-def test_the_readme_s_poses_a_second_are_the_record_s() -> None:
-    free, least = stated(r"at random, by .*?: ([\d,]+) a second without a load, ([\d,]+) in the")
-    drawn = {
-        row[0]: 1000 / float(row[1]) for row in TABLES["poses"].rows if row[0].endswith("at random")
-    }
-    assert free == pytest.approx(drawn["no load, at random"], rel=0.01)
-    assert least == pytest.approx(min(drawn.values()), rel=0.01)
 
 
 def test_a_statistic_is_called_by_its_name() -> None:
-    for name in ("plates", "decks", "compiled", "processes", "poses", "commands", "versions"):
+    for name in ("plates", "decks", "processes", "poses", "commands", "versions"):
         assert statistic(TABLES[name]) in {"median", "least"}, name
-    for name in ("versions", "poses"):
-        assert re.search(
-            rf"{statistic(TABLES[name])} (?:processor )?time of several rounds", README
-        )
+    assert re.search(
+        rf"{statistic(TABLES['versions'])} (?:processor )?time of several rounds", README
+    )
     record_of_medians = record("benchmarks")._replace(
         tables={
             name: Table([column.replace("least", "median") for column in table.columns], table.rows)
@@ -75,11 +57,11 @@ def test_a_statistic_is_called_by_its_name() -> None:
         }
     )
     assert "median" in speed(record_of_medians)
-    assert "median" in poses(record_of_medians)
 
 
 def test_no_rate_stands_in_a_text_by_hand() -> None:
-    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))):
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if "_made" not in page.parts]
+    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(pages)):
         by_hand = BLOCK.sub("", path.read_text(encoding="utf-8"))
         assert RATE.findall(" ".join(by_hand.split())) == [], path
 

@@ -11,10 +11,9 @@ import pytest
 import sbafab
 from docs.scripts import reference_cli, reference_keys
 from docs.scripts.offline import complaints
-from docs.scripts.rule_pictures import CHOSEN, OTHERS, pair
+from docs.scripts.rule_pictures import OTHERS, pair
 from sbafab.cli import COMMANDS
-from sbafab.rules.deck import rule_names
-from tests.rules.test_deck import FAULTS
+from tests.rules.test_deck import TESTED_APART
 
 ROOT = Path(__file__).parents[2]
 LINK = re.compile(r"\]\((?!https?://|#|mailto:)([^)#\s]+)")
@@ -31,7 +30,7 @@ def test_the_page_of_commands_has_every_command_and_option() -> None:
 
 def test_the_page_of_keys_has_every_key_of_every_family() -> None:
     from sbafab.actuators import records
-    from sbafab.design.messages import key_paths
+    from sbafab.design.files import key_paths
 
     page = reference_keys.page()
     for record in records().values():
@@ -41,8 +40,7 @@ def test_the_page_of_keys_has_every_key_of_every_family() -> None:
 
 
 def test_every_rule_has_its_picture() -> None:
-    assert CHOSEN.keys() | OTHERS.keys() == set(rule_names())
-    assert all(FAULTS[name].rule == rule for rule, name in CHOSEN.items())
+    assert OTHERS.keys() == TESTED_APART
     for rule in ("film-limits", "bridges"):
         drawn = pair(rule)
         assert drawn.right != drawn.wrong
@@ -90,6 +88,16 @@ def test_the_examples_for_assistants_pass(tmp_path: Path) -> None:
         path = tmp_path / f"{number}.toml"
         path.write_text(example)
         assert sbafab.check(path).failed == ()
+
+
+def test_readme_is_short_and_begins_with_its_two_commands() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    (block, *_) = re.findall(r"^```\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    assert block.splitlines() == [
+        "python -m pip install . && sbafab generate 3dof-15mm",
+        'python -m pip install -e ".[dev]" && python -m tests',
+    ]
 
 
 def test_readme_is_published_with_absolute_links() -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,9 @@ PATIENCE = 120.0
 
 
 def chromium() -> str | None:
-    """The browser's program, None where none is found."""
+    """The browser's program; None where it or what drives it is not installed."""
+    if find_spec("playwright") is None:
+        return None
     return next((path for path in CHROMIUM if Path(path).exists()), None)
 
 

@@ -26,7 +26,7 @@ from tests.studio.browsing import (
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 
 
@@ -193,7 +193,7 @@ def test_the_solid_comes_apart_is_cut_and_picked(seen: Watched) -> None:
 
 def test_the_section_is_the_laminate_s(seen: Watched) -> None:
     """Spans that the page works out, against those of the exact geometry."""
-    from sbafab.geometry.section import section
+    from sbafab.geometry.region import section
 
     laminate = api.build(api.loads(DESIGN))
     for origin, direction in (

@@ -16,7 +16,7 @@ from tests.studio.browsing import Watched, chromium, colours, picture, served, s
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 BRACE = api.template("brace")
 
@@ -201,8 +201,8 @@ def test_an_assembly_moves_and_says_how_it_grips(brace: Watched) -> None:
     assert f"{pose.bend:.1f}°" in readings[1]
     assert share_changed(before, picture(brace, "#view-swing .surface")) > 0.02
     trust = page.locator("#view-swing .trust").inner_text()
-    assert "no calibration" in trust
-    assert "Contact between parts is not felt here" in trust
+    assert "not calibrated" in trust
+    assert "Contact between parts is ignored here" in trust
     # Emptied, the grip is as wide as its films.
     page.get_by_role("button", name="Vent").locator("visible=true").click()
     brace.until("document.querySelector('#view-swing').textContent.includes('15.33 mm')")
@@ -228,7 +228,7 @@ def test_an_assembly_is_predicted_and_compared(brace: Watched) -> None:
     assert brace.say("studio.prediction.figures.length === 0 || !studio.prediction.before")
     panel = page.locator("#panel-findings")
     if brace.say("studio.prediction.quick"):
-        assert panel.get_by_role("group", name="Figures of the state before").count() == 1
+        assert panel.get_by_role("group", name="Figures of the previous state").count() == 1
     assert share_changed(same, picture(brace, "#view-beside .twin")) > 0.01
     label = page.locator("#view-beside canvas").last.get_attribute("aria-label") or ""
     assert label.endswith("these differ: grip, arm, cup, vacuum")

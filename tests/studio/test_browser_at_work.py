@@ -16,7 +16,7 @@ import pytest
 from PIL import Image
 
 from sbafab import api
-from sbafab.studio.links import packed
+from sbafab.studio.app import packed
 from tests.studio.browsing import (
     DESIGN,
     FILE,
@@ -31,7 +31,7 @@ from tests.studio.browsing import (
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 
 CONE = api.template("1dof-5mm").replace('name = "1dof-5mm"', 'name = "cone"')

@@ -26,7 +26,7 @@ PYODIDE = os.environ.get("SBAFAB_PYODIDE", "")
 pytestmark = [
     pytest.mark.long,
     pytest.mark.skipif(not PYODIDE, reason="SBAFAB_PYODIDE names no folder"),
-    pytest.mark.skipif(chromium() is None, reason="no Chromium"),
+    pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed"),
 ]
 PATIENCE = 240.0
 """Seconds: Python in the page is slower than beside it, and starts in two workers."""

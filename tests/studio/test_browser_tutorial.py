@@ -28,7 +28,7 @@ def click(seen: Watched, name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(chromium() is None, reason="Chromium is not installed")
+@pytest.mark.skipif(chromium() is None, reason="Chromium or Playwright is not installed")
 def test_the_tutorial_works_as_written(tmp_path: Path) -> None:
     (tmp_path / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
     steps = STEP.findall(PAGE.read_text(encoding="utf-8"))

@@ -10,7 +10,7 @@ import pytest
 
 from sbafab import api
 from sbafab.studio.app import Studio, app
-from sbafab.studio.made import Made, zipped
+from sbafab.studio.places import RunFolder, zipped
 from tests.studio.asking import Client
 
 TOKEN = "right-token"
@@ -143,7 +143,7 @@ def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: St
     folder.mkdir(parents=True)
     (folder / "a.txt").write_text("a", encoding="utf-8")
     (studio.scratch / "run" / "b.txt").write_text("b", encoding="utf-8")
-    studio.made["key"] = Made(folder, "own")
+    studio.made["key"] = RunFolder(folder, "own")
     assert client.get("/made/key/a.txt").text == "a"
     assert "sandbox" in client.get("/made/key/a.txt").headers["content-security-policy"]
     assert client.get("/made/other/a.txt").status_code == 404

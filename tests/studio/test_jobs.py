@@ -11,11 +11,10 @@ import pytest
 
 from sbafab import api
 from sbafab.errors import DesignError
-from sbafab.studio import answering
-from sbafab.studio.answering import SupersededError, refusal
+from sbafab.studio import jobs
+from sbafab.studio.app import design_in, packed
 from sbafab.studio.editing import edited
-from sbafab.studio.jobs import JOBS
-from sbafab.studio.links import design_in, packed
+from sbafab.studio.jobs import JOBS, SupersededError, refusal
 from tests.studio.worked import EnoughError, answers, given_up_at, job
 
 SMALL = api.template("1dof-5mm").replace("balloons = 6", "balloons = 2") + (
@@ -144,7 +143,7 @@ def test_a_change_that_comes_during_the_yield_ends_it(tmp_path: Path) -> None:
         if beats > 4:
             raise SupersededError
 
-    for answer in answering.answers(job(tmp_path, text), beat):
+    for answer in jobs.answers(job(tmp_path, text), beat):
         seen.append(answer.get("rule", answer["kind"]))
     assert seen[-2:] == ["registration-worst-case", "superseded"]
 

@@ -15,10 +15,9 @@ from sbafab import api
 from sbafab.assemblies.records import KINDS, Assembly
 from sbafab.assemblies.shapes import placed_surface
 from sbafab.errors import DesignError
-from sbafab.studio.answering import refusal
 from sbafab.studio.editing import edited
 from sbafab.studio.forms import assembly
-from sbafab.studio.jobs import JOBS
+from sbafab.studio.jobs import JOBS, refusal
 from tests.studio.worked import job
 
 APERTURE = api.template("aperture")

@@ -79,7 +79,7 @@ def test_the_page_answers_as_a_worker_does(memory: Path) -> None:
 def test_what_is_cut_in_the_page_is_what_the_command_cuts(memory: Path) -> None:
     text = SMALL.replace("[rules]", '[registration]\nmethod = "ears"\n[rules]')
     (made,) = (a for a in asked("/api/generate", text=text) if a["kind"] == "made")
-    content = in_page.made(f"/made/{made['key']}.zip")
+    content = in_page.made_bytes(f"/made/{made['key']}.zip")
     assert content is not None
     archive = zipfile.ZipFile(io.BytesIO(content))
     run = api.cut(api.loads(text), out=memory / "theirs")
@@ -89,9 +89,9 @@ def test_what_is_cut_in_the_page_is_what_the_command_cuts(memory: Path) -> None:
         for path in paths
     }
     first = next(name for name in made["files"] if name.startswith("layers/"))
-    assert in_page.made(f"/made/{made['key']}/{first}") == (run.folder / first).read_bytes()
+    assert in_page.made_bytes(f"/made/{made['key']}/{first}") == (run.folder / first).read_bytes()
     for wrong in ("/made/none.zip", f"/made/{made['key']}/../../x", f"/made/{made['key']}/none"):
-        assert in_page.made(wrong) is None
+        assert in_page.made_bytes(wrong) is None
 
 
 def test_a_design_that_breaks_a_rule_is_not_cut_in_the_page(memory: Path) -> None:
@@ -263,7 +263,7 @@ def test_the_command_says_what_was_written_and_what_it_goes_without(
     done = CliRunner().invoke(studio, ["--static", site, "--pyodide", str(pyodide)])
     assert done.exit_code == 0
     assert f"python -m http.server --bind 127.0.0.1 --directory {site}" in done.output
-    assert "Without numpy it has no prediction" in done.output
+    assert "Without numpy the page has no prediction" in done.output
     for wrong in (["3dof-15mm", "--static", site], ["--pyodide", str(pyodide)]):
         assert CliRunner().invoke(studio, wrong).exit_code == 2
 

@@ -9,8 +9,8 @@ import pytest
 
 from sbafab.assemblies.build import assemble
 from sbafab.assemblies.checks import run_checks
-from sbafab.assemblies.reading import load_assembly
-from sbafab.models.sizes import sizes
+from sbafab.assemblies.files import load_assembly
+from sbafab.models.formulas import sizes
 
 
 def measured(template: str, rule: str) -> tuple[float | None, float | None, str]:

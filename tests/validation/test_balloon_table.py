@@ -1,4 +1,4 @@
-"""The elastic balloon beside CalculiX: the table of docs/prediction.md, and what it claims."""
+"""The elastic balloon beside CalculiX: docs/measured/balloons.csv, and what it claims."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from docs.scripts.balloon_runs import CASES, PAGE, Case, elastic, known
+from docs.scripts.balloon_runs import CASES, Case, elastic, known
 from docs.scripts.ripple_sector import Sector, sector_states
 from sbafab.models.balloon import Balloon, inflate
 
@@ -22,8 +22,7 @@ MISSED = {
 
 
 def cells(name: str) -> list[list[float]]:
-    row = known(PAGE.read_text(encoding="utf-8"))[name]
-    return [[float(value) for value in cell.split(",")] for cell in row.split("|")[2:-1]]
+    return [[float(value) for value in cell.split(",")] for cell in known()[name][1:]]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

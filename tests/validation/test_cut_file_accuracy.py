@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pyogrio
 import pytest
 import shapely
 
 from sbafab.actuators import load_design
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.output.run import generate
+from sbafab.runs.run import RunRequest, generate
+
+pyogrio = pytest.importorskip("pyogrio", reason="pyogrio is not installed")
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_areas_within_a_hundredth_of_a_percent(name: str, tmp_path: Path) -> None:
-    run = generate(load_design(name), tmp_path, ["cut"])
+    run = generate(RunRequest(load_design(name), tmp_path, ["cut"]))
     pyogrio.set_gdal_config_options({"OGR_ARC_STEPSIZE": "0.25"})
     for layers in run.laminate.patterns.values():
         table = pyogrio.raw.read(run.folder / "layers" / f"{layers[0].name}.dxf")
@@ -35,7 +36,7 @@ def test_areas_within_a_hundredth_of_a_percent(name: str, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", TEMPLATES)
 def test_written_contours_within_a_micrometre_of_the_exact_edges(name: str, tmp_path: Path) -> None:
-    run = generate(load_design(name), tmp_path, ["cut"])
+    run = generate(RunRequest(load_design(name), tmp_path, ["cut"]))
     for layers in run.laminate.patterns.values():
         exact = layers[0].profile
         written = read_profile(run.folder / "layers" / f"{layers[0].name}.dxf").region

@@ -10,7 +10,7 @@ from sbafab.actuators import build, load_design
 from sbafab.actuators.radial import RadialDesign
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.sizes import sizes
+from sbafab.models.formulas import sizes
 
 
 def laminate(name: str, *assignments: str) -> Laminate:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.settings import press_settings
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import Schedule, schedule
 
 

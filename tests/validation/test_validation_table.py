@@ -1,4 +1,4 @@
-"""docs/validation.md is what its command writes, and holds every figure that was measured."""
+"""docs/measured/validation.csv is what its command writes, with every figure that was measured."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from docs.scripts.tables import table
 from docs.scripts.validate import PATH, validation
 from sbafab.models import parabola, printed
 
@@ -53,14 +54,12 @@ RESIDUAL = re.compile(r"([+-][\d.e+-]+), [+-][\d.]+%")
 
 
 def rows() -> list[list[str]]:
-    lines = PATH.read_text(encoding="utf-8").splitlines()
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines if "|" in line]
-    return [row for row in cells if len(row) == 7 and not row[0].startswith(("figure", "---"))]
+    return [list(row[1:]) for row in table("validation").rows]
 
 
 @pytest.mark.long
 def test_the_file_is_what_the_command_writes() -> None:
-    assert PATH.read_text(encoding="utf-8") == validation()
+    assert PATH.read_text(encoding="utf-8") == validation().csv
 
 
 def test_every_measured_figure_has_its_row() -> None:
@@ -85,7 +84,7 @@ def test_every_row_has_a_prediction_or_says_that_there_is_none_and_why() -> None
 
 
 def test_comparison_of_eq_4_in_the_documentation() -> None:
-    text = (PATH.parent / "prediction.md").read_text(encoding="utf-8")
+    text = (PATH.parents[1] / "prediction.md").read_text(encoding="utf-8")
     table = [re.findall(r"[\d.]+", line) for line in text.splitlines() if line.startswith("| 0.")]
     assert len(table) == 6
     for share, h, by_eqs, by_eq_4, ratio, slopes in [map(float, row) for row in table]:
@@ -98,19 +97,17 @@ def test_comparison_of_eq_4_in_the_documentation() -> None:
 
 
 def test_what_the_misses_hang_on_begins_with_the_calibrated_figures() -> None:
-    lines = PATH.read_text(encoding="utf-8").splitlines()
-    (three, one) = [line for line in lines if line.startswith("| calibrated, as above |")]
-    measured = [line for line in lines if line.startswith("| **measured** |")]
+    lines = table("sensitivity").rows
+    (three, one) = [cells[2:] for cells in lines if cells[1] == "calibrated, as above"]
+    measured = [cells[2:] for cells in lines if cells[1] == "**measured**"]
     held = {
         row[0].split(" (")[0]: row for row in rows() if row[0].endswith(("held out)", "fitted)"))
     }
     names = [f"3-DoF, 100 kPa, {at}" for at in ("flat", *PARTS, *BENT)]
     names += ["height of the 3-DoF of 15 balloons"]
     others = [f"1-DoF, 100 kPa, {at}" for at in ("flat", *PARTS)]
-    for table, figures, paper in ((three, names, measured[0]), (one, others, measured[1])):
-        for name, value, wanted in zip(
-            figures, table.split("|")[2:-1], paper.split("|")[2:-1], strict=False
-        ):
+    for values, figures, paper in ((three, names, measured[0]), (one, others, measured[1])):
+        for name, value, wanted in zip(figures, values, paper, strict=False):
             assert float(value) == pytest.approx(float(held[name][3].split()[0]), abs=0.06), name
             assert float(wanted) == pytest.approx(float(held[name][1].split()[0])), name
 

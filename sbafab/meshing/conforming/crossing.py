@@ -1,4 +1,4 @@
-"""Films that pass through each other: looked for in every mesh before it is written.
+"""Check for films of a mesh that pass through each other.
 
 Each film is a surface over the plane, seen along its own upright. A film must lie above the one
 below it wherever both are; of films farther apart in the stack, none may have one node on this side
@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.meshing.conforming.cavities import TRIANGLE_PARTS
-from sbafab.meshing.conforming.form import FormedFilm
-from sbafab.meshing.conforming.layup import Layup
+from sbafab.meshing.conforming.layup import FormedFilm, Layup
+from sbafab.meshing.conforming.mesh import TRIANGLE_PARTS
 
 if TYPE_CHECKING:
     from matplotlib.tri import TriFinder
@@ -44,22 +43,22 @@ class Crossing(NamedTuple):
 
 def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
     """Raises OutputError where films of a mesh cross; ``forms`` are not wrapped round a tube."""
-    found = crossing(stack, forms)
-    if found is not None:
-        raise OutputError(f"{said(stack, found)}; ask for a more even fill")
+    deepest = crossing(stack, forms)
+    if deepest is not None:
+        raise OutputError(f"{crossing_clause(stack, deepest)}; ask for a more even fill")
 
 
-def said(stack: Layup, found: Crossing) -> str:
-    """One clause: which films cross, how deep and where."""
-    lower, upper = (stack.plies[k].layer.index for k in (found.lower, found.upper))
+def crossing_clause(stack: Layup, worst: Crossing) -> str:
+    """Return a clause that says which films cross, how deep and where."""
+    lower, upper = (stack.plies[k].layer.index for k in (worst.lower, worst.upper))
     return (
-        f"films {lower} and {upper} would pass through each other by {found.depth:.2f} mm at "
-        f"x {found.x:.3f}, y {found.y:.3f}"
+        f"films {lower} and {upper} would pass through each other by {worst.depth:.2f} mm at "
+        f"x {worst.x:.3f}, y {worst.y:.3f}"
     )
 
 
 def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
-    """Where two films cross deepest; None where all are apart, or touch."""
+    """Return the deepest crossing of two films; None where all are apart, or touch."""
     films = [_Film(stack, k, form) for k, form in enumerate(forms)]
     plane = _Plane(stack)
     near = [_between(plane, lower, upper) for lower, upper in pairwise(films)]
@@ -70,8 +69,8 @@ def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
         for upper in films[k + 2 :]
         if not any(near)
     )
-    found = [one for one in (*near, *far) if one is not None]
-    return max(found, key=lambda one: one.depth, default=None)
+    crossings = [pair for pair in (*near, *far) if pair is not None]
+    return max(crossings, key=lambda pair: pair.depth, default=None)
 
 
 class _Film:
@@ -90,7 +89,7 @@ class _Film:
         ways, self.shift = np.split(np.linalg.lstsq(flat, level, rcond=None)[0], [2])
         self.axes = np.vstack([ways, up])
 
-    def seen(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def in_frame(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 3) in this film's frame: x and y of the flat laminate, and height."""
         inside: NDArray[np.float64] = (points - self.shift) @ self.axes.T
         return inside
@@ -124,16 +123,16 @@ class _Plane:
         there = np.flatnonzero(part >= 0)
         there = there[film.cells[self.cells[part[there]]]]
         height = np.full(len(self.points), np.nan)
-        height[film.nodes] = film.seen(face)[:, 2]
+        height[film.nodes] = film.in_frame(face)[:, 2]
         corners = self.parts[part[there]]
         a, b, c = (self.points[corners[:, i]] for i in range(3))
         offset = points[there, :2] - a
         twice = _cross(b - a, c - a)
         s, t = _cross(offset, c - a) / twice, _cross(b - a, offset) / twice
         h = height[corners]
-        found = np.full(len(points), np.nan)
-        found[there] = points[there, 2] - (h[:, 0] * (1 - s - t) + h[:, 1] * s + h[:, 2] * t)
-        return found
+        gaps = np.full(len(points), np.nan)
+        gaps[there] = points[there, 2] - (h[:, 0] * (1 - s - t) + h[:, 1] * s + h[:, 2] * t)
+        return gaps
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -142,10 +141,10 @@ def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
-    low, high = lower.seen(lower.top), lower.seen(upper.bottom)
+    low, high = lower.in_frame(lower.top), lower.in_frame(upper.bottom)
     if high[:, 2].min() >= low[:, 2].max() - SLACK:
         return None
-    low_above, high_above = upper.seen(lower.top), upper.seen(upper.bottom)
+    low_above, high_above = upper.in_frame(lower.top), upper.in_frame(upper.bottom)
     if high_above[:, 2].min() >= low_above[:, 2].max() - SLACK:
         return None
     if _is_parallel(lower, upper):
@@ -170,10 +169,10 @@ def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
 
 
 def _is_parallel(lower: _Film, upper: _Film) -> bool:
-    """Whether two films are seen along the same upright, one right above the other."""
+    """Return True if two films are seen along one upright, one right above the other."""
     sideways = lower.axes[:2] @ (upper.shift - lower.shift).ravel()
-    alike = np.abs(lower.axes - upper.axes).max() < PARALLEL
-    return bool(alike and np.abs(sideways).max() < PARALLEL)
+    is_parallel = np.abs(lower.axes - upper.axes).max() < PARALLEL
+    return bool(is_parallel and np.abs(sideways).max() < PARALLEL)
 
 
 def _upright(plane: _Plane, lower: _Film, upper: _Film) -> NDArray[np.float64]:
@@ -185,7 +184,7 @@ def _upright(plane: _Plane, lower: _Film, upper: _Film) -> NDArray[np.float64]:
 
 
 def _is_pierced(plane: _Plane, film: _Film, gap: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which nodes of a film have a neighbour on the other side of the other film."""
+    """Return a mask of a film's nodes that have a neighbour on the other side of the other film."""
     height = np.full(len(plane.points), np.nan)
     height[film.nodes] = gap
     a, b = height[plane.edges].T
@@ -193,5 +192,5 @@ def _is_pierced(plane: _Plane, film: _Film, gap: NDArray[np.float64]) -> NDArray
     across &= np.maximum(a, b) > SLACK
     pierced = np.zeros(len(plane.points), dtype=bool)
     pierced[plane.edges[across]] = True
-    found: NDArray[np.bool_] = pierced[film.nodes]
-    return found
+    of_film: NDArray[np.bool_] = pierced[film.nodes]
+    return of_film

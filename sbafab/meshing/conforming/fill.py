@@ -1,31 +1,343 @@
-"""Fill: films lifted off each other by the air of their balloons.
+"""Films lifted by the air of their balloons, and balloons set on each other.
 
-The lift is vertical in the frame of each balloon, so no element changes its volume; balloons
-are then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
-refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the
-paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver that
-takes one.
+The lift is vertical in the frame of each balloon, so no element changes its volume; balloons are
+then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
+refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in
+the paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver
+that takes one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.meshing.conforming.bodies import bodies
-from sbafab.meshing.conforming.crossing import crossing, said
-from sbafab.meshing.conforming.form import FormedFilm, flat
-from sbafab.meshing.conforming.layup import Layup
-from sbafab.meshing.conforming.pockets import Pocket, pockets
-from sbafab.meshing.conforming.poses import UPRIGHT, RigidMotion, set_on, slopes_of
+from sbafab.geometry.edges import Arc, Point
+from sbafab.laminate.laminate import Interface
+from sbafab.meshing.conforming.crossing import crossing, crossing_clause
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, bodies, flat
+from sbafab.meshing.conforming.mesh import integrals
+from sbafab.meshing.conforming.plane import MISSING, Plane
+from sbafab.models.lens import fullest as fullest_slot
+from sbafab.models.parabola import fullest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+# The lift of one film: Poisson's equation on the triangles of a pocket.
+
+
+class Lift(NamedTuple):
+    """Shapes (3, plane nodes) of a film over a pocket, in mm2, mm and mm.
+
+    The first is what even pressure gives; the others are a neck disc that leans by one along x
+    or y. ``plateaus`` (3,) are their heights at the middle of the neck disc (of the first one),
+    ``volumes`` (3,) what they enclose.
+    """
+
+    shapes: NDArray[np.float64]
+    plateaus: NDArray[np.float64]
+    volumes: NDArray[np.float64]
+
+
+def lift(
+    plane: Plane,
+    pocket: NDArray[np.bool_],
+    fixed: NDArray[np.int64],
+    discs: list[tuple[NDArray[np.int64], tuple[float, float]]],
+) -> Lift:
+    """Return the rise of the film over a pocket: -lap w = 1, w = 0 at the ``fixed`` nodes.
+
+    ``discs`` are the nodes of each neck and its middle: they rise as one. For a round pocket
+    without a neck this is the paraboloid of the paper's Eq. 1.
+    """
+    try:
+        from scipy.sparse import coo_matrix, csr_matrix
+        from scipy.sparse.linalg import splu
+    except ImportError:
+        raise DesignError(MISSING.format("scipy")) from None
+    triangles = plane.triangles[pocket]
+    stiffness, load = integrals(plane.points, triangles)
+    count = len(plane.points)
+    rows = np.repeat(triangles, 6, axis=1).ravel()
+    columns = np.tile(triangles, (1, 6)).ravel()
+    matrix = coo_matrix((stiffness.ravel(), (rows, columns)), shape=(count, count)).tocsr()
+    weights = np.bincount(triangles.ravel(), load.ravel(), count)
+
+    # Each unknown moves one node, or all nodes of one neck disc.
+    unknown = np.full(count, -1)
+    active = np.unique(triangles)
+    unknown[active] = 0
+    unknown[fixed] = -1
+    for nodes, _ in discs:
+        unknown[nodes] = -1
+    free = np.flatnonzero(unknown == 0)
+    unknown[free] = np.arange(len(free))
+    lean = np.zeros((2, count))
+    for number, (nodes, middle) in enumerate(discs):
+        unknown[nodes] = len(free) + number
+        lean[:, nodes] = (plane.points[nodes] - middle).T
+    size = len(free) + len(discs)
+    moved = np.flatnonzero(unknown >= 0)
+    spread = csr_matrix((np.ones(len(moved)), (moved, unknown[moved])), shape=(count, size))
+    factors = splu((spread.T @ matrix @ spread).tocsc())
+    shapes = np.empty((3, count))
+    shapes[0] = spread @ factors.solve(spread.T @ weights)
+    for axis in range(2):
+        push = spread.T @ (matrix @ lean[axis])
+        shapes[1 + axis] = lean[axis] - spread @ factors.solve(push)
+    plateaus = np.zeros(3)
+    if discs:
+        first = discs[0][0][0]
+        plateaus = shapes[:, first] - np.array([0.0, *lean[:, first]])
+    return Lift(shapes, plateaus, shapes @ weights)
+
+
+# The pockets of a laminate.
+
+
+NEAR = 1e-3
+"""mm by which a round pocket may stand off its chamber's axis."""
+
+
+@dataclass(frozen=True)
+class Pocket:
+    """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
+
+    ``centres`` are its stacks, as places in the layup's. ``share`` of each of them is meshed;
+    ``flat_ul`` is what the meshed part holds before it is filled, ``largest_ul`` the most air
+    that a balloon can hold.
+    """
+
+    chamber: str
+    ply: int
+    layer: int
+    centres: tuple[int, ...]
+    lower: Lift
+    upper: Lift
+    share: float
+    flat_ul: float
+    largest_ul: float
+
+    def pressure(self, ul: float, lean: NDArray[np.float64]) -> float:
+        """The amount of the even shape, in 1/mm, at which each balloon holds ``ul``.
+
+        ``lean`` (2, 2) are the slopes of the lower and the upper neck disc. Raises DesignError
+        where a balloon cannot hold that much.
+        """
+        if ul > self.largest_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is more than the balloon under layer "
+                f"{self.layer} can hold with a film of constant length: "
+                f"ask for {math.floor(self.largest_ul * 100) / 100:.2f} ul at most"
+            )
+        target = ul * len(self.centres) * self.share
+        if 0 < target < self.flat_ul:
+            raise DesignError(
+                f"fill of {self.chamber} = {ul:g} ul is less than the gaps between flat films "
+                f"hold; ask for {self.flat_ul / len(self.centres) / self.share:.2f} ul or more"
+            )
+        if ul == 0:
+            return 0.0
+        even = self.lower.volumes[0] + self.upper.volumes[0]
+        leaning = lean[0] @ self.lower.volumes[1:] + lean[1] @ self.upper.volumes[1:]
+        return float((target - self.flat_ul - leaning) / even)
+
+
+def pockets(stack: Layup) -> list[Pocket]:
+    """The pockets of every chamber, bottom to top; equal ones are worked out once."""
+    lifts: dict[tuple[bytes, ...], Lift] = {}
+    limits: dict[tuple[bytes, bytes], float] = {}
+    return [
+        _pocket(stack, chamber, ply, lifts, limits)
+        for ply, interface in enumerate(stack.laminate.interfaces, start=1)
+        if interface.kind == "chamber"
+        for chamber, void in stack.voids.items()
+        if ply in void.under
+    ]
+
+
+def _pocket(
+    stack: Layup,
+    chamber: str,
+    ply: int,
+    lifts: dict[tuple[bytes, ...], Lift],
+    limits: dict[tuple[bytes, bytes], float],
+) -> Pocket:
+    plane, plies = stack.plane, stack.plies
+    cells = stack.voids[chamber].under[ply]
+    inner = np.unique(plane.triangles[cells])
+    fixed = np.intersect1d(inner, np.unique(plane.triangles[plies[ply].bonded]))
+    centres = tuple(i for i, owner in enumerate(stack.centre_chambers) if owner == chamber)
+    places = [stack.centres[i] for i in centres]
+
+    def lift_of(necks: NDArray[np.bool_]) -> Lift:
+        key = cells.tobytes(), fixed.tobytes(), necks.tobytes()
+        if key not in lifts:
+            discs = list(_discs(stack, necks, fixed, places))
+            lifts[key] = lift(plane, cells, fixed, discs)
+        return lifts[key]
+
+    above = plies[ply + 1].bonded if ply + 1 < len(plies) else cells & False
+    lower = lift_of(cells & (plies[ply - 1].bonded | ~plies[ply - 1].cells))
+    upper = lift_of(cells & (above | ~plies[ply].cells))
+    share = stack.shares[chamber]
+    key = cells.tobytes(), fixed.tobytes()
+    if key not in limits:
+        interface = stack.laminate.interfaces[ply - 1]
+        limits[key] = _largest(stack, interface, lift_of(cells & False), fixed, places, share)
+    return Pocket(
+        chamber,
+        ply,
+        plies[ply].layer.index,
+        centres,
+        lower,
+        upper,
+        share,
+        float(plane.areas()[cells].sum()) * plies[ply].gap,
+        limits[key],
+    )
+
+
+def _discs(
+    stack: Layup, necks: NDArray[np.bool_], fixed: NDArray[np.int64], places: list[Point]
+) -> Iterator[tuple[NDArray[np.int64], Point]]:
+    """The nodes of each neck disc, and the axis it is on."""
+    nodes = np.setdiff1d(np.unique(stack.plane.triangles[necks]), fixed)
+    offsets = stack.plane.points[nodes][:, None] - np.array(places)
+    nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
+    for number, place in enumerate(places):
+        if (nearest == number).any():
+            yield nodes[nearest == number], place
+
+
+def _largest(
+    stack: Layup,
+    interface: Interface,
+    even: Lift,
+    fixed: NDArray[np.int64],
+    places: list[Point],
+    share: float,
+) -> float:
+    """Most air in ul that a balloon can hold, of which ``share`` is meshed.
+
+    A round pocket's is that of two paraboloids whose meridian keeps its length (paper Eqs. 1 to
+    3), an oblong one's that of two arcs (as ``predict`` says); a drawn one holds as much more than
+    the disc in it as the even lift of equal height does.
+    """
+    ends = _round_ends(interface, places[0])
+    if len(ends) == 1:
+        return 2 * fullest(ends[0][1]).volume
+    if len(ends) == 2:
+        (first, radius), (last, _) = ends
+        return fullest_slot(2 * radius, math.dist(first, last)).volume
+    offsets = stack.plane.points[fixed][:, None] - np.array(places)
+    half = float(np.linalg.norm(offsets, axis=2).min())
+    disc = math.pi * half**2 / 2
+    wider = float(even.volumes[0] / even.shapes[0].max()) / disc
+    return 2 * fullest(half).volume * wider / len(places) / share
+
+
+def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
+    """Middles and radii of the circles that the pocket round a centre ends in.
+
+    One on the centre where most of its edge is that circle; two of one radius and at equal
+    distances on either side of it for a slot, of which at least a third of a turn is left beside
+    inlet and manifold.
+    """
+    turns: dict[tuple[Point, float], float] = {}
+    for outer in interface.unbonded.outers:
+        for edge in outer.edges:
+            if isinstance(edge, Arc):
+                x, y = edge.centre
+                place = (round(x, 5), round(y, 5)), round(edge.radius, 5)
+                turns[place] = turns.get(place, 0.0) + abs(edge.sweep)
+    ends = sorted(place for place, turn in turns.items() if turn > math.tau / 3)
+    on_centre = [end for end in ends if math.dist(end[0], centre) < NEAR and turns[end] > math.pi]
+    if on_centre:
+        return on_centre[:1]
+    for number, (first, radius) in enumerate(ends):
+        for last, last_radius in ends[number + 1 :]:
+            middle = (first[0] + last[0]) / 2, (first[1] + last[1]) / 2
+            if abs(last_radius - radius) < NEAR and math.dist(middle, centre) < NEAR:
+                return [(first, radius), (last, last_radius)]
+    return []
+
+
+# Balloons set on each other by the planes of their neck discs.
+
+
+FLATNESS = 0.01
+"""Part of the lift by which necks may miss a common plane."""
+
+
+class RigidMotion(NamedTuple):
+    """A rigid motion: ``turn`` (3, 3) first, then ``shift`` (3,) in mm."""
+
+    turn: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+
+UPRIGHT = RigidMotion(np.eye(3), np.zeros(3))
+
+
+def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Slopes along x and y of the plane through the heights at the centres (n, 2).
+
+    Raises DesignError where they have no common plane.
+    """
+    offsets = centres - centres.mean(axis=0)
+    rises = heights - heights.mean()
+    slopes: NDArray[np.float64] = np.linalg.lstsq(offsets, rises, rcond=1e-9)[0]
+    worst = float(np.abs(rises - offsets @ slopes).max())
+    if worst > FLATNESS * float(np.abs(heights).max()):
+        raise DesignError(
+            f"the fills asked for lift the chambers {worst:.3f} mm off a common plane; fill more "
+            "than three chambers, or chambers in one row, alike"
+        )
+    return slopes
+
+
+def set_on(
+    below: RigidMotion,
+    centres: NDArray[np.float64],
+    top: NDArray[np.float64],
+    bottom: NDArray[np.float64],
+    gap: float,
+) -> RigidMotion:
+    """The pose of a balloon whose neck discs at heights ``bottom`` meet those at ``top`` of the
+    balloon below, ``gap`` mm apart.
+    """
+    middle = centres.mean(axis=0)
+    turn = below.turn @ _frame(slopes_of(centres, top)) @ _frame(slopes_of(centres, bottom)).T
+    meeting = below.turn @ np.array([*middle, top.mean()]) + below.shift
+    normal = below.turn @ _frame(slopes_of(centres, top))[:, 2]
+    start = turn @ np.array([*middle, bottom.mean()])
+    return RigidMotion(turn, meeting + gap * normal - start)
+
+
+def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The turn (3, 3) by the least angle of the upright axis onto the normal of a plane."""
+    normal = np.array([-slopes[0], -slopes[1], 1.0])
+    normal /= np.linalg.norm(normal)
+    x, y, z = normal.tolist()
+    return np.array(
+        [
+            [1 - x * x / (1 + z), -x * y / (1 + z), x],
+            [-x * y / (1 + z), 1 - y * y / (1 + z), y],
+            [-x, -y, z],
+        ]
+    )
+
+
+# The fill of a whole actuator.
+
 
 ROUNDS = 4
 """Leaning discs change volumes, and these the lean, by less each round."""
@@ -57,24 +369,24 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
     through each other.
     """
     fill = _fill(stack, fill_ul)
-    held = pockets(stack)
-    forms = formed(stack, fill, held)
+    all_pockets = pockets(stack)
+    forms = formed(stack, fill, all_pockets)
     if fill.is_even:
         return fill, forms
-    found = crossing(stack, forms)
-    if found is not None:
-        least = _least(stack, fill, held)
+    worst = crossing(stack, forms)
+    if worst is not None:
+        least = _least(stack, fill, all_pockets)
         names = [name for name, ul in fill.ul.items() if ul < least.ul[name]]
-        asked = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
-        wanted = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
+        amounts = ", ".join(f"{name}={ul:g}ul" for name, ul in fill.ul.items())
+        minima = " and ".join(f"{least.ul[name]:.1f} ul in {name}" for name in names)
         raise DesignError(
-            f"with fill {asked} {said(stack, found)}, for balloons lean by what their chambers "
-            f"differ; ask for at least {wanted}, or for less in the others"
+            f"with fill {amounts} {crossing_clause(stack, worst)}, for balloons lean by what "
+            f"their chambers differ; ask for at least {minima}, or for less in the others"
         )
     return fill, forms
 
 
-def _least(stack: Layup, fill: Fill, held: list[Pocket]) -> Fill:
+def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
     """The fill that is raised least towards an even one, in steps of 0.1 ul, for films to clear."""
 
     def raised(share: float) -> Fill:
@@ -93,35 +405,35 @@ def _least(stack: Layup, fill: Fill, held: list[Pocket]) -> Fill:
     for _ in range(HALVINGS):
         share = (low + high) / 2
         tried = raised(share)
-        crosses = crossing(stack, formed(stack, tried, held)) is not None
+        crosses = crossing(stack, formed(stack, tried, all_pockets)) is not None
         low, high = (share, high) if crosses else (low, share)
     return raised(high)
 
 
-def formed(stack: Layup, fill: Fill, held: list[Pocket]) -> list[FormedFilm]:
+def formed(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> list[FormedFilm]:
     """Every film where the air of these pockets has moved it to, films that cross included."""
     body_of_node, body_of_centre = bodies(stack)
     forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
     for body in np.unique(body_of_centre).tolist():
         nodes = np.flatnonzero(body_of_node == body)
         centres = np.flatnonzero(body_of_centre == body)
-        own = [pocket for pocket in held if pocket.centres[0] in centres]
-        for k, form in _raised(stack, own, centres, fill).items():
+        of_body = [pocket for pocket in all_pockets if pocket.centres[0] in centres]
+        for k, form in _raised(stack, of_body, centres, fill).items():
             forms[k].base[nodes] = form.base[nodes]
             forms[k].up[nodes] = form.up[nodes]
     return forms
 
 
 def _raised(
-    stack: Layup, own: list[Pocket], centres: NDArray[np.int64], fill: Fill
+    stack: Layup, of_body: list[Pocket], centres: NDArray[np.int64], fill: Fill
 ) -> dict[int, FormedFilm]:
     """The films of one body, by ply; sheets stay as they are."""
     lifts = np.zeros((len(stack.plies), len(stack.plane.points)))
     # Height of each stack's neck disc on each film, above the film itself.
     necks = np.zeros((len(stack.plies), len(stack.centres)))
     places = np.array(stack.centres)[centres]
-    for k in sorted({pocket.ply for pocket in own}):
-        there = [pocket for pocket in own if pocket.ply == k]
+    for k in sorted({pocket.ply for pocket in of_body}):
+        there = [pocket for pocket in of_body if pocket.ply == k]
         _lift(there, fill, centres, places, lifts, necks)
     poses = _poses(stack, places, necks[:, centres])
     forms = {}
@@ -136,7 +448,7 @@ def _raised(
 def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
     names = [chamber.name for chamber in stack.laminate.chambers]
     if not isinstance(fill_ul, Mapping):
-        asked = dict.fromkeys(names, float(fill_ul))
+        amounts = dict.fromkeys(names, float(fill_ul))
     else:
         unknown = [name for name in fill_ul if name not in names]
         if unknown:
@@ -144,16 +456,16 @@ def _fill(stack: Layup, fill_ul: float | Mapping[str, float]) -> Fill:
                 f"fill names chamber {unknown[0]}, which is not there; "
                 f"the chambers are {', '.join(names)}"
             )
-        asked = {name: float(fill_ul.get(name, 0.0)) for name in names}
-        if stack.sector is not None and len(set(asked.values())) > 1:
+        amounts = {name: float(fill_ul.get(name, 0.0)) for name in names}
+        if stack.sector is not None and len(set(amounts.values())) > 1:
             raise DesignError(
                 "a mesh of a part by symmetry has the same fill in every chamber; "
                 "ask for symmetry full"
             )
-    for name, value in asked.items():
+    for name, value in amounts.items():
         if not (math.isfinite(value) and value >= 0):
             raise DesignError(f"fill of {name} = {value:g} ul must be 0 ul or more")
-    return Fill(asked)
+    return Fill(amounts)
 
 
 def _lift(

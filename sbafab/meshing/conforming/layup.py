@@ -1,24 +1,181 @@
-"""The layup: every TPE film over one triangulation of the plane, and the voids between them."""
+"""Layup that volume and shell mesh share: settings, symmetry, films, voids, film positions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.edges import Point, unit
+from sbafab.geometry.region import Region, disc, polygon
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
-from sbafab.meshing.cavity import cavity_slabs
 from sbafab.meshing.conforming.plane import Plane, triangulation
-from sbafab.meshing.conforming.settings import MeshSettings
-from sbafab.meshing.conforming.symmetry import Sector, sector
+from sbafab.meshing.solid import cavity_slabs
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
+
+Element = Literal["wedge", "tet"]
+Symmetry = Literal["full", "half", "quarter", "sector"]
+
+
+@dataclass(frozen=True)
+class MeshSettings:
+    """Settings of the conforming meshes.
+
+    ``h`` is the side of the triangles in mm. ``symmetry``: half of the actuator, the quarter of a
+    1-DoF one that lies away from its inlet, or one lobe's sector. ``fill_ul`` is the air in every
+    balloon's pocket in ul, or in those of each chamber by name; None is the flat shape.
+    ``gaps`` keeps the films as far apart as the masks hold them, with bonds between them that
+    are as thick; without it films lie on each other, and the height is the sum of the TPE films.
+    ``wrapped``: a laminate made for a tube lies round it, its axis z; else it lies flat.
+    """
+
+    h: float = 0.35
+    element: Element = "wedge"
+    symmetry: Symmetry = "full"
+    fill_ul: float | Mapping[str, float] | None = None
+    gaps: bool = False
+    wrapped: bool = True
+
+
+# The part of an actuator that stands for the whole.
+
+
+SLACK = 1e-5
+"""mm2 by which a profile may differ from its image."""
+ON_PLANE = 1e-6
+NEAR = 0.01
+"""mm round a chamber's centre, any part of which makes it meshed."""
+
+
+class Sector(NamedTuple):
+    """Meshed part of the plane, and its symmetry planes by name: directions from the axis.
+
+    ``copies`` of it make up the whole.
+    """
+
+    region: Region
+    planes: tuple[tuple[str, Point], ...]
+    copies: int
+
+    def on_planes(self, points: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Yield each plane's name and a mask of the points (n, 2) on it."""
+        import numpy as np
+
+        for name, (x, y) in self.planes:
+            across = np.abs(points[:, 1] * x - points[:, 0] * y) < ON_PLANE
+            if name.startswith("symmetry_sector"):
+                across &= points[:, 0] * x + points[:, 1] * y > -ON_PLANE
+            yield name, across
+
+
+def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
+    """The part of the laminate to mesh, None for all of it.
+
+    Half: one side of the plane y = 0, or else of x = 0. Quarter: of a stack on the axis, the one at
+    x < 0, y > 0, away from the inlet, which is left out so. Sector: one of several stacks round
+    the axis, with its inlet.
+    Raises DesignError where the laminate is not symmetric.
+    """
+    if symmetry == "full":
+        return None
+    far = 10 * max(map(abs, laminate.bounds)) + 10
+    regions = _regions(laminate)
+    if symmetry == "half":
+        if all(_covers(_flipped_y(region), region) for region in regions):
+            box = polygon([(-far, 0.0), (far, 0.0), (far, far), (-far, far)])
+            return Sector(box, (("symmetry_y", (1.0, 0.0)),), 2)
+        if all(_covers(region.mirrored(), region) for region in regions):
+            box = polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
+            return Sector(box, (("symmetry_x", (0.0, 1.0)),), 2)
+    elif symmetry == "quarter":
+        box = polygon([(-far, 0.0), (0.0, 0.0), (0.0, far), (-far, far)])
+        if _is_on_axis(laminate) and all(_is_quarter(laminate, layer) for layer in regions):
+            return Sector(box, (("symmetry_x", (0.0, 1.0)), ("symmetry_y", (-1.0, 0.0))), 4)
+    else:
+        count = len(laminate.chambers)
+        if count > 1 and all(_covers(region.turned(360 / count), region) for region in regions):
+            return _lobe(count, far)
+    raise DesignError(
+        f"mesh symmetry {symmetry} is not this laminate's: a profile differs from its image; "
+        "use full, or leave out what is on one side only, such as ears and inlet tabs"
+    )
+
+
+def _is_on_axis(laminate: Laminate) -> bool:
+    """Return True if there is one stack, on the axis: its quarter is a quarter of its chamber."""
+    return [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
+
+
+def _regions(laminate: Laminate) -> Sequence[Region]:
+    """Each distinct film and bond."""
+    films = [layer.profile for layer in laminate.tpe_layers]
+    return list(dict.fromkeys([*films, *(interface.bond for interface in laminate.interfaces)]))
+
+
+def _lobe(count: int, far: float) -> Sector:
+    half = 180 / count
+    rays = [unit(half * share) for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    rim = [(far * x, far * y) for x, y in rays]
+    planes = (("symmetry_sector_1", rays[0]), ("symmetry_sector_2", rays[-1]))
+    return Sector(polygon([(0.0, 0.0), *rim]), planes, count)
+
+
+def _flipped_y(region: Region) -> Region:
+    return region.mirrored().turned(180.0)
+
+
+def _covers(region: Region, image: Region) -> bool:
+    return region == image or (image - region).area < SLACK
+
+
+def _is_quarter(laminate: Laminate, region: Region) -> bool:
+    """Return True if, but for the inlet, all four quarters are images of each other."""
+    far = 10 * max(map(abs, laminate.bounds)) + 10
+    away = region & polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
+    if not _covers(_flipped_y(away), away):
+        return False
+    inlet = laminate.inlets[0] if laminate.inlets else None
+    image = away.mirrored()
+    if inlet is not None and inlet.direction[0] > 0:
+        width = inlet.width / 2
+        image = image - polygon([(0.0, -width), (far, -width), (far, width), (0.0, width)])
+    return _covers(region, image)
+
+
+def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
+    """For each chamber the one that is meshed in its place: itself, or one it is an image of."""
+    part = sector(laminate, symmetry)
+    chambers = {chamber.name: chamber.centres for chamber in laminate.chambers}
+    if part is None:
+        return {name: name for name in chambers}
+    meshed = [
+        name
+        for name, centres in chambers.items()
+        if any(not (disc(centre, NEAR) & part.region).is_empty for centre in centres)
+    ]
+    if symmetry != "half":
+        return {name: name if name in meshed else meshed[0] for name in chambers}
+    _, (x, y) = part.planes[0]
+    meshed_for = {}
+    for name, centres in chambers.items():
+        a, b = centres[0]
+        along = a * x + b * y
+        image = 2 * along * x - a, 2 * along * y - b
+        distances = {twin: math.dist(image, chambers[twin][0]) for twin in meshed}
+        meshed_for[name] = (
+            name if name in meshed else min(distances, key=lambda twin: distances[twin])
+        )
+    return meshed_for
+
+
+# The layup: every TPE film over one triangulation of the plane, and the voids between them.
+
 
 EDGE = 1e-3
 """mm"""
@@ -50,8 +207,9 @@ class Ply:
 
 @dataclass(frozen=True)
 class MeshedVoid:
-    """What the air of a chamber fills: triangles by ply that are open in that film, and by ply
-    that are open under it. ``volume`` is the exact volume in mm3 when flat.
+    """Air of a chamber as triangles by ply: open in that film (``in_films``), or ``under`` it.
+
+    ``volume`` is the exact volume in mm3 when flat.
     """
 
     in_films: Mapping[int, NDArray[np.bool_]]
@@ -60,7 +218,7 @@ class MeshedVoid:
 
     @property
     def is_open(self) -> bool:
-        """Whether any of it lies in what is meshed."""
+        """True if any of it lies in the meshed part."""
         return any(bool(cells.any()) for cells in self.under.values())
 
 
@@ -125,7 +283,7 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     ]
     seat_regions = [clip(seat) for _, seat in whole_seats]
     used = [*films, *bonds, *seat_regions]
-    used += [clip(region) for found in slabs.values() for _, _, region in found]
+    used += [clip(region) for chamber_slabs in slabs.values() for _, _, region in chamber_slabs]
     regions = [region for region in dict.fromkeys(used) if not region.is_empty]
     plane = triangulation(regions, settings.h)
     row = {region: index for index, region in enumerate(regions)}
@@ -147,8 +305,10 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     for ply in plies:
         _check_apart(plane, ply)
     voids = {
-        name: _void([(place, under, clip(region)) for place, under, region in found], plies, cells)
-        for name, found in slabs.items()
+        name: _void(
+            [(place, under, clip(region)) for place, under, region in chamber_slabs], plies, cells
+        )
+        for name, chamber_slabs in slabs.items()
     }
     seats = nothing.copy()
     for seat in seat_regions:
@@ -189,35 +349,35 @@ def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
 
 
 def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """Width of each bonded ring along x and y, and what it is called."""
+    """Yield the width of each bonded ring along x and y, and its name."""
     for interface in laminate.interfaces:
         ring = "the neck ring" if interface.kind == "separator" else "the bond round the pocket"
         layers = f"between layers {interface.below.index} and {interface.above.index}"
         for piece in interface.bond.pieces:
             (low_x, low_y, high_x, high_y) = piece.outers[0].bounds
             for hole in piece.holes:
-                left, low, right, high = hole.bounds
-                width = min(left - low_x, low - low_y, high_x - right, high_y - high)
+                hole_x, hole_y, right, high = hole.bounds
+                width = min(hole_x - low_x, hole_y - low_y, high_x - right, high_y - high)
                 yield width, f"{ring} {layers}"
 
 
 def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
-    """What is left of the films beside each pocket, on the side where that is least.
+    """Yield the narrowest width of the bond beside each pocket, and its name.
 
     No ring is closed where a lone balloon's inlet leaves it.
     """
     for interface in laminate.interfaces:
         low_x, low_y, high_x, high_y = interface.contact.bounds
         for outer in interface.unbonded.outers:
-            left, low, right, high = outer.bounds
-            sides = (left - low_x, low - low_y, high_x - right, high_y - high)
+            pocket_x, pocket_y, right, high = outer.bounds
+            sides = (pocket_x - low_x, pocket_y - low_y, high_x - right, high_y - high)
             layers = f"between layers {interface.below.index} and {interface.above.index}"
             # The inlet's strip runs to the edge of the films.
             yield from ((s, f"the bond beside the pocket {layers}") for s in sides if s > EDGE)
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:
-    """What is bonded when ears are snipped off: between balloons, the neck rings alone."""
+    """Return the bond without snipped-off ears: between balloons, the neck rings alone."""
     if interface.kind != "separator":
         return interface.bond
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
@@ -279,9 +439,9 @@ def _void(
     under: dict[int, NDArray[np.bool_]] = {}
     volume = 0.0
     for place, is_under, region in slabs:
-        held = under if is_under else in_films
+        open_cells = under if is_under else in_films
         covered = cells(region)
-        held[place] = held[place] | covered if place in held else covered
+        open_cells[place] = open_cells[place] | covered if place in open_cells else covered
         ply = plies[place]
         volume += region.area * (ply.gap if is_under else ply.thickness)
     return MeshedVoid(in_films, under, volume)
@@ -303,3 +463,54 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
             f"Bonds under layer {ply.layer.index} touch in one point at x {x:.3f}, y {y:.3f}; "
             "change a size there by 0.01 mm or more."
         )
+
+
+# The positions of the films: flat, or lifted off each other by air.
+
+
+class FormedFilm(NamedTuple):
+    """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
+    (n, 3) along which its thickness is measured. ``growth`` is the part by which its volume is
+    larger than flat, where it is bent round a tube.
+    """
+
+    base: NDArray[np.float64]
+    up: NDArray[np.float64]
+    growth: float = 0.0
+
+    def at(self, height: float) -> NDArray[np.float64]:
+        """Points (n, 3) of the film ``height`` mm above its lower face."""
+        points: NDArray[np.float64] = self.base + height * self.up
+        return points
+
+
+def flat(layup: Layup) -> list[FormedFilm]:
+    """Every film flat, at its height in the stack."""
+    return [level(layup, ply.z) for ply in layup.plies]
+
+
+def level(layup: Layup, z: float) -> FormedFilm:
+    """A film flat at one height in mm."""
+    import numpy as np
+
+    plane = layup.plane.points
+    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(plane), 3))
+    return FormedFilm(np.column_stack([plane, np.full(len(plane), z)]), up)
+
+
+def bodies(stack: Layup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the body of each node of the plane, and of each stack's centre.
+
+    A body is what hangs together above the sheet, such as each oblong balloon stack on it.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    films = [ply.cells for ply in stack.plies if ply.layer.role != "sheet"]
+    triangles = stack.plane.triangles[np.any(films, axis=0)]
+    count = len(stack.plane.points)
+    rows, columns = np.repeat(triangles[:, 0], 5), triangles[:, 1:].ravel()
+    links = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    labels = connected_components(links, directed=False)[1].astype(np.int64)
+    offsets = stack.plane.points[:, None] - np.array(stack.centres)
+    return labels, labels[np.linalg.norm(offsets, axis=2).argmin(axis=0)]

@@ -6,46 +6,27 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 import numpy as np
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.conforming.checks import skin_surface
-from sbafab.meshing.conforming.fill import Fill, filled, formed
-from sbafab.meshing.conforming.form import FormedFilm, flat
-from sbafab.meshing.conforming.layup import Layup, layup
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.pockets import pockets
-from sbafab.meshing.conforming.settings import MeshSettings, Symmetry
-from sbafab.meshing.conforming.shell_mesh import shell_mesh, thin
-from sbafab.meshing.conforming.statistics import (
-    Statistics,
-    Thinning,
-    mesh_statistics,
-    thinning,
+from sbafab.meshing.conforming.element_mesh import (
+    shell_mesh,
+    skin_surface,
+    swept_points,
+    thin,
+    volume_mesh,
 )
-from sbafab.meshing.conforming.volume_mesh import swept_points, volume_mesh
-from sbafab.meshing.conforming.write_inp import write_inp
-from sbafab.meshing.conforming.write_msh import write_msh
-from sbafab.meshing.conforming.write_obj import write_obj
-from sbafab.meshing.conforming.write_ply import write_ply
-from sbafab.meshing.conforming.write_vtk import write_vtk
-from sbafab.meshing.conforming.write_vtu import write_cavity_vtu, write_vtu
+from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
+from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
 from sbafab.meshing.files import MeshFile, MeshKind
-from sbafab.meshing.surface import Surface
-from sbafab.meshing.write_stl import write_stl
+from sbafab.meshing.formats.table import CONFORMING_ENDINGS, MESH_FORMATS
 
-MESH_WRITERS: dict[str, Callable[[Mesh, Path], None]] = {
-    "vtu": write_vtu,
-    "vtk": write_vtk,
-    "msh": write_msh,
-    "inp": write_inp,
-}
-SURFACE_WRITERS: dict[str, Callable[[Surface, Path], None]] = {
-    "stl": write_stl,
-    "obj": write_obj,
-    "ply": write_ply,
-}
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 HEIGHTS = {
     False: "Films lie on each other: heights are sums of the TPE films, without the masks.",
     True: "Films are as far apart as the masks hold them, and bonds are as thick.",
@@ -66,7 +47,6 @@ FILLED = (
 REST = "Films are free of stress when flat: the point field rest of the .vtu holds those places."
 HEIGHT_OF_SHELL = "Mid-surfaces: films have no height of their own, and lie in one plane when flat."
 ROUNDS = 2
-FORMATS = ("vtu", "vtk", "msh", "inp", "stl", "obj", "ply")
 
 
 @dataclass(frozen=True)
@@ -95,11 +75,11 @@ class ConformingMeshes:
 
     @property
     def has_air(self) -> bool:
-        """Whether any film stands off another."""
+        """True if any film stands off another."""
         return any(self.holds_air(chamber) for chamber in self.volume.cavities)
 
     def holds_air(self, chamber: str) -> bool:
-        """Whether the pockets of a chamber are open: filled, or kept so by gaps."""
+        """Return True if the pockets of a chamber are open: filled, or kept open by gaps."""
         return self.settings.gaps or (self.fill is not None and self.fill.ul[chamber] > 0)
 
     @cached_property
@@ -146,12 +126,12 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
 
 def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm]], Mesh]) -> Mesh:
     """The mesh whose balloons hold a fill, round a tube as well as flat."""
-    held = pockets(stack)
-    mesh = make(stack, formed(stack, fill, held))
+    all_pockets = pockets(stack)
+    mesh = make(stack, formed(stack, fill, all_pockets))
     if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
         return mesh
     # Bent round the tube balloons hold a little more than flat.
-    given, sizes = dict(fill.ul), stack.plane.areas()
+    amounts, sizes = dict(fill.ul), stack.plane.areas()
     for _ in range(ROUNDS):
         for chamber in stack.laminate.chambers:
             name = chamber.name
@@ -159,9 +139,9 @@ def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm
                 films = stack.voids[name].in_films.items() if stack.is_thick else ()
                 bores = sum(sizes[cells].sum() * stack.plies[k].thickness for k, cells in films)
                 balloons = stack.laminate.balloons * len(chamber.centres)
-                found = (mesh.cavity(name)[0].volume - bores) / balloons
-                given[name] *= fill.ul[name] / found
-        mesh = make(stack, formed(stack, Fill(given), held))
+                volume = (mesh.cavity(name)[0].volume - bores) / balloons
+                amounts[name] *= fill.ul[name] / volume
+        mesh = make(stack, formed(stack, Fill(amounts), all_pockets))
     return mesh
 
 
@@ -182,14 +162,14 @@ def write_conforming(
     meshes: ConformingMeshes,
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
-    formats: Collection[str] = FORMATS,
+    formats: Collection[str] = CONFORMING_ENDINGS,
 ) -> list[MeshFile]:
     """Write ``mesh/volume.*``, ``mesh/shell.*``, and of open pockets ``mesh/skin.*`` and
     ``mesh/cavity_<chamber>_conforming.*``.
 
     ``folder`` is the output folder, ``formats`` the file endings wanted. Models of a part by
     symmetry have no closed cavities: their cavity walls are face sets of the meshes. ``progress``
-    is told how many of how many files are done.
+    is called with the numbers of files done and of all files.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in formats]
@@ -208,29 +188,99 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
     kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
         size = meshes.statistics[mesh.name]["volume_mm3"]
-        for suffix, write in MESH_WRITERS.items():
-            file = MeshFile(f"mesh/{kind}.{suffix}", kind, None, fill, size, len(mesh.cells))
-            yield file, partial(write, mesh)
+        for row in MESH_FORMATS:
+            if row.elements:
+                name = f"mesh/{kind}.{row.ending}"
+                file = MeshFile(name, kind, None, fill, size, len(mesh.cells))
+                yield file, partial(row.elements, mesh)
     mesh = meshes.volume
     if meshes.has_air and mesh.cavities:
         outer = skin_surface(mesh)
-        skin_file = MeshFile("", "skin", None, fill, outer.volume, len(outer.faces))
-        for suffix, write_surface in SURFACE_WRITERS.items():
-            yield replace(skin_file, file=f"mesh/skin.{suffix}"), partial(write_surface, outer)
+        for row in MESH_FORMATS:
+            if row.surface:
+                name = f"mesh/skin.{row.ending}"
+                file = MeshFile(name, "skin", None, fill, outer.volume, len(outer.faces))
+                yield file, partial(row.surface, outer)
     for chamber in mesh.cavities:
         # Films that lie on each other enclose nothing: such a surface has no inside.
         if not meshes.holds_air(chamber):
             continue
         surface, _ = mesh.cavity(chamber)
-        described = MeshFile(
-            f"mesh/cavity_{chamber}_conforming.vtu",
-            "cavity",
-            chamber,
-            fill,
-            surface.volume,
-            len(surface.faces),
+        for row in MESH_FORMATS:
+            name = f"mesh/cavity_{chamber}_conforming.{row.ending}"
+            file = MeshFile(name, "cavity", chamber, fill, surface.volume, len(surface.faces))
+            if row.cavity:
+                yield file, partial(row.cavity, mesh, chamber)
+            elif row.surface:
+                yield file, partial(row.surface, surface)
+
+
+# Size and quality of a mesh.
+
+
+class Statistics(TypedDict):
+    """Size and quality of a mesh. Aspect is longest edge over shortest.
+
+    ``thinnest_film_mm`` is the least thickness of a film that air has lifted.
+    """
+
+    nodes: int
+    elements: int
+    element: str
+    least_scaled_jacobian: float
+    worst_aspect: float
+    volume_mm3: float
+    height_mm: float
+    thinnest_film_mm: float
+
+
+class Thinning(NamedTuple):
+    """By what part films over the pockets are larger than flat, in the mean and at most, and how
+    thin they are there: no film changes its volume.
+    """
+
+    mean: float
+    most: float
+    thinnest_mm: float
+
+
+def thinning(shell: Mesh, flat: Mesh) -> Thinning:
+    """Return the thinning of a shell's films against the same shell when flat."""
+    pockets = np.unique(np.concatenate([faces[:, 0] for faces in shell.face_sets.values()]))
+    thickness = np.zeros(len(shell.cells))
+    for name, value in shell.thickness.items():
+        thickness[shell.cell_sets[name]] = value
+
+    def areas(mesh: Mesh) -> NDArray[np.float64]:
+        slopes = jacobians(mesh.kind, mesh.points, mesh.cells[pockets], integration=True)
+        sizes: NDArray[np.float64] = np.linalg.norm(
+            np.cross(slopes[..., 0], slopes[..., 1]), axis=2
         )
-        yield described, partial(write_cavity_vtu, mesh, chamber)
-        for suffix, write_surface in SURFACE_WRITERS.items():
-            name = f"mesh/cavity_{chamber}_conforming.{suffix}"
-            yield replace(described, file=name), partial(write_surface, surface)
+        return sizes
+
+    raised, before = areas(shell), areas(flat)
+    growth = np.maximum((raised / before).max(axis=1), 1.0)
+    return Thinning(
+        float(raised.sum() / before.sum()) - 1,
+        float(growth.max()) - 1,
+        float((thickness[pockets] / growth).min()),
+    )
+
+
+def mesh_statistics(mesh: Mesh, thinnest_film_mm: float) -> Statistics:
+    """Counts, quality and volume of a mesh; a shell's volume is area x thickness."""
+    sizes = volumes(mesh.kind, mesh.points, mesh.cells)
+    for name, thickness in mesh.thickness.items():
+        sizes[mesh.cell_sets[name]] *= thickness
+    least = scaled_jacobians(mesh.kind, mesh.points, mesh.cells)
+    heights = mesh.points[:, 2]
+    return Statistics(
+        nodes=len(mesh.points),
+        elements=len(mesh.cells),
+        element=mesh.kind,
+        least_scaled_jacobian=float(least.min()),
+        worst_aspect=float(aspects(mesh.kind, mesh.points, mesh.cells).max()),
+        volume_mm3=float(sizes.sum()),
+        height_mm=float(heights.max() - heights.min()),
+        thinnest_film_mm=thinnest_film_mm,
+    )

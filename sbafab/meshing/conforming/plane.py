@@ -1,22 +1,250 @@
-"""One triangulation of the plane for all layers, arcs as arcs."""
+"""One triangulation of the plane for all layers: edges of regions, arcs as arcs, and sizes."""
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.arrangement import Arrangement, by_owner
+from sbafab.geometry.boolean import arranged
+from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
-from sbafab.meshing.conforming.arrangement import Border, Label, arrangement
-from sbafab.meshing.conforming.elements import scaled_jacobians, volumes
-from sbafab.meshing.conforming.extras import MISSING
-from sbafab.meshing.conforming.narrows import narrows
+from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+# The plane cut up by the edges of several regions, arcs as arcs.
+
+
+MISSING = 'conforming meshes need {}; install it with: pip install "sbafab[mesh]"'
+
+Label = tuple[bool, ...]
+"""For each region, whether it covers a cell of the plane."""
+
+CUSP = math.radians(8.0)
+"""Edges that leave a point at less than this angle are joined for as far as they are near."""
+NEAR = 0.03
+"""The part of h within which they are near."""
+COARSE = 0.35
+"""Above this h, in mm, a coarser mesh does not move edges any farther."""
+
+
+@dataclass(frozen=True)
+class Border:
+    """An edge between two cells, and the regions that cover each side of it."""
+
+    edge: Edge
+    left: Label
+    right: Label
+
+    def reversed(self) -> Border:
+        return Border(self.edge.reversed(), self.right, self.left)
+
+
+def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
+    """All edges of the regions, each place once, cut where they meet.
+
+    Where two edges leave a point in one direction (a fillet and the outline it runs into) they
+    are one until they are a small part of ``h`` mm apart, so that no cell ends in a cusp.
+    """
+
+    def labelled(plan: Arrangement) -> list[Border]:
+        sides = [_label(turns, len(regions)) for turns in plan.left]
+        return [
+            Border(piece.edge, left, right)
+            for piece, left, right in zip(plan.pieces, sides[::2], sides[1::2], strict=True)
+            if left != right
+        ]
+
+    borders = arranged([region.edges for region in regions], labelled)
+    return _without_cusps(borders, min(h, COARSE))
+
+
+def _label(turns: int, regions: int) -> Label:
+    return tuple(count > 0 for count in by_owner(turns, regions))
+
+
+def _without_cusps(borders: list[Border], h: float) -> list[Border]:
+    """The borders with every cusp shortened to where its sides are apart."""
+    leaving: defaultdict[Point, list[int]] = defaultdict(list)
+    for number, border in enumerate(borders):
+        leaving[border.edge.start].append(number)
+        leaving[border.edge.end].append(number)
+    shortened: list[Border | None] = list(borders)
+    added: list[Border] = []
+    for corner, numbers in leaving.items():
+        for i, first in enumerate(numbers):
+            for second in numbers[i + 1 :]:
+                a, b = shortened[first], shortened[second]
+                if a is None or b is None or first == second:
+                    continue
+                if not (_ends_at(a, corner) and _ends_at(b, corner)):
+                    continue  # cut short by another cusp at this corner
+                joined = _joined(_from(a, corner), _from(b, corner), h)
+                if joined is not None:
+                    common, shortened[first], bent, shortened[second] = joined
+                    added += [common] if common.left != common.right else []
+                    added.append(bent)
+    return [border for border in shortened if border is not None] + added
+
+
+def _ends_at(border: Border, corner: Point) -> bool:
+    return corner in (border.edge.start, border.edge.end)
+
+
+def _from(border: Border, corner: Point) -> Border:
+    return border if border.edge.start == corner else border.reversed()
+
+
+def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Border | None] | None:
+    """The part that two borders from one corner share, and what is left of both.
+
+    The second one is bent over about ``h`` to start where the first one does.
+    """
+    (ax, ay), (bx, by) = a.edge.direction(a.edge.start), b.edge.direction(b.edge.start)
+    if ax * bx + ay * by <= math.cos(CUSP):
+        return None
+    apart = _parting(a.edge, b.edge, NEAR * h)
+    if apart is None:
+        return None
+    end, b_end = apart
+    # The cusp lies between the two: the common part keeps what is outside both.
+    across = (b_end[0] - end[0]) * -ay + (b_end[1] - end[1]) * ax
+    b_is_left = across > 0
+    common = Border(
+        a.edge.part(a.edge.start, end),
+        b.left if b_is_left else a.left,
+        a.right if b_is_left else b.right,
+    )
+    rest = b.edge.part(b_end, b.edge.end)
+    whole = rest.length < 1.5 * h
+    bent = rest if whole else rest.part(b_end, rest.at(h / rest.length))
+    return (
+        common,
+        replace(a, edge=a.edge.part(end, a.edge.end)),
+        replace(b, edge=edge_from_bulge(end, bent.end, bent.bulge)),
+        None if whole else replace(b, edge=rest.part(bent.end, rest.end)),
+    )
+
+
+def _parting(a: Edge, b: Edge, near: float) -> tuple[Point, Point] | None:
+    """The points, one on each, from which on two edges of one start are ``near`` mm apart.
+
+    None if they already are at the first step, or never are.
+    """
+    steps = 256
+    length = min(a.length, b.length)
+    for step in range(1, steps):
+        along = length * step / steps
+        on_b = b.at(along / b.length)
+        on_a = a.nearest(on_b)
+        if math.dist(on_a, on_b) >= near:
+            return (on_a, on_b) if step > 1 else None
+    return None
+
+
+# The size of triangles along each edge, smaller beside narrow places.
+
+
+ACROSS = 2.0
+"""Triangles across a narrow place."""
+TURN = 0.5
+"""Angle in radians that one side of a triangle may follow an arc: a parabola through three points
+of it then encloses the arc's area to 0.05 %."""
+LEAST = 0.4
+"""Triangles are never made smaller than this part of h."""
+
+
+def narrows(borders: Sequence[Border], h: float) -> list[float]:
+    """For each edge the side in mm of the triangles along it: ``h``, or less where it is needed.
+
+    Straight out from each edge on both sides, the next edge that does not start or end where
+    this one does must be two triangles away; tight arcs have sides of half a radian.
+    """
+    import numpy as np
+    import shapely
+
+    tails, heads, owner = _chords(borders, h / 2)
+    ends = _end_numbers(borders)
+    middles = (tails + heads) / 2
+    along = heads - tails
+    normals = np.column_stack([-along[:, 1], along[:, 0]])
+    normals /= np.hypot(normals[:, 0], normals[:, 1])[:, None]
+    far = normals * ACROSS * h
+    rays = shapely.linestrings(np.stack([middles - far, middles + far], axis=1))
+    chords = shapely.linestrings(np.stack([tails, heads], axis=1))
+    ray, chord = shapely.STRtree(chords).query(rays, predicate="intersects")
+    mine, theirs = ends[owner[ray]], ends[owner[chord]]
+    apart = ~(mine[:, :, None] == theirs[:, None, :]).any(axis=(1, 2))
+    ray, chord = ray[apart], chord[apart]
+    widths = np.full(len(middles), math.inf)
+    reach = _ray_lengths(middles[ray], normals[ray], tails[chord], heads[chord])
+    np.minimum.at(widths, ray, reach)
+    sizes = np.array([_by_bend(border.edge, h) for border in borders])
+    np.minimum.at(sizes, owner, np.maximum(widths / ACROSS, LEAST * h))
+    return [float(size) for size in sizes]
+
+
+def _by_bend(edge: Edge, h: float) -> float:
+    return min(h, TURN * edge.radius) if isinstance(edge, Arc) else h
+
+
+def _chords(
+    borders: Sequence[Border], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """The edges as chords of at most ``step`` mm: tails, heads, and the edge of each."""
+    import numpy as np
+
+    tails, heads, owner = [], [], []
+    for number, border in enumerate(borders):
+        edge = border.edge
+        count = max(2, math.ceil(edge.length / step))
+        stops = [edge.at(i / count) for i in range(count + 1)]
+        tails += stops[:-1]
+        heads += stops[1:]
+        owner += [number] * count
+    return np.array(tails), np.array(heads), np.array(owner, dtype=np.int64)
+
+
+def _end_numbers(borders: Sequence[Border]) -> NDArray[np.int64]:
+    import numpy as np
+
+    numbers: dict[tuple[float, float], int] = {}
+    rows = [
+        [numbers.setdefault(end, len(numbers)) for end in (border.edge.start, border.edge.end)]
+        for border in borders
+    ]
+    return np.array(rows, dtype=np.int64)
+
+
+def _ray_lengths(
+    origins: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    tails: NDArray[np.float64],
+    heads: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Distance in mm from each origin along its normal, to either side, to its chord."""
+    import numpy as np
+
+    a, b = tails - origins, heads - origins
+    side_a = a[:, 0] * normals[:, 1] - a[:, 1] * normals[:, 0]
+    side_b = b[:, 0] * normals[:, 1] - b[:, 1] * normals[:, 0]
+    run = side_a - side_b
+    share = np.divide(side_a, run, out=np.full_like(run, 0.5), where=np.abs(run) > 1e-12)
+    lengths: NDArray[np.float64] = np.abs(
+        np.einsum("ij,ij->i", a + share[:, None] * (b - a), normals)
+    )
+    return lengths
+
+
+# One triangulation of the plane for all layers, arcs as arcs.
+
 
 LEAST_JACOBIAN = 0.05
 """A curved side that leaves its triangle less than this becomes a chord."""
@@ -113,14 +341,14 @@ def _netgen(
         ) from None
     # A copy: Netgen frees its own with the mesh.
     points = np.array(mesh.Coordinates(), dtype=np.float64)
-    found = mesh.Elements2D().NumPy()
+    elements = mesh.Elements2D().NumPy()
     sides = mesh.Elements1D().NumPy()
-    triangles = found["nodes"][:, :3].astype(np.int64) - 1
+    triangles = elements["nodes"][:, :3].astype(np.int64) - 1
     return (
         list(domains),
         points,
         triangles,
-        found["index"].astype(np.int64) - 1,
+        elements["index"].astype(np.int64) - 1,
         np.column_stack([sides["nodes"][:, :2].astype(np.int64) - 1, sides["index"] - 1]),
     )
 
@@ -159,11 +387,11 @@ def _crossings_halved(
                 corners.append([middle if node == old else node for node in triangle])
                 owners.append(owners[number])
             corners[number] = None
-    kept = [number for number, triangle in enumerate(corners) if triangle is not None]
+    remaining = [number for number, triangle in enumerate(corners) if triangle is not None]
     return (
         np.vstack([points, *added]),
-        np.array([corners[number] for number in kept], dtype=np.int64),
-        np.array(owners, dtype=np.int64)[kept],
+        np.array([corners[number] for number in remaining], dtype=np.int64),
+        np.array(owners, dtype=np.int64)[remaining],
     )
 
 
@@ -174,19 +402,19 @@ def _sharp_corners(
     import numpy as np
 
     size = len(points)
-    known = np.sort(sides[:, :2])
-    keys = known[:, 0] * size + known[:, 1]
-    found: set[tuple[int, int]] = set()
+    border_edges = np.sort(sides[:, :2])
+    keys = border_edges[:, 0] * size + border_edges[:, 1]
+    opposite: set[tuple[int, int]] = set()
     for turn in range(3):
         c, a, b = np.roll(triangles, turn, axis=1).T
         u, v = points[a] - points[c], points[b] - points[c]
         cosine = np.sum(u * v, axis=1) / (np.hypot(*u.T) * np.hypot(*v.T))
         sharp = cosine > math.cos(SHARP)
-        for other in (a, b):
-            sharp &= np.isin(np.minimum(c, other) * size + np.maximum(c, other), keys)
+        for end in (a, b):
+            sharp &= np.isin(np.minimum(c, end) * size + np.maximum(c, end), keys)
         across = np.sort(np.column_stack([a, b])[sharp])
-        found |= {(i, j) for i, j in across.tolist()}
-    return found
+        opposite |= {(i, j) for i, j in across.tolist()}
+    return opposite
 
 
 def _tangents_meet(arc: Arc) -> Point:

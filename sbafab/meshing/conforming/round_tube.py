@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.meshing.conforming.bodies import bodies
-from sbafab.meshing.conforming.form import FormedFilm
-from sbafab.meshing.conforming.layup import Layup, Ply
+from sbafab.meshing.conforming.layup import FormedFilm, Layup, Ply, bodies
 from sbafab.meshing.wrap import TubeWrap, tube_wrap
 
 if TYPE_CHECKING:
@@ -62,12 +60,14 @@ def _bodies(
     top = forms[-1].base[:, 2] + stack.plies[-1].thickness
     for body in np.unique(of_centre).tolist():
         nodes = np.flatnonzero(of_node == body)
-        own = [c[0] for c, other in zip(stack.centres, of_centre, strict=True) if other == body]
+        fixed_at = [
+            c[0] for c, owner in zip(stack.centres, of_centre, strict=True) if owner == body
+        ]
         # One body of several stacks, joined by a manifold, goes all round.
         share = 1.0
-        if len(own) == 1:
+        if len(fixed_at) == 1:
             share = min(1.0, stack.laminate.thickness / max(float(top[nodes].max()), 1e-9))
-        yield nodes, sum(own) / len(own), share
+        yield nodes, sum(fixed_at) / len(fixed_at), share
 
 
 def _moved(
@@ -134,10 +134,10 @@ def _check_room(stack: Layup, wrap: TubeWrap, placed: Sequence[FormedFilm]) -> N
             least = wrap.radius + ply.z + (ply.thickness if stack.is_thick else 0.0)
             continue
         covered = np.unique(stack.plane.triangles[ply.cells])
-        for body, own in middles.items():
+        for body, fixed_at in middles.items():
             nodes = covered[of_node[covered] == body]
             x, y, _ = form.base[nodes].T
-            at = (sum(own) / len(own)) / (wrap.radius + wrap.neutral)
+            at = (sum(fixed_at) / len(fixed_at)) / (wrap.radius + wrap.neutral)
             aside = np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - at))))
             room = math.pi / len(middles)
             if len(middles) > 1 and float((aside - room).max() * wrap.radius) > SLACK:

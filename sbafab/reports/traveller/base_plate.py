@@ -1,4 +1,4 @@
-"""The base plate and what goes with it: its holes, its pins, the pad and the release films."""
+"""The base plate and what goes with it: holes, pins, build-up, pad and release films."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from collections import Counter
 from typing import NamedTuple
 
 from sbafab.cutting.fixture import plate_corner
-from sbafab.laminate.base_plate import MAKINGS, most_play
+from sbafab.laminate.base_plate import HOLE_PROCESSES, most_play
 from sbafab.laminate.laminate import Pin
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pieces
-from sbafab.pressing.dowels import PinHole, pin_holes
-from sbafab.pressing.schedule import Schedule, Step
-from sbafab.pressing.words import listed
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.bench import TAPE
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pad_sheets
+from sbafab.pressing.dowels import PinHole, pin_holes, push_out
+from sbafab.pressing.schedule import (
+    Schedule,
+    Step,
+    joined_words,
+)
+from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
 
 MOST_LISTED = 9
@@ -35,7 +37,7 @@ class PlateHole(NamedTuple):
 
 
 class PlatePlace(NamedTuple):
-    """Where a further place has its holes, mm from those of the first."""
+    """A further place of the plate: the shift of its holes from those of the first, mm."""
 
     place: int
     x: float
@@ -43,12 +45,14 @@ class PlatePlace(NamedTuple):
 
 
 def places(work: Work) -> list[PlatePlace]:
-    """All places of the plate but the first."""
+    """Return all places of the plate but the first."""
     return [PlatePlace(n, x, y) for n, (x, y) in enumerate(work.runs.places[1:], 2)]
 
 
 def grid(work: Work) -> str:
-    """The places of a full plate in one sentence, where a list of them is too long to use."""
+    """Return the places of a full plate in one sentence; empty where a list of them is short
+    enough.
+    """
     every = work.runs.places
     if len(every) <= MOST_LISTED:
         return ""
@@ -62,11 +66,11 @@ def grid(work: Work) -> str:
 
 
 def holes(work: Work) -> list[PlateHole]:
-    """Every hole of the plate's first place; films have the diameter ``films`` there."""
+    """Return every hole of the plate's first place; films have the diameter ``films`` there."""
     laminate, press = work.laminate, work.design.press
     platen = press.platen_width, press.platen_length
     corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
-    found = _pin_holes(work.schedule)
+    pins = _pin_holes(work.schedule)
     return [
         PlateHole(
             pin.name,
@@ -75,17 +79,17 @@ def holes(work: Work) -> list[PlateHole]:
             pin.centre[1] - corner_y,
             pin.centre,
             pin.hole,
-            *_sizes(found.get(pin.name)),
+            *_sizes(pins.get(pin.name)),
         )
         for pin in laminate.pins
     ]
 
 
 def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
-    """Depth, push-out hole and pins of a hole, as the table has them."""
+    """Return depth, push-out hole and pins of a hole, as the table has them."""
     if hole is None:
         return "not used", "", ""
-    lengths = listed([f"{length:g}" for length in hole.lengths])
+    lengths = joined_words([f"{length:g}" for length in hole.lengths])
     return f"{hole.depth:g} ± {hole.tolerance:g}", f"{hole.push_out:g}", f"{lengths} mm"
 
 
@@ -95,48 +99,50 @@ def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
 
 
 def plate_notes(work: Work) -> tuple[str, ...]:
-    """How the plate's holes are made, how true, and what the rules count for it."""
+    """Return how the plate's holes are made, how true they are, and what the rules count for it."""
     design = work.design
-    own = design.registration
-    making = MAKINGS[own.plate_made_by]
+    registration = design.registration
+    making = HOLE_PROCESSES[registration.plate_made_by]
     several = len(work.laminate.pins) > 1
     counted = design.pin_error if several else design.lone_pin_error
-    play = most_play(design.thickest_pin, own.plate_made_by)
+    play = most_play(design.thickest_pin, registration.plate_made_by)
     fit = (
         "Bore it 0.005 to 0.01 too narrow and lap it to its own pins, until they go in by hand "
         "without shake; mark which pins are whose"
         if making.is_lapped and several
         else "Ream it H7; choose pins of the pack that go in by hand or with light taps"
     )
-    made = (
+    how = (
         "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
         "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
-        f"stands. {fit}. Take off the burr, no more: it lifts films. The file has nominal edges."
+        f"stands. {fit}. Deburr, no more: a burr lifts films. The file has nominal edges."
     )
     if not several:
-        return made, (
-            "All layers hang on this one pin, so that its place on the plate counts for nothing: a "
-            f"drill press does, marked out to 0.2 mm. The rules count {counted:g} mm for its play."
+        return how, (
+            "All layers register on this one pin, so its place on the plate does not matter: a "
+            "drill press is good enough, marked out to 0.2 mm. The rules count "
+            f"{counted:g} mm for its play."
         )
-    return made, (
+    return how, (
         f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
-        f"that is {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of play "
-        f"in its hole. The rules count {counted:g} mm for both."
+        f"which takes {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of "
+        f"play in its hole. The rules count {counted:g} mm for both."
     )
 
 
 def _underlay_words(work: Work) -> str:
-    """What is said of the underlay where some step has one."""
+    """Return the sentences on the underlay; empty where no step has one."""
     steps = [step.step for step in work.schedule.steps if _has_underlay(step)]
     if not steps:
         return ""
-    which = listed([str(number) for number in steps])
-    thick = say.millimetres(work.design.press.underlay_thickness)
+    which = joined_words([str(number) for number in steps])
+    thick = units.millimetres(work.design.press.underlay_thickness)
+    pins = ", which the pin heights allow for" if work.laminate.pins else ""
     return (
         f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
         f"along its dotted line, lies between plate and release film while the press is closed: "
-        f"{thick} of paper, which the heights of the pins count. As large as the plate, it changes "
-        f"no pressure. Its left and right edge are taped down with {TAPE}, off the films."
+        f"{thick} of paper{pins}. As large as the plate, it does not change the pressure. Its left "
+        f"and right edges are taped down with {TAPE}, off the films."
     )
 
 
@@ -145,56 +151,70 @@ def _has_underlay(step: Step) -> bool:
 
 
 def hot_prints(work: Work) -> int:
-    """Return how often a print of the underlay lies in the closed press, all cycles counted."""
+    """Return the prints of the underlay that lie in the closed press, all cycles counted."""
     return work.runs.count * sum(_has_underlay(step) for step in work.schedule.steps)
 
 
+def prints(work: Work) -> int:
+    """Return the prints of the underlay that are needed: one a hot closing, one for the tray."""
+    return hot_prints(work) + (work.runs.together > 1)
+
+
+def release_films(work: Work) -> int:
+    """Return the release films that all cycles need: two new ones each time the press closes on a
+    step, and two that serve all tacks of a batch of registered sheets.
+    """
+    panel, steps = work.laminate.panel, len(work.schedule.steps)
+    return 2 * work.runs.count * steps if panel is None else 2 * panel.batches * (steps + 1)
+
+
 def build_up_notes(work: Work) -> tuple[str, ...]:
-    """The one build-up of all steps, and what its force means."""
+    """Return the one build-up of all steps, and what its force means."""
     step = work.schedule.steps[-1]
     thick = {item.part: item for item in step.build_up}
     newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    size = say.size(*step.platen_mm)
+    size = units.size(*step.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
     together = work.runs.together
     alone = together * work.laminate.layers[-1].profile.area
-    what = "laminate" if together == 1 else f"{together} laminates"
+    laminates = "laminate" if together == 1 else f"{together} laminates"
+    holes = "has no holes, pins press into it, and it " if work.laminate.pins else ""
     return (
         "Every step has the same build-up, from the lower platen up: base plate "
-        f"({plate.material}, {say.millimetres(plate.thickness_mm)}, {size}, as large as the "
+        f"({plate.material}, {units.millimetres(plate.thickness_mm)}, {size}, as large as the "
         f"platen), release film ({release.material}), {LAMINATE}, release film, press pad "
-        f"({pad.material}, {say.millimetres(pad.thickness_mm)}, as large as the platen), upper "
+        f"({pad.material}, {units.millimetres(pad.thickness_mm)}, as large as the platen), upper "
         f"platen. Nothing rigid lies on the films: no second plate.{_underlay_words(work)}",
         f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
-        f"pad brings it to the films; without it {newtons} on the {what} alone ({alone:.0f} mm²) "
-        f"would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and films is "
-        "not known. The pressures at each step are estimates that no press has confirmed: check "
-        "them once, cold, with pressure-indicating film.",
-        "The pad has no holes: pins press into it. It keeps heat back: films are "
-        "heated from below, through the base plate. Lay up on the plate while it is cold, out of "
-        "the press; it warms with the films on it, and each step counts from when it is hot.",
+        f"pad brings it to the films; without it {newtons} on the {laminates} alone ({alone:.0f} "
+        f"mm²) would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and "
+        "films is not known. The pressures at each step are estimates that no press has confirmed: "
+        "check them once, cold, with pressure-indicating film.",
+        f"The pad {holes}insulates: films are heated from below, through the base plate. Lay up on "
+        "the plate while it is cold, out of the press; it warms with the films on it, and each "
+        "step's clock starts when it is hot.",
     )
 
 
 def build_up_again(work: Work) -> tuple[str, ...]:
-    """The same where another design's page has said it: only what is this design's own."""
+    """Return the build-up in short, where another design's page has given it in full."""
     thick = {item.part: item for item in work.schedule.steps[-1].build_up}
     plate, pad = thick[BASE_PLATE], thick[PAD]
     return (
         "Build-up, force and heating are those of the first Press section, with a press pad of "
-        f"{say.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
-        f"{say.millimetres(plate.thickness_mm)}; what reaches the films stands at each step.",
+        f"{units.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
+        f"{units.millimetres(plate.thickness_mm)}; each step states the pressure on the films.",
     )
 
 
 def items(work: Work) -> list[tuple[str, str, str]]:
-    """Rows of the bill of materials: what, which, how many."""
+    """Return rows of the bill of materials: name, specification, quantity."""
     laminate, plan = work.laminate, work.schedule
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}
-    size = say.size(*first.platen_mm)
+    size = units.size(*first.platen_mm)
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
-    sheets = pieces(pad.thickness_mm)
+    sheets = pad_sheets(pad.thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
     holes = (
         f"; stepped holes from {work.job.fixture} and the hole table"
@@ -207,19 +227,19 @@ def items(work: Work) -> list[tuple[str, str, str]]:
         ),
         (
             "Base plate",
-            f"{plate.material}, {say.millimetres(plate.thickness_mm)}, {size}{holes}",
+            f"{plate.material}, {units.millimetres(plate.thickness_mm)}, {size}{holes}",
             "1",
         ),
         (
             "Release film",
-            f"{release.material}, {say.millimetres(release.thickness_mm)}, {size}; TPE must not "
+            f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; TPE must not "
             "stick to it at press temperature (our advice; the paper names none)",
-            f"{2 * len(plan.steps)}",
+            str(release_films(work)),
         ),
         (
             "Press pad",
-            f"{pad.material}, {say.millimetres(pad.thickness_mm)}{piled}, {size}, for "
-            f"{first.temperature_c:g} °C in lasting use (our advice; the paper names none)",
+            f"{pad.material}, {units.millimetres(pad.thickness_mm)}{piled}, {size}, for "
+            f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
             str(sheets),
         ),
     ]
@@ -236,9 +256,21 @@ def _pin_items(pins: tuple[Pin, ...], plan: Schedule, standard: str) -> list[tup
     return [
         (
             "Dowel pins",
-            f"{standard}, ⌀{say.millimetres(diameter)} m6, {say.millimetres(length)} long; spares "
-            "to choose from",
+            f"{standard}, ⌀{units.millimetres(diameter)} m6, {units.millimetres(length)} long; "
+            "spares to choose from",
             f"{number} + {max(2, number // 2)} spare",
         )
         for (diameter, length), number in sorted(sizes.items())
     ]
+
+
+TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
+
+
+PUNCH_PLAY = 0.1
+"""mm by which the punch is thinner than the push-out hole."""
+
+
+def punch(diameter: float) -> float:
+    """Return the diameter of the punch for pins of a diameter, mm."""
+    return round(push_out(diameter) - PUNCH_PLAY, 2)

@@ -1,22 +1,27 @@
-"""Several copies on one traveller: the press cycles by day, the plate's places, a serial each."""
+"""Several copies on one traveller: the press cycles by day, the plate's places, serials."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.geometry.svg import number, path_data
-from sbafab.pressing.together import Runs, batch_times, most_together, working_days
-from sbafab.pressing.working_days import CUT_SHARE, FINISH_SHARE, Entry
+from sbafab.geometry.region import coord
+from sbafab.pressing.cycles import (
+    CUT_SHARE,
+    FINISH_SHARE,
+    Entry,
+    Runs,
+    batch_times,
+    most_together,
+    working_days,
+)
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.job import Work
+from sbafab.reports.traveller import units
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
 """mm of the page that the platen takes."""
-PLATE = "#f1f1ef"
 
 
 PAUSES = (
@@ -28,7 +33,7 @@ PAUSES = (
 
 @dataclass(frozen=True)
 class PatternRow:
-    """How many of a pattern one place takes, and each kind of cycle."""
+    """The count of a pattern at one place, and in each kind of cycle."""
 
     pattern: str
     material: str
@@ -38,7 +43,7 @@ class PatternRow:
 
 @dataclass(frozen=True)
 class CopyRow:
-    """Where a copy is pressed; all numbers count from 1."""
+    """The cycle and the place in which a copy is pressed; all numbers count from 1."""
 
     copy: int
     cycle: int
@@ -60,11 +65,11 @@ class PlanRow:
 
 @dataclass(frozen=True)
 class BatchPage:
-    """What the page says of a batch. Cycles of one size share a column of the counts."""
+    """The section on a batch. Cycles of one size share a column of the counts."""
 
     at_once: int
     cycles: int
-    said: str
+    summary: str
     why: str
     picture: str
     plan: tuple[PlanRow, ...]
@@ -77,7 +82,7 @@ class BatchPage:
 
 
 def batch_page(work: Work) -> BatchPage | None:
-    """The batch of a design; None for a single copy."""
+    """Return the batch of a design; None for a single copy."""
     runs = work.runs
     if runs.copies == 1:
         return None
@@ -90,7 +95,7 @@ def batch_page(work: Work) -> BatchPage | None:
     return BatchPage(
         runs.together,
         runs.count,
-        _said(work, runs),
+        _summary(work, runs),
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
         f"say how many it pressed at once).{lesser}",
         _picture(work, runs),
@@ -115,27 +120,27 @@ def batch_page(work: Work) -> BatchPage | None:
     )
 
 
-def _said(work: Work, runs: Runs) -> str:
-    times, one = batch_times(runs, work.schedule), work.schedule.total_press_minutes
-    cycles = say.count(runs.count, "press cycle")
+def _summary(work: Work, runs: Runs) -> str:
+    times, single = batch_times(runs, work.schedule), work.schedule.total_press_minutes
+    cycles = units.count(runs.count, "press cycle")
     sizes = ", ".join(str(size) for size in dict.fromkeys(runs.cycles))
     why = f" {work.design.order.why}" if work.design.order.why else ""
     return (
-        f"{runs.copies} copies in {cycles} of {sizes} at once: {say.plain(times.press)} min in the "
-        f"press instead of {say.plain(say.product(runs.copies, one))}.{why}"
+        f"{runs.copies} copies in {cycles} of {sizes} at once: {units.plain(times.press)} min in "
+        f"the press instead of {units.plain(units.product(runs.copies, single))}.{why}"
     )
 
 
 def _plan(work: Work) -> tuple[PlanRow, ...]:
-    """The work of every day, in its order."""
+    """Return the work of every day, in its order."""
     entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
     days = [entry.day for entry in entries]
     return tuple(
         PlanRow(
             entry.day,
             days.count(entry.day) if number == days.index(entry.day) else 0,
-            say.clock(entry.start),
-            say.clock(entry.start + entry.minutes),
+            units.clock(entry.start),
+            units.clock(entry.start + entry.minutes),
             _task(work, entry),
             _copies(entry),
             f"{entry.minutes:.0f}",
@@ -170,59 +175,57 @@ def _plan_basis(work: Work) -> str:
     holds = most_together(work.laminate, platen)
     entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
     pressing = {entry.day for entry in entries if entry.task == "press"}
-    left = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
+    spare = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
     return (
         f"One person, one press, shifts of {hours:g} h (order.shift_hours); a cycle takes no more "
         f"copies than such a shift makes (the plate has room for {holds}), and its press steps end "
         "on the day on which they begin, where they fit into one. The minutes are estimates: "
-        f"{by_hand:g} by hand for each copy, as the paper's total leaves them; that "
-        f"{CUT_SHARE:.0%} of these go to cutting, {FINISH_SHARE:.0%} to the tubes, and the rest to "
-        "the steps by the number of parts that each lays, is ours. Warming and cooling of the "
-        "plate come on top of every press step (blanks in Before the day): the fullest day with a "
-        f"press step has {say.clock(max(0.0, left))} left for them. So do curing and leak tests. "
-        "Write beside the rows what they took."
+        f"{by_hand:g} of handling for each copy, the paper's total less its time in the press; of "
+        f"these {CUT_SHARE:.0%} for cutting, {FINISH_SHARE:.0%} for the tubes and the rest for the "
+        "steps, in proportion to the parts that each lays (ours). Not included: warming and "
+        "cooling the plate in every press step (blanks in Before the day), for which the fullest "
+        f"day with a press step has {units.clock(max(0.0, spare))} left, curing, leak and proof "
+        "tests. Write the actual minutes beside each row."
     )
 
 
 def _identity(work: Work) -> tuple[Action, ...]:
-    """How a laminate is told from the others from one step to the next."""
+    """Return how each laminate is identified from one step to the next."""
     lining = "a drawing of the places above, with their numbers"
     if work.job.underlay is not None:
-        lining = f"a second print of {work.job.underlay}, which has the places' numbers"
+        lining = f"one more print of {work.job.underlay}, which has the places' numbers"
     return (
         Action(
-            "A laminate is known by its cycle and its place; the table below has its copy number. "
-            "Nothing that is pressed carries a label: at the press temperature ink and paper would "
-            "go into the bond."
+            "A laminate is identified by its cycle and its place; the table below gives its copy "
+            "number. Nothing that is pressed carries a label: at the press temperature ink and "
+            "paper would go into the bond."
         ),
         Action(
             f"Line a flat tray with {lining}. After every step take the laminates off the plate "
             "one at a time, each straight to its number in the tray, the same side up. Stacks of "
-            "the same number that are not yet bonded to each other lie on each other with paper "
-            "between."
+            "one number that are not yet bonded lie on each other with paper between."
         ),
         Action(
-            "In the next step each goes back to the place of its number. One that has lost its "
-            "number may be pressed with the others, for all are alike: write “place lost” in its "
-            "row."
+            "In the next step each goes back to the place of its number. One whose number is lost "
+            "may be pressed with the others, as all are equal: write “place lost” in its row."
         ),
         Action(
             "After the last step they stay in the tray until their tubes are fitted. Then put a "
-            "flag of tape with the copy number round a tube, and write the serial number beside it "
-            "in the table."
+            "flag of tape with the copy number round a tube, and write the serial number in the "
+            "table."
         ),
     )
 
 
 def _name(runs: Runs, size: int) -> str:
-    numbers = [n for n, own in enumerate(runs.cycles, 1) if own == size]
+    numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
     if len(numbers) == 1:
         return f"Cycle {numbers[0]} ({size})"
     return f"Cycles {numbers[0]} to {numbers[-1]}, each ({size})"
 
 
 def _picture(work: Work, runs: Runs) -> str:
-    """The places on the base plate, numbered as they are laid."""
+    """Return the places on the base plate, numbered as they are laid."""
     laminate = work.laminate
     plate = whole_plate(laminate, work.schedule.steps[0].platen_mm, runs.places)
     low_x, low_y, high_x, high_y = plate.bounds
@@ -231,13 +234,7 @@ def _picture(work: Work, runs: Runs) -> str:
     at = 1 - scale * low_x, 1 + scale * high_y
     words = f"{runs.together} places on the base plate, from above"
     picture = Picture("batch-plan", scale * wide + 2, scale * high + 8, words)
-    shape = path_data(
-        plate.mapped(lambda p: (at[0] + scale * p[0], at[1] - scale * p[1]), scale, mirror=True)
-    )
-    picture.add(
-        f'<path d="{shape}" fill="{PLATE}" fill-rule="evenodd" stroke="{draw.GREY}" '
-        'stroke-width="0.25"/>'
-    )
+    picture.plate(plate, flat(scale, at))
     widest = max(laminate.layers, key=lambda layer: layer.profile.area)
     box = laminate.bounds
     for place, (x, y) in enumerate(runs.places, 1):
@@ -247,7 +244,9 @@ def _picture(work: Work, runs: Runs) -> str:
         middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
         spot = moved[0] + scale * middle[0], moved[1] - scale * middle[1] + size / 3
         picture.add(label(spot, str(place), size))
-    size_said = f"{number(round(wide, 6))} x {number(round(high, 6))} mm"
-    said = f"base plate and heated area, {size_said}, from above; the cut corner at the back right"
-    picture.add(draw.text((1.0, scale * high + 6), said, size=2.2))
+    size_words = f"{coord(round(wide, 6))} x {coord(round(high, 6))} mm"
+    caption = (
+        f"base plate and heated area, {size_words}, from above; the cut corner at the back right"
+    )
+    picture.add(draw.text((1.0, scale * high + 6), caption, size=2.2))
     return picture.svg()

@@ -1,21 +1,32 @@
-"""What good hands know: one line each where it happens. All of it is ours; the paper gives none."""
+"""Practice at the bench: cutting and laying films, heating the plate, pressure, preparation, tools.
+
+All of it is ours; the paper gives none.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
-from sbafab.design.records import HoldDown
+from sbafab.design.sections import HoldDown
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.heating import Heating
-from sbafab.pressing.schedule import Step
-from sbafab.pressing.words import listed
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.warming import closing_words
+from sbafab.pressing.schedule import (
+    END,
+    MELTING,
+    PATIENCE,
+    START,
+    Heating,
+    HeatPoint,
+    Step,
+    joined_words,
+)
+from sbafab.reports.traveller import base_plate, units
+from sbafab.reports.traveller.base_plate import punch
+from sbafab.reports.traveller.bill import kerf_states
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.underlay import guides
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
@@ -49,11 +60,12 @@ HOLDING: Mapping[HoldDown, str] = {
 SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
 RIM = 10.0
 """mm of film round a registered sheet, by which it is held down."""
-TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 
 
 def before_first_cut() -> list[Action]:
-    """The same of registered sheets, whose parts hang on bridges or lie on the transfer film."""
+    """Return the actions before registered sheets are cut: bridges or the transfer film hold their
+    parts.
+    """
     return [
         Action(WIPE),
         Action(
@@ -68,11 +80,12 @@ def before_first_cut() -> list[Action]:
 
 
 def before_cutting(works: Sequence[Work]) -> list[Action]:
-    """How films come clean and flat under the beam, and what holds their parts once they are cut.
+    """Return the actions before cutting: films come clean and flat under the beam, their parts are
+    held.
 
     None of it was tried, and the actions say so.
     """
-    return [Action(WIPE), *(_held(works, film) for film in _films(works)), Action(AIR)]
+    return [Action(WIPE), *(_holding(works, film) for film in _films(works)), Action(AIR)]
 
 
 def _films(works: Sequence[Work]) -> list[Film]:
@@ -85,8 +98,10 @@ def hold_down(work: Work, film: Film) -> HoldDown:
     return laser.hold_ptfe if film.is_mask else laser.hold_tpe
 
 
-def _held(works: Sequence[Work], film: Film) -> Action:
-    """How one film is held: on sheets of which each part comes free, for nothing bridges it."""
+def _holding(works: Sequence[Work], film: Film) -> Action:
+    """Return the holding of one film on sheets of which each part comes free, as nothing bridges
+    it.
+    """
     count, lightest = 0, math.inf
     for work in works:
         for layers in work.laminate.patterns.values():
@@ -98,7 +113,7 @@ def _held(works: Sequence[Work], film: Film) -> Action:
     weight = ""
     if film.density is not None:
         weight = f", the lightest of {lightest * film.thickness * film.density / 1000:.2g} mg"
-    thin = say.millimetres(film.thickness)
+    thin = units.millimetres(film.thickness)
     how = HOLDING[hold_down(works[0], film)]
     sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
     return Action(
@@ -108,11 +123,11 @@ def _held(works: Sequence[Work], film: Film) -> Action:
 
 
 def after_cutting(works: Sequence[Work]) -> list[Action]:
-    """How parts leave the sheet: clean, and none lost."""
+    """Return the actions by which parts leave the sheet clean, and none is lost."""
     actions = [
         Action(
             "Wipe the soot off both faces of every part with isopropanol, let it dry: soot in a "
-            "bond is a leak."
+            "bond leaks."
         )
     ]
     actions += _threading(works)
@@ -120,15 +135,17 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
     if loose:
         actions.append(
             Action(
-                f"{say.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers on "
-                "an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
+                f"{units.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers "
+                "on an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
             )
         )
     return actions
 
 
 def _threading(works: Sequence[Work]) -> list[Action]:
-    """What the rule pin-fit means at the bench, for the design whose films stretch most."""
+    """Return the trial on the pins that the rule pin-fit asks for; of the design that stretches
+    most.
+    """
     tight = [
         (finding.measured, finding.limit or 0.0, work)
         for work in works
@@ -137,27 +154,27 @@ def _threading(works: Sequence[Work]) -> list[Action]:
     ]
     if not tight:
         return []
-    stretch, allowed, work = max(tight, key=lambda one: one[0])
-    error = say.millimetres(work.design.registration.cutting_error)
+    stretch, allowed, work = max(tight, key=lambda stretched: stretched[0])
+    error = units.millimetres(work.design.registration.cutting_error)
     return [
         Action(
             "Try one part of every pattern on its pins before you lay up. With edges off by "
-            f"{error}, the worst that is reckoned with, a film must stretch by {stretch:.0%} over "
-            f"its pin ({allowed:.0%} is allowed; nobody has tried it), and up to "
-            f"{say.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
+            f"{error}, the worst case, a film must stretch by {stretch:.0%} over its pin "
+            f"({allowed:.0%} is allowed; nobody has tried it), and up to "
+            f"{units.count(most_on_a_pin(work.laminate), 'film')} go on one pin. If one tears or "
             "wrinkles, stop: the designer takes a thinner pin or a wider bore."
         )
     ]
 
 
 def _loose(laminate: Laminate) -> int:
-    """Pieces of masks that fall into several."""
+    """Return the number of pieces of masks that fall into several."""
     pieces = (len(layer.profile.pieces) for layer in laminate.layers if layer.is_mask)
     return sum(count for count in pieces if count > 1)
 
 
 def underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """The printed page below the release film, in steps in which it has a line to lay by.
+    """Return the printed page below the release film, in steps in which it has a line to lay by.
 
     One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
     """
@@ -176,13 +193,14 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     return [
         Action(
             f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
-            f"back right; over it {film}. It has the edges of {listed(patterns)}{eye}."
+            f"back right; over it {film}. The print shows the edges of "
+            f"{joined_words(patterns)}{eye}."
         )
     ]
 
 
 def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action]:
-    """What to do with a mask that has slipped; empty for a step that lays none."""
+    """Return the remedy for a mask that has slipped; empty for a step that lays none."""
     if not any(layer.is_mask for layer in distinct_layers(laminate, adds)):
         return []
     home = "down on its pin" if pinned else "to its edge"
@@ -195,5 +213,324 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
 
 
 def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
-    """When the clock starts, as the plate goes in cold; a box for each of the ``cycles``."""
+    """Return start of the clock, as the plate goes in cold; a box for each of the ``cycles``."""
     return Action(closing_words(step, heating), (), cycles)
+
+
+# Warming of the plate: the time-temperature line and its blanks.
+
+
+MOST_RAISED = 5.0
+"""C by which the platens may be set hotter than the schedule says: ours."""
+
+
+class HeatBlank(NamedTuple):
+    """A point of a step's time-temperature line, in words, with a blank for the time read; ``id``
+    tells that from the others.
+    """
+
+    point: str
+    words: str
+    id: str
+
+
+def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
+    """Return time-temperature line of a step, from the melting point to the end of its clock."""
+    return [
+        HeatBlank(point.point, _heat_words(point, step, heating), f"heat-{step.step}-{number}")
+        for number, point in enumerate(step.time_temperature, 1)
+    ]
+
+
+def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
+    """Return the point so short that three of them fit on one line of the page."""
+    if point.point == END:
+        return f"end ({units.minutes(step.minutes)} later)"
+    name = "melting" if point.point == MELTING else point.point
+    minutes = point.after_minutes
+    after = _constants(point, heating) if minutes is None else units.minutes(minutes)
+    return f"{point.edge_c:g} °C ({name}, {after})"
+
+
+def _constants(point: HeatPoint, heating: Heating) -> str:
+    """Return the time constants to a point of known temperature, in words."""
+    assert point.edge_c is not None
+    return f"{heating.constants_to(point.edge_c):.2f} τ"
+
+
+def note(work: Work) -> str:
+    """Return what the paper states of time, what we add, and the line that all steps share."""
+    heating = work.schedule.heating
+    platens, warms = heating.platen_c, heating.platen_c - heating.start_c
+    points = work.schedule.steps[0].time_temperature
+    [start] = [point for point in points if point.point == START]
+    words = (
+        "Time. The paper gives 135 °C and minutes for each step; it does not say when its clock "
+        "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
+        f"to the plate's edge reads {heating.clock_c:g} °C, not before. A first-order estimate of "
+        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {heating.start_c:g} °C, τ of "
+        f"this bench {units.plain(heating.time_constant_minutes)} min (measured as in Before the "
+        "day). After closing, "
+    )
+    starts = f"the clock starts after {_after(start, heating)}"
+    if heating.melting_c is None:
+        words += f"{starts}; the films' melting point is not known."
+    else:
+        [melting] = [point for point in points if point.point == MELTING]
+        molten = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
+        words += (
+            f"the films' melting point, {heating.melting_c:g} °C, is reached after "
+            f"{_after(melting, heating)}, and {starts}: the films are above it for {molten:.2f} τ "
+            "before the clock starts."
+        )
+    return words + (
+        f" Where the edge does not read {heating.clock_c:g} °C within {PATIENCE:g} τ "
+        f"({_patience(heating)}): do not start the clock. Open the press, set these films aside as "
+        "a sample (how long they were hot is not known) and find the cause as in Before the day."
+    )
+
+
+def _after(point: HeatPoint, heating: Heating) -> str:
+    return f"{_constants(point, heating)} = {units.minutes(point.after_minutes)}"
+
+
+def closing_words(step: Step, heating: Heating) -> str:
+    """Return when the clock of a step starts; one line of the page."""
+    return (
+        f"Close the press. Start the clock, {units.minutes(step.minutes)}, only when the plate's "
+        f"edge reads {heating.clock_c:g} °C (see Time, above)."
+    )
+
+
+def _patience(heating: Heating) -> str:
+    tau = heating.time_constant_minutes
+    return units.minutes(None if tau is None else PATIENCE * tau)
+
+
+def heating_lines(heating: Heating, steps: int) -> Iterator[str]:
+    """Yield how τ is measured, and what to do where the plate's edge stays too cold."""
+    hot, ready = units.temperature(heating.platen_c), units.temperature(heating.clock_c)
+    reach = heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1)
+    yield (
+        "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
+        f"plate at {heating.start_c:g} °C, a thermocouple taped to its edge; close it between "
+        f"platens at {hot} and log the reading every half minute. τ is the time to {reach:.0f} "
+        "°C, 63 % of the way: ________ min. Set press.time_constant to it. Add "
+        f"{heating.constants_to(heating.clock_c):.2f} τ to each of the "
+        f"{units.count(steps, 'press step')}."
+    )
+    yield (
+        f"Edge temperature after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it is "
+        "less, check that the thermocouple reads 100 °C in boiling water (at sea level) and is "
+        "taped down, that both platens reach their set temperature by the same thermocouple, that "
+        "the plate lies flat and that the pad covers it. Then set the platens hotter by the "
+        f"difference, {MOST_RAISED:g} °C at most: ________ °C, and measure again. If more is "
+        "missing, do not press."
+    )
+
+
+# Resolution of the press's gauge and of a pressure-indicating film.
+
+
+class FilmClass(NamedTuple):
+    """A class of pressure-indicating film: its name, its product, and its range in kPa."""
+
+    name: str
+    product: str
+    low: float
+    high: float
+
+
+FILM_CLASSES = (
+    FilmClass("extreme low pressure", "4LW", 50, 200),
+    FilmClass("ultra super low pressure", "LLLW", 200, 600),
+    FilmClass("super low pressure", "LLW", 500, 2500),
+)
+"""Two-sheet films of Fujifilm Prescale, by the ranges that its maker lists as far as we know: the
+list was not opened, so the page has them compared with the box."""
+COLD = "checks the pressure once, cold; compare this range with its box"
+WANTED = 0.05
+"""Share to which a gauge should set the pressure: ours."""
+
+
+def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
+    """Return the least and the largest pressure in kPa that any place of the films gets."""
+    steps = [step for work in works for step in work.schedule.steps]
+    low = min(min(step.film_kpa, step.bond_kpa, step.plate_kpa) for step in steps)
+    return low, max(max(step.edge_kpa, step.film_kpa) for step in steps)
+
+
+def film_classes(low: float, high: float) -> list[FilmClass]:
+    """Return the fewest classes that cover a range in kPa, as far as classes do."""
+    return [film for film in FILM_CLASSES if film.low < high and film.high > low]
+
+
+def film_words(works: Sequence[Work]) -> str:
+    """Return which pressure-indicating film covers what the films get."""
+    low, high = pressure_range(works)
+    classes = film_classes(low, high)
+    names = joined_words(
+        [f"{film.name} ({film.product}, {film.low:g} to {film.high:g} kPa)" for film in classes]
+    )
+    return (
+        f"pressure-indicating film for {low:.0f} to {high:.0f} kPa: Fujifilm Prescale, {names}"
+        if classes
+        else f"pressure-indicating film for {low:.0f} to {high:.0f} kPa"
+    )
+
+
+def notes(work: Work) -> tuple[str, ...]:
+    """Return what a reading of the press's gauge is worth on the platen."""
+    step = work.schedule.steps[0]
+    pound = step.pressure_kpa / step.force_n * units.NEWTONS_PER_POUND
+    finest = 2 * WANTED * step.pressure_kpa / pound
+    return (
+        f"The gauge must read {units.force(step.force_n)}; 1 lbf is {pound:.2g} kPa. Read to half "
+        f"a division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a division "
+        f"every {finest:.0f} lbf ({finest * units.NEWTONS_PER_POUND:.0f} N) or finer; the "
+        "divisions of the paper's press (Carver 5420) are not known to us. With a coarser gauge, "
+        "set the force by a load cell between the platens, cold, and mark the gauge.",
+    )
+
+
+UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
+"""What stands for a time that the paper does not give."""
+
+
+LOUPE = "10x with a scale of 0.1 mm"
+"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
+
+
+class Tool(NamedTuple):
+    """A row of the list of tools."""
+
+    name: str
+    use: str
+
+
+HOLDERS: Mapping[HoldDown, Tool] = {
+    "border": Tool("Smooth card; tape or magnets", "hold thin film flat under the beam"),
+    "carrier": Tool(
+        "Carrier sheet of low tack, silicone adhesive",
+        "holds masks and their parts under the beam: one as large as each sheet",
+    ),
+    "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
+}
+
+
+def before_the_day(works: Sequence[Work]) -> list[Action]:
+    """Return all that must be at hand, cut, dry and measured before the press is switched on."""
+    return [Action(text) for text in _before(works)]
+
+
+def _before(works: Sequence[Work]) -> Iterator[str]:
+    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
+    materials = list(dict.fromkeys(film.material for film in films))
+    nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
+    if nominal:
+        yield (
+            f"Kerf of {joined_words(nominal)} measured and the files generated again; or it is "
+            "accepted that edges are nominal (warning above)."
+        )
+    if any(film.warning for film in films):
+        yield "Laser's owner permits these films; exhaust tested (warning above)."
+    if any(work.laminate.pins for work in works):
+        yield (
+            "Base plate made and measured (table under Cut): place and depth of each hole; every "
+            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
+            "from below. Where none does, lap the hole. The corner that is cut off is marked."
+        )
+    release = sum(base_plate.release_films(work) for work in works)
+    pads = "the press pad" if len(works) == 1 else "every press pad"
+    yield f"Cut to the size under Materials: {release} release films and {pads}."
+    if any(work.job.underlay is not None for work in works):
+        prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
+        yield (
+            f"Underlay printed at 100 %, {units.count(prints, 'time', 'times')}, the bars of each "
+            "print measured, each cut out along its dotted line."
+        )
+    yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
+    first = works[0].schedule.steps[0]
+    hot = units.temperature(first.temperature_c)
+    yield (
+        f"Pressure of {first.pressure_kpa:g} kPa checked once, cold, in the whole build-up, at "
+        f"{units.force(first.force_n)}, with {film_words(works)}. Division of the press's "
+        "gauge: ________."
+    )
+    yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
+    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
+    yield from heating_lines(works[0].schedule.heating, steps)
+    yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
+    if any(work.laminate.inlets for work in works):
+        yield "Adhesive in date; curing time on its package: ________ h."
+
+
+def tools(works: Sequence[Work]) -> list[Tool]:
+    """Return the tools, without what is used up."""
+    laminates = [work.laminate for work in works]
+    first = works[0].schedule.steps[0]
+    width, length = first.platen_mm
+    rows = [
+        Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
+        Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
+    ]
+    masks = [layer for laminate in laminates for layer in laminate.layers if layer.is_mask]
+    holds = {
+        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
+        for work in works
+        for layer in work.laminate.layers
+    }
+    rows += [tool for hold, tool in HOLDERS.items() if hold in holds]
+    if any(len(layer.profile.pieces) > 1 for layer in masks):
+        rows.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))
+    sizes = sorted({pin.diameter for laminate in laminates for pin in laminate.pins})
+    if sizes:
+        diameters = joined_words([f"⌀{units.millimetres(size)}" for size in sizes])
+        thin = joined_words([f"⌀{units.millimetres(punch(size))}" for size in sizes])
+        has_underlay = any(work.job.underlay is not None for work in works)
+        pricked = "release film and underlay" if has_underlay else "the release film"
+        rows += [
+            Tool(
+                f"Drills, flat cutters, reamers H7 {diameters}",
+                "base plate, if you make it yourself",
+            ),
+            Tool("Depth gauge, small hammer", "seat the pins on their shoulders, check heights"),
+            Tool(f"Pin punches {thin}, or shanks of drills", "push the pins out, from below"),
+            Tool("Flat tweezers, pliers", "hold the films down and draw the pins"),
+            Tool("Needle", f"pricks {pricked} over the pins"),
+        ]
+    if any(work.job.underlay is not None for work in works):
+        rows.append(
+            Tool("Knife, steel rule, 100 mm at least", "measure the underlay's bars, cut it out")
+        )
+    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
+    if hands:
+        finest = units.millimetres(min(hand.hand_placement for hand in hands))
+        rows.append(
+            Tool(
+                f"Measuring loupe, {LOUPE}; bright light",
+                f"lay by eye to {finest} and measure the result (sbafab record --offset); the "
+                "unaided eye resolves about 0.1 mm",
+            )
+        )
+    rows += [
+        Tool(
+            f"Heat press, {units.size(width, length)}",
+            f"both platens to {units.temperature(first.temperature_c)}, "
+            f"{units.force(first.force_n)}",
+        ),
+        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
+        Tool(f"{film_words(works)[:1].upper()}{film_words(works)[1:]}", COLD),
+        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
+    ]
+    if any(laminate.inlets for laminate in laminates):
+        ears = "ears, " if any(laminate.registration == "ears" for laminate in laminates) else ""
+        rows += [
+            Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
+            Tool(
+                "Regulator or syringe with a gauge, water or soapy water, eye protection",
+                "leak and proof test",
+            ),
+            Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
+        ]
+    return rows

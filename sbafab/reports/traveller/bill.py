@@ -1,4 +1,4 @@
-"""The bill of materials and the cut list."""
+"""What a job takes: bill of materials, cut list, minutes, and notes on the cut files."""
 
 from __future__ import annotations
 
@@ -6,12 +6,23 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from sbafab.design.kits import tube_name
+from sbafab.cutting.fixture import fixture
+from sbafab.cutting.properties import (
+    COLOURS,
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SEQUENCE,
+    CUT_SHEET,
+    ENGRAVE,
+    REFERENCE,
+)
+from sbafab.design.identity import tube_name
 from sbafab.laminate.laminate import Layer
-from sbafab.reports.features import layer_numbers
-from sbafab.reports.traveller import base_plate, bench
-from sbafab.reports.traveller import quantities as say
+from sbafab.pressing.cycles import batch_times
+from sbafab.reports.drawing import layer_numbers
+from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import thumbnail
 from sbafab.reports.underlay import PAPER, leaves
@@ -27,51 +38,56 @@ class Item:
 
 
 def bill(work: Work) -> list[Item]:
-    """All that must be at hand before the work starts, for all copies."""
+    """Return all that must be at hand before the work starts, for all copies."""
     job, laminate = work.job, work.laminate
     items = [*_films(work)]
     if laminate.inlets:
         number = len(laminate.inlets) * job.copies
-        diameter = say.millimetres(laminate.inlets[0].tube_diameter)
+        diameter = units.millimetres(laminate.inlets[0].tube_diameter)
         tube = tube_name(work.design)
-        items.append(Item("Tube", f"{tube}, outer diameter {diameter}", say.count(number, "piece")))
-        drops = say.count(number, "small drop")
+        items.append(
+            Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"))
+        )
+        drops = units.count(number, "small drop")
         items.append(Item("Adhesive", work.design.inlet.adhesive, drops))
     wrap = work.design.form.wrap
     if wrap is not None:
-        diameter = say.millimetres(wrap.tube_diameter)
-        what = f"to wrap the sheet round, outer diameter {diameter}"
-        items.append(Item("Tube to wrap", what, str(job.copies)))
-        what = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
-        items.append(Item("Adhesive of the wrap", what, "as needed"))
+        diameter = units.millimetres(wrap.tube_diameter)
+        words = f"to wrap the sheet round, outer diameter {diameter}"
+        items.append(Item("Tube to wrap", words, str(job.copies)))
+        words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
+        items.append(Item("Adhesive of the wrap", words, "as needed"))
     items += [Item(*row) for row in base_plate.items(work)]
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
-        what = f"{bench.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
-        items.append(Item("Tape", what, "as needed"))
+        words = (
+            f"{base_plate.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
+        )
+        items.append(Item("Tape", words, "as needed"))
     if work.runs.together > 1:
-        what = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
-        items.append(Item("Tray", what, "1"))
+        words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
+        items.append(Item("Tray", words, "1"))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
 
 def _underlay(work: Work, path: str) -> Item:
-    """The pages to print, and on what paper where A4 and Letter are too small."""
+    """Return the pages to print, and the paper where A4 and Letter are too small."""
     spread = leaves(work.laminate, work.runs.places, work.schedule.steps[0].platen_mm)
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
     if (width, height) != PAPER:
-        paper = f"at least {say.size(math.ceil(width), math.ceil(height))}"
+        paper = f"at least {units.size(math.ceil(width), math.ceil(height))}"
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
-    thick = say.millimetres(work.design.press.underlay_thickness)
-    closings = base_plate.hot_prints(work)
-    what = (
+    thick = units.millimetres(work.design.press.underlay_thickness)
+    closings, prints = base_plate.hot_prints(work), base_plate.prints(work)
+    tray = ", and one to line the tray" if prints > closings else ""
+    words = (
         f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
-        f"mm{join}. A fresh print for each of {say.count(closings, 'time', 'times')} that it lies "
-        "in the closed press: paper dries there and shrinks"
+        f"mm{join}. A fresh print for each of {units.count(closings, 'closing')} of the press, as "
+        f"paper dries there and shrinks{tray}"
     )
-    return Item("Underlay", what, say.count(len(spread) * closings, "page"))
+    return Item("Underlay", words, units.count(len(spread) * prints, "page"))
 
 
 def _films(work: Work) -> list[Item]:
@@ -80,13 +96,13 @@ def _films(work: Work) -> list[Item]:
         layers = [layer for layer in work.laminate.layers if layer.film == film]
         area = sum(layer.profile.area for layer in layers) * work.job.copies / 100
         sheets = [sheet for sheet in work.sheets if sheet.material == film.material]
-        sizes = Counter(say.size(sheet.width, sheet.length) for sheet in sheets)
-        needed = [f"{say.count(number, 'sheet')} {size}" for size, number in sizes.items()]
+        sizes = Counter(units.size(sheet.width, sheet.length) for sheet in sheets)
+        needed = [f"{units.count(number, 'sheet')} {size}" for size, number in sizes.items()]
         items.append(
             Item(
                 f"{film.material} film",
-                f"{film.product}, {say.millimetres(film.thickness)} thick; {area:.1f} cm² of parts "
-                f"in {len(layers) * work.job.copies} layers",
+                f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of "
+                f"parts in {len(layers) * work.job.copies} layers",
                 ", ".join(needed) or "see the cut files",
             )
         )
@@ -110,7 +126,7 @@ class Cut:
 
 
 def cut_list(work: Work) -> list[Cut]:
-    """Every pattern once, in the order of its first layer."""
+    """Return every pattern once, in the order of its first layer."""
     return [_cut(work, layers) for layers in work.laminate.patterns.values()]
 
 
@@ -138,9 +154,9 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
 
 
 def _cut_length(work: Work, layer: Layer) -> float:
-    """Length of the beam's path round a layer, mm; of its edges where it is on no sheet.
+    """Return the length of the beam's path round a layer, mm; of its edges where it is on no sheet.
 
-    Pieces that are alike are one part of a nest, cut as many times more.
+    Equal pieces are one part of a nest, cut as many times more.
     """
     profile = layer.profile
     parts = {
@@ -156,20 +172,20 @@ def _cut_length(work: Work, layer: Layer) -> float:
 
 
 def _spares(work: Work, layers: Sequence[Layer]) -> int:
-    """How many more of a pattern lie on the sheets than its layers take."""
-    own = work.design.name, layers[0].pattern
+    """Return the number of a pattern's spares on the sheets."""
+    key = work.design.name, layers[0].pattern
     cut = sum(
         count
         for sheet in work.sheets
         for design, pattern, count in sheet.counts
-        if (design, pattern) == own
+        if (design, pattern) == key
     )
     needed = len(layers) * work.job.copies
     return max(0, cut // len(layers[0].profile.pieces) - needed)
 
 
 def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:
-    """For every material: what the cut files say of its kerf, and whether it was measured."""
+    """Return each material, the words on the kerf of its cut files, and True if it was measured."""
     states = []
     for material in materials:
         kerf = job.kerf.get(material)
@@ -181,3 +197,206 @@ def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool
         else:
             states.append((material, f"compensated for {kerf:g} mm", True))
     return states
+
+
+# Notes on opening the cut files in other programs: only what was tried or is documented.
+#
+# Tried with sheets and layer files of this program: LibreCAD 2.2.0 (``librecad dxf2pdf``) and
+# Inkscape 1.2.2 (its DXF import, and ``--query-all``). LightBurn: from its documentation only.
+
+
+COLOUR_NAMES = {1: "red", 5: "blue", 6: "magenta", 7: "black or white", 8: "grey"}
+MEANINGS = {
+    ENGRAVE: "the sheet's label, in its border; leave it out if you like",
+    CUT_INNER: "holes: cut these before the outlines",
+    CUT_OUTER: "outlines of the parts",
+    CUT_SHEET: "cuts the used sheet off a roll; last",
+    REFERENCE: "sheet frame or datum cross; never cut",
+}
+
+
+class CutLayer(NamedTuple):
+    """A row of the table of cut layers."""
+
+    order: str
+    name: str
+    colour: str
+    meaning: str
+
+
+class Program(NamedTuple):
+    """A laser or drawing program, what is known of it, and how (``evidence``)."""
+
+    name: str
+    evidence: str
+    notes: tuple[str, ...]
+
+
+PROGRAMS = (
+    Program(
+        "LightBurn",
+        "from its documentation, not tried",
+        (
+            "Open the .lbrn2 beside each DXF: layers, order and a frame without output are set, "
+            "all powers are 0. Set power and speed of each layer. The rest of this list is only "
+            "for the DXF.",
+            "Each colour becomes a layer of its own in the Cuts / Layers window. By default layers "
+            "run in the order of that window, from the top: bring them into the order above.",
+            "Switch Output off for the layer of the grey REFERENCE lines.",
+            "Set every cut layer to Line mode, Kerf Offset 0.",
+            "Optimization Settings count only while Optimize Cut Path is on: keep Order by Layer "
+            "first and Cut inner shapes first on, as they are by default.",
+            "We do not know which units it assumes for a DXF: compare the overall size above "
+            "before you cut.",
+            "Run Preview and watch the order of the holes and outlines.",
+        ),
+    ),
+    Program(
+        "Inkscape",
+        "tried: 1.2.2",
+        (
+            "Use File > Open, not Import: only then the layers keep their names (its own help says "
+            "so). In the DXF dialog choose “Read from file”, or “Manual scale” with 1.0: the size "
+            "is then right.",
+            "Do not choose “Automatic scaling to size A4”: it enlarges the drawing.",
+            "Circles and arcs stay true arcs, layer colours are kept.",
+            "Sizes include the width of the line unless its preferences are set to the geometric "
+            "bounding box.",
+        ),
+    ),
+    Program(
+        "LibreCAD",
+        "tried: 2.2.0",
+        (
+            "Opens the DXF correctly: layers, colours and arcs are right. Printed at scale 1:1 the "
+            "parts have their size, to 0.1 mm.",
+            "REFERENCE does not print: no frame on paper is right.",
+        ),
+    ),
+)
+
+
+def cut_layers() -> list[CutLayer]:
+    """Return the layers in cutting order, what is not cut last."""
+    numbered = {name: str(place) for place, name in enumerate(CUT_SEQUENCE, 1)}
+    return [
+        CutLayer(
+            numbered.get(name, "not cut"),
+            name,
+            f"{COLOUR_NAMES[COLOURS[name]]} ({COLOURS[name]})",
+            MEANINGS[name],
+        )
+        for name in (*CUT_SEQUENCE, REFERENCE)
+    ]
+
+
+def expected_sizes(work: Work) -> list[tuple[str, str]]:
+    """Return file and overall size after opening, for every sheet and the base plate."""
+    expected = [(sheet.path, units.size(sheet.width, sheet.length)) for sheet in work.sheets]
+    press = work.design.press
+    platen = press.platen_width, press.platen_length
+    plate = fixture(work.laminate, platen, work.runs.places)
+    if work.job.fixture is not None and plate is not None:
+        low_x, low_y, high_x, high_y = plate.bounds
+        expected.append((work.job.fixture, units.size(high_x - low_x, high_y - low_y)))
+    return expected
+
+
+def kerf_notes(work: Work) -> list[str]:
+    """Return the kerf setting of the laser's program, a line for each material."""
+    materials = list(dict.fromkeys(layer.film.material for layer in work.laminate.layers))
+    return [
+        f"{material}: {words}. "
+        + (
+            "The paths are compensated already: set kerf offset 0 in the laser's program."
+            if measured
+            else "No offset is known: set kerf offset 0 in the laser's program, and calibrate."
+        )
+        for material, words, measured in kerf_states(work.job, materials)
+    ]
+
+
+# Times, next to the paper's.
+
+
+PAPER_MINUTES = 105.0
+"""1.75 h for a 1-DoF or 3-DoF actuator (paper Sec. 4)."""
+
+
+class Time(NamedTuple):
+    """A row of the time table: the work, its estimate, and what that is made of."""
+
+    what: str
+    took: str
+    made_of: str
+
+
+def laser_minutes(work: Work) -> float:
+    """Return the minutes of laser of all sheets."""
+    return sum(sheet.minutes for sheet in work.sheets)
+
+
+def laser_basis(work: Work) -> str:
+    """Return lengths and speeds that the estimate of the laser's time assumes."""
+    laser = work.design.laser
+    cut = sum(sheet.cut_length for sheet in work.sheets)
+    travel = sum(sheet.travel for sheet in work.sheets)
+    contours = sum(sheet.contours for sheet in work.sheets)
+    return (
+        f"{cut / 1000:.2f} m of cut at {laser.cut_speed:g} mm/s, {travel / 1000:.2f} m of travel "
+        f"at {laser.travel_speed:g} mm/s, {units.count(contours, 'contour')} with "
+        f"{laser.pierce_seconds:g} s each to pierce, without labels; not a setting of your machine"
+    )
+
+
+def _batch(work: Work) -> list[Time]:
+    """Return the row of the whole batch; empty for a single copy."""
+    runs, plan = work.runs, work.schedule
+    if runs.copies == 1:
+        return []
+    took = batch_times(runs, plan)
+    made_of = (
+        f"{units.count(runs.count, 'press cycle')} of {units.plain(plan.total_press_minutes)} min, "
+        f"{runs.copies} times the handling below, one after the other; copies pressed singly: "
+        f"{units.minutes(units.product(runs.copies, plan.estimated_build_minutes))}"
+    )
+    row = f"All {runs.copies} copies"
+    return [Time(row, units.whole_minutes(took.total), made_of)]
+
+
+def times(work: Work) -> list[Time]:
+    """Return the rows of the time table, the total last but for the paper's."""
+    plan = work.schedule
+    handling = plan.hands_minutes
+    steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
+    rows = [
+        Time("In the press", units.minutes(plan.total_press_minutes), f"{steps} min, one actuator")
+    ]
+    if work.sheets:
+        copies = units.count(work.job.copies, "copy", "copies")
+        rows.append(
+            Time(
+                "Laser (within handling)",
+                units.minutes(laser_minutes(work)),
+                f"{laser_basis(work)}; all sheets, {copies}",
+            )
+        )
+    return [
+        *rows,
+        *_batch(work),
+        Time(
+            "Handling",
+            units.minutes(handling),
+            "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, assumed "
+            "equal for every design",
+        ),
+        Time(
+            "Total, one actuator",
+            units.whole_minutes(plan.estimated_build_minutes),
+            "not included: heating the press, warming the plate before each clock starts, curing "
+            "the adhesive, leak and proof tests",
+        ),
+        Time(
+            "The paper", f"{PAPER_MINUTES:g} min = {units.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"
+        ),
+    ]

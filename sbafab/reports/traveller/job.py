@@ -1,4 +1,4 @@
-"""What a traveller is written from, beside the pictures that it draws itself."""
+"""The order behind a traveller, what its pages are made from, and a box to tick."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
-from sbafab.geometry.beam import Kerf
+from sbafab.geometry.offset import Kerf
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.together import Runs, design_runs
 from sbafab.rules.finding import Finding
 
 
@@ -41,7 +41,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """All that the pages are made from."""
+    """A design with its laminate, schedule, sheets and order: all that its pages are made from."""
 
     design: Design
     laminate: Laminate
@@ -51,5 +51,14 @@ class Work:
 
     @property
     def runs(self) -> Runs:
-        """How all copies are pressed."""
+        """The press runs of all copies."""
         return design_runs(self.design, self.laminate, self.job.copies)
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
+
+    text: str
+    layers: tuple[int, ...] = ()
+    ticks: tuple[str, ...] = ()

@@ -6,8 +6,10 @@ date of a print is written by the browser that prints.
 
 from __future__ import annotations
 
+import sys
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -15,43 +17,28 @@ from string import ascii_uppercase
 from typing import TYPE_CHECKING, Any
 
 from sbafab.cutting.sheets import SheetFile
-from sbafab.design.kits import cited, departures, tube_name
+from sbafab.design.identity import cited, departures, tube_name
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.models.sizes import sizes
-from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.words import listed
+from sbafab.models.formulas import sizes
+from sbafab.pressing.schedule import Schedule, joined_words
 from sbafab.reports.canvas import COLOURS, KEY
-from sbafab.reports.drawing import TIMES
-from sbafab.reports.features import balloons, layer_numbers
-from sbafab.reports.traveller import (
-    acceptance,
-    base_plate,
-    bench,
-    bill,
-    gauges,
-    notes,
-    panel,
-    process,
-    times,
-    warming,
-)
-from sbafab.reports.traveller import quantities as say
+from sbafab.reports.drawing import TIMES, balloons, layer_numbers
+from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
 from sbafab.reports.traveller.batch import batch_page
-from sbafab.reports.traveller.cautions import cautions, for_the_designer
-from sbafab.reports.traveller.code import code_svg, record_text
-from sbafab.reports.traveller.day import before_the_day, tools
+from sbafab.reports.traveller.bench import before_the_day, tools
+from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.layup import Round, rounds
-from sbafab.reports.traveller.shapes import definitions, pattern_regions
-from sbafab.reports.traveller.sheet_map import marked, part_regions, rows_said, sheet_map
-from sbafab.reports.traveller.taking_down import order_of
-from sbafab.reports.traveller.wrapping import wrapping
+from sbafab.reports.traveller.process import order_of, wrapping
+from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
+from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
+from sbafab.rules.finding import Finding
+from sbafab.rules.limits import CHECKED_AGAINST
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import BytecodeCache, Environment
 
 HERE = Path(__file__).parent
 TEMPLATE = "traveller.html.j2"
@@ -67,16 +54,14 @@ def traveller_html(
     sheets: Sequence[SheetFile],
     job: Job,
 ) -> str:
-    """The whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
+    """Return the whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
     work = Work(design, laminate, schedule, sheets, job)
     return environment().get_template(TEMPLATE).render(context(work))
 
 
 def environment() -> Environment:
-    """The templates of this folder; what they are not given is an error."""
+    """Return the environment of this folder's templates; an undefined name is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    from sbafab.reports.traveller.compiled import compiled_beside
 
     return Environment(
         loader=FileSystemLoader(HERE),
@@ -90,10 +75,10 @@ def environment() -> Environment:
 
 
 def context(work: Work) -> dict[str, Any]:
-    """What the templates say of one design."""
+    """Return the values that the templates print of one design."""
     laminate, job = work.laminate, work.job
     text = record_text(laminate.name, job.design_sha256, job.generator)
-    others = _others(work)
+    other_marks = _other_marks(work)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),
         "work": work,
@@ -116,13 +101,13 @@ def context(work: Work) -> dict[str, Any]:
         "bill": bill.bill(work),
         "before_the_day": before_the_day([work]),
         "tools": tools([work]),
-        "others": others,
-        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **others}),
+        "others": other_marks,
+        "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **other_marks}),
         "cuts": bill.cut_list(work),
-        "laser_minutes": times.laser_minutes(work),
-        "laser_basis": times.laser_basis(work),
+        "laser_minutes": bill.laser_minutes(work),
+        "laser_basis": bill.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": (*base_plate.build_up_notes(work), *gauges.notes(work), warming.note(work)),
+        "force_notes": (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work)),
         "plate_holes": base_plate.holes(work),
         "plate_notes": base_plate.plate_notes(work),
         "plate_places": base_plate.places(work),
@@ -134,31 +119,35 @@ def context(work: Work) -> dict[str, Any]:
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
         "wrapping": wrapping(work),
-        "leak_words": acceptance.leak_words(work),
-        "proof_words": acceptance.proof_words(work),
-        "times": times.times(work),
-        "kerf_notes": notes.kerf_notes(work),
-        "expected_sizes": notes.expected_sizes(work),
+        "leak_words": process.leak_words(work),
+        "proof_words": process.proof_words(work),
+        "times": bill.times(work),
+        "kerf_notes": bill.kerf_notes(work),
+        "expected_sizes": bill.expected_sizes(work),
         **panel.chapter(work),
     }
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:
-    """What the solid's colours are, each with its colour."""
-    own = ", ".join(dict.fromkeys(film.material for film in films(laminate) if not film.is_mask))
-    said = [(own if tone == "film" else words, tone) for tone, words in KEY]
-    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in said]
+    """Return the words and the hex code of each colour of the solid."""
+    structural = ", ".join(
+        dict.fromkeys(film.material for film in films(laminate) if not film.is_mask)
+    )
+    tones = [(structural if tone == "film" else words, tone) for tone, words in KEY]
+    return [(words, f"#{bytes(COLOURS[tone]).hex()}") for words, tone in tones]
 
 
-def _others(work: Work) -> dict[str, str]:
-    """A letter for each other design that lies on the same sheets, so that labels stay short."""
+def _other_marks(work: Work) -> dict[str, str]:
+    """Return a letter for each other design that lies on the same sheets, so that labels stay
+    short.
+    """
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
 
 
 def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
-    """What every page has: its style, and what stands at the head and foot of each sheet."""
+    """Return the values that every page prints: style, head and foot."""
     short = sha256[:SHORT_HASH]
     return {
         "title": title,
@@ -166,8 +155,8 @@ def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
         "generator": generator,
         "running_head": css_string(f"{title}  {short}"),
         "style": (HERE / STYLE).read_text(encoding="utf-8"),
-        "say": say,
-        "notes": notes,
+        "units": units,
+        "notes": bill,
     }
 
 
@@ -184,10 +173,10 @@ def _facts(work: Work) -> list[tuple[str, str]]:
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
     names = {
         "thickness": "Thickness, flat (nominal films)",
-        "width": f"Width of all that is cut, with {extras}",
-        "length": f"Length of all that is cut, with {extras}",
-        "outline_diameter": f"Films without {extras} fit a circle round the axis of",
-        "overall_diameter": f"All that is cut, with {extras}, fits one of",
+        "width": f"Overall width, with {extras}",
+        "length": f"Overall length, with {extras}",
+        "outline_diameter": f"Diameter round the axis, without {extras}",
+        "overall_diameter": f"Diameter round the axis, with {extras}",
         "pitch": "Pitch round the tube",
         "deflated_diameter": "Diameter on its tube, deflated",
         "reached_diameter": "Diameter on its tube, inflated (computed)",
@@ -199,7 +188,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
         ("Chambers", str(len(laminate.chambers))),
         ("Layers", f"{len(laminate.layers)} of {len(laminate.patterns)} patterns"),
         *(
-            (names.get(name, name.replace("_", " ")), say.millimetres(value))
+            (names.get(name, name.replace("_", " ")), units.millimetres(value))
             for name, value in sizes(work.design, laminate).items()
         ),
         ("Inlets", str(len(laminate.inlets))),
@@ -209,20 +198,20 @@ def _facts(work: Work) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A sheet as it stands in the cut list; ``said`` tells how a long one is drawn."""
+    """A sheet as it stands in the cut list; ``note`` tells how a long one is drawn."""
 
     sheet: SheetFile
     picture: str
     counts: str
     size: str
     minutes: str
-    said: str
+    note: str
 
 
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
 ) -> list[SheetRow]:
-    """The film sheets of a design; patterns go with the mark or the name of theirs."""
+    """Return the film sheets of a design; patterns go with the mark or the name of theirs."""
     films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
@@ -235,9 +224,9 @@ def sheet_rows(
                 sheet,
                 sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
-                say.size(sheet.width, sheet.length),
-                say.minutes(sheet.minutes),
-                rows_said(sheet),
+                units.size(sheet.width, sheet.length),
+                units.minutes(sheet.minutes),
+                picture_note(sheet),
             )
         )
     return rows
@@ -256,15 +245,15 @@ class LayUpRow:
 
 
 def _lay_up(work: Work) -> list[LayUpRow]:
-    """The layers bottom to top, rounds named once."""
-    held = {
-        index: listed([pin.name for pin in pins]) if pins else BY_HAND
+    """Return the layers bottom to top, rounds once."""
+    pins_of = {
+        index: joined_words([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
-    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(held, turn)]
+    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(pins_of, turn)]
 
 
-def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
+def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
     rows = []
     for place, layers in enumerate(turn.places):
         repeat = "once"
@@ -277,7 +266,7 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
                 layer_numbers([layer.index for layer in layers]),
                 layers[0],
                 len(layers[0].profile.pieces),
-                "; ".join(dict.fromkeys(held[layer.index] for layer in layers)),
+                "; ".join(dict.fromkeys(pins_of[layer.index] for layer in layers)),
                 repeat,
                 len(turn.places) if place == 0 else 0,
             )
@@ -286,5 +275,128 @@ def _round_rows(held: Mapping[int, str], turn: Round) -> list[LayUpRow]:
 
 
 def css_string(words: str) -> str:
-    """Words as a CSS string that can neither end early nor leave the style element."""
+    """Return words as a CSS string that can neither end early nor leave the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
+
+
+# Compiled templates, cached beside them as Python caches its modules.
+
+
+def compiled_beside(folder: Path) -> BytecodeCache:
+    """Return the cache of compiled templates in ``__pycache__``, filled where Python may write.
+
+    Each template is kept with its source's checksum and compiled again when that changes. Where the
+    folder cannot be read or written, nothing is kept.
+    """
+    from jinja2 import FileSystemBytecodeCache
+    from jinja2.bccache import Bucket
+
+    class Compiled(FileSystemBytecodeCache):
+        def load_bytecode(self, bucket: Bucket) -> None:
+            with suppress(OSError):
+                super().load_bytecode(bucket)
+
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            if sys.dont_write_bytecode:
+                return
+            with suppress(OSError):
+                place.mkdir(exist_ok=True)
+                super().dump_bytecode(bucket)
+
+    place = folder / "__pycache__"
+    return Compiled(str(place), f"%s.{sys.implementation.cache_tag}.jinja")
+
+
+# The QR code: which design this sheet of paper belongs to.
+
+
+QUIET = 4
+"""Modules left white round the code, as its standard asks."""
+
+
+def code_text(name: str, design_sha256: str, generator: str) -> str:
+    """Return the code's plain text, a line each: name, checksum, generator; it links to nothing."""
+    return f"{name}\nsha256 {design_sha256}\n{generator}"
+
+
+def record_text(name: str, design_sha256: str, generator: str) -> str:
+    """Return the code's text for a design that is built, with the command that finds its build
+    records.
+    """
+    text = code_text(name, design_sha256, generator)
+    return f"{text}\nsbafab record --find {design_sha256[:12]}"
+
+
+def code_svg(text: str) -> str:
+    """Return the text as a QR code, inline SVG without a size of its own."""
+    import segno
+
+    code = segno.make(text, error="m", micro=False)
+    return code.svg_inline(border=QUIET, omitsize=True, light="white", svgclass="code")
+
+
+# Warnings; the rules' findings have their own page.
+
+
+def cautions(work: Work) -> list[tuple[str, str]]:
+    """Return every warning once: a short title and its text."""
+    return list(dict.fromkeys(_all(work)))
+
+
+def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
+    """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
+    any.
+    """
+    rules = {finding.rule for finding in findings if finding.verdict == "warn"}
+    if not rules:
+        return []
+    words = (
+        f"{units.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. "
+        "findings.html gives places and remedies; at the press follow the steps."
+    )
+    return [("For the designer", words)]
+
+
+def _all(work: Work) -> Iterator[tuple[str, str]]:
+    job, schedule = work.job, work.schedule
+    films = list(dict.fromkeys(layer.film for layer in work.laminate.layers))
+    materials = [film.material for film in films]
+    for film in films:
+        if film.warning:
+            title = "PTFE fumes" if film.material == "PTFE" else f"Cutting {film.material}"
+            yield title, film.warning
+    if job.waived:
+        yield (
+            "Waived rules",
+            f"made although the design waives {', '.join(job.waived)}. Findings: "
+            + " / ".join(f.message for f in job.findings if f.by_user),
+        )
+    if job.lowered:
+        yield (
+            "Lowered limits",
+            f"{CHECKED_AGAINST}{', '.join(job.lowered)}. A pass here may be a failure at the usual "
+            "limits: ask the designer whether this is intended.",
+        )
+    nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
+    if nominal:
+        yield (
+            f"{' and '.join(nominal)} kerf uncalibrated",
+            "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
+            "Cut, measure and compute a calibration piece (“sbafab new coupon”, “sbafab kerf”), "
+            "and generate again.",
+        )
+    if job.underlay is not None:
+        yield (
+            "Toner on the underlay",
+            "laser toner softens in the press and may mark the release film or stick to it: print "
+            "with ink if you can. Each print goes into the press once: paper dries there and "
+            "shrinks. Not tried by us.",
+        )
+    for warning in schedule.warnings:
+        if not warning.startswith(("made although", CHECKED_AGAINST)) and not _is_in_step(warning):
+            yield "Press schedule", warning
+
+
+def _is_in_step(warning: str) -> bool:
+    """Return True if the press step itself gives the warning where the layer is laid."""
+    return warning.endswith("align by hand")

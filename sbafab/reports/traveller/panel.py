@@ -1,29 +1,31 @@
-"""What the page says of registered sheets: cut, weed, tack, stack, press, cut free."""
+"""The section on registered sheets: cut, weed, tack, stack, press, cut free."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-from sbafab.cutting.cut_layers import CUT_OUTER
+from sbafab.cutting.properties import CUT_OUTER
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.svg import number, path_data
-from sbafab.laminate.inks import ink
-from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.laminate.panel import SheetPanel
-from sbafab.pressing.words import listed
+from sbafab.geometry.region import Region, coord, path_data
+from sbafab.laminate.films import ink
+from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
+from sbafab.pressing.schedule import joined_words
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import bench, process
-from sbafab.reports.traveller import quantities as say
-from sbafab.reports.traveller.action import Action
-from sbafab.reports.traveller.bill import Cut, Item, bill, cut_list
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.notes import expected_sizes
+from sbafab.reports.traveller import bench, process, units
+from sbafab.reports.traveller.bill import (
+    PAPER_MINUTES,
+    Cut,
+    Item,
+    Time,
+    bill,
+    cut_list,
+    expected_sizes,
+)
+from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.process import COVER, StepPage
 from sbafab.reports.traveller.shapes import Picture, label
-from sbafab.reports.traveller.times import PAPER_MINUTES, Time
 
 WIDEST, TALLEST = 62.0, 74.0
 EDGE, FOOT = 3.0, 5.0
@@ -35,13 +37,13 @@ UNTRIED = (
 
 
 def chapter(work: Work) -> dict[str, Any]:
-    """What ``panel.html.j2`` prints, and what stands instead of the pages for single parts."""
+    """Return the values of ``panel.html.j2``, and those that replace the pages for single parts."""
     panel = work.laminate.panel
     if panel is None:
         return {"panel": None}
     return {
         "panel": panel,
-        "panel_size": say.size(*panel.size),
+        "panel_size": units.size(*panel.size),
         "panel_untried": UNTRIED,
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
@@ -55,21 +57,21 @@ def chapter(work: Work) -> dict[str, Any]:
         "cuts": _cuts(work, panel),
         "times": _times(work, panel),
         "expected_sizes": [
-            ("every file in layers/", say.size(*panel.size)),
-            (f"{SECOND_CUT}, with its frame", say.size(*panel.size)),
+            ("every file in layers/", units.size(*panel.size)),
+            (f"{SECOND_CUT}, with its frame", units.size(*panel.size)),
             *expected_sizes(work),
         ],
     }
 
 
 def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
-    """What the force means on sheets that are smaller than the platen."""
+    """Return the meaning of the force on sheets that are smaller than the platen."""
     highest = max(step.film_kpa for step in work.schedule.steps)
     step = work.schedule.steps[0]
     return (
         f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
-        f"{say.size(*step.platen_mm)}, as the paper gives it. The sheets take "
-        f"{say.size(*panel.size)}; through the press pad, which fills the platen, up to about "
+        f"{units.size(*step.platen_mm)}, as the paper gives it. The sheets take "
+        f"{units.size(*panel.size)}; through the press pad, which fills the platen, up to about "
         f"{highest:.0f} kPa reach them. That is an estimate, which no press has confirmed.",
         "Sheets of every film lie round the parts at every height, so that these share the "
         "pressure; what each part gets of it nobody has measured.",
@@ -77,25 +79,26 @@ def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
 
 
 def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
-    """Every film with the masks that lie on it."""
-    found: list[tuple[Layer, tuple[Layer, ...]]] = []
+    """Return every film with the masks that lie on it."""
+    pairs: list[tuple[Layer, tuple[Layer, ...]]] = []
     for layer in laminate.layers:
-        if layer.is_mask and found:
-            film, masks = found[-1]
-            found[-1] = film, (*masks, layer)
+        if layer.is_mask and pairs:
+            film, masks = pairs[-1]
+            pairs[-1] = film, (*masks, layer)
         elif not layer.is_mask:
-            found.append((layer, ()))
-    return found
+            pairs.append((layer, ()))
+    return pairs
 
 
 def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
-    """All that is done to the sheets before the first press step."""
+    """Return all that is done to the sheets before the first press step."""
     design, laminate = work.design, work.laminate
     pairs = [(film, masks) for film, masks in _pairs(laminate) if masks]
     ticks = tuple(
-        f"{listed([str(mask.index) for mask in masks])} on {film.index}" for film, masks in pairs
+        f"{joined_words([str(mask.index) for mask in masks])} on {film.index}"
+        for film, masks in pairs
     )
-    tack = say.minutes(design.panel.tack_minutes)
+    tack = units.minutes(design.panel.tack_minutes)
     return [
         *bench.before_first_cut(),
         Action(_carrier(work)),
@@ -123,9 +126,9 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
             "film over them. Tack the masks, a film at a time: the film sheet on the pins, cut "
             "corner over the plate's, its mask sheet face down on it, a release film and the press "
             f"pad on top. The plate goes in cold each time: press for {tack} at "
-            f"{say.temperature(design.press.temperature_c)} (ours), counted from when the plate is "
-            "hot, let it cool until it can be touched, peel off the transfer film flat and slowly. "
-            "Masks and PTFE sheet stay on the film.",
+            f"{units.temperature(design.press.temperature_c)} (ours), counted from when the plate "
+            "is hot, let it cool until it can be touched, peel off the transfer film flat and "
+            "slowly. Masks and PTFE sheet stay on the film.",
             tuple(mask.index for _, masks in pairs for mask in masks),
             ticks,
         ),
@@ -137,9 +140,9 @@ def _preparing(work: Work, panel: SheetPanel) -> list[Action]:
 
 
 def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
-    """The press steps with what is done to sheets, and the panel in place of one copy."""
+    """Return the press steps with the actions on sheets, and the panel in place of one copy."""
     pages = process.step_pages(work)
-    found = []
+    panel_pages = []
     for page in pages:
         last = page is pages[-1]
         plan = _picture(
@@ -150,15 +153,15 @@ def _step_pages(work: Work, panel: SheetPanel) -> list[StepPage]:
             "the sheets from above on their pins",
         )
         actions = tuple(_pressing(work, page, last))
-        found.append(replace(page, plan=plan, actions=actions))
-    return found
+        panel_pages.append(replace(page, plan=plan, actions=actions))
+    return panel_pages
 
 
 def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
     step = page.step
     films = [pair for pair in _pairs(work.laminate) if pair[0].index in step.adds]
     ticks = tuple(
-        f"{film.index} with {listed([str(mask.index) for mask in masks])}"
+        f"{film.index} with {joined_words([str(mask.index) for mask in masks])}"
         if masks
         else str(film.index)
         for film, masks in films
@@ -190,8 +193,8 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
         ]
     return [
         Action(
-            f"Heat both platens to {say.temperature(step.temperature_c)}; set the force to "
-            f"{say.force(step.force_n)}."
+            f"Heat both platens to {units.temperature(step.temperature_c)}; set the force to "
+            f"{units.force(step.force_n)}."
         ),
         *start,
         Action(lay, tuple(i for i in step.adds), ticks if len(ticks) > 1 else ()),
@@ -207,7 +210,7 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
 
 
 def _cut_free(panel: SheetPanel) -> list[Action]:
-    many = say.count(len(panel.places), "actuator")
+    many = units.count(len(panel.places), "actuator")
     return [
         Action(
             "Fix the stack flat on the laser's bed, the cap up, by tape or magnets all along its "
@@ -231,31 +234,33 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
     ]
 
 
-def _each(panel: SheetPanel, what: str) -> list[Action]:
-    """What is done once for every actuator of a batch says so, with a box for each."""
+def _each(panel: SheetPanel, task: str) -> list[Action]:
+    """Return a task done for each actuator of a batch, with a box for each; empty for one."""
     count = len(panel.places)
     if count == 1:
         return []
     numbers = tuple(str(number) for number in range(1, count + 1))
-    text = f"{what} one actuator after the other, numbered by its place in the sheet, row by row:"
+    text = f"{task} one actuator after the other, numbered by its place in the sheet, row by row:"
     return [Action(text, (), numbers)]
 
 
 def _bill(work: Work, panel: SheetPanel) -> list[Item]:
-    """The bill with sheets in place of parts, and what carries the masks."""
+    """Return the bill with sheets in place of parts, and the film that carries the masks."""
     items = []
     for item in bill(work):
         material = item.name.removesuffix(" film")
-        own = [layer for layer in work.laminate.layers if layer.film.material == material]
-        if own:
-            number_of = len(own) * panel.batches
+        material_layers = [
+            layer for layer in work.laminate.layers if layer.film.material == material
+        ]
+        if material_layers:
+            number_of = len(material_layers) * panel.batches
             number_of += sum(
                 _spare_sheets(work, panel, pattern)
-                for pattern in dict.fromkeys(layer.pattern for layer in own)
+                for pattern in dict.fromkeys(layer.pattern for layer in material_layers)
             )
             rim = 2 * bench.RIM
-            least = say.size(panel.size[0] + rim, panel.size[1] + rim)
-            needed = f"{say.count(number_of, 'sheet')} of at least {least}"
+            least = units.size(panel.size[0] + rim, panel.size[1] + rim)
+            needed = f"{units.count(number_of, 'sheet')} of at least {least}"
             items.append(replace(item, quantity=needed))
         else:
             items.append(item)
@@ -264,18 +269,18 @@ def _bill(work: Work, panel: SheetPanel) -> list[Item]:
         for pattern, layers in work.laminate.patterns.items()
         if layers[0].is_mask
     )
-    what = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
-    return [*items, Item("Carrier", what, say.count(masks, "piece"))]
+    words = f"{work.design.panel.carrier}; carries the masks of one sheet each, off in the end"
+    return [*items, Item("Carrier", words, units.count(masks, "piece"))]
 
 
 def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
-    """The cut list: a sheet for every layer of a pattern and every batch."""
-    found = []
+    """Return the cut list: a sheet for every layer of a pattern and every batch."""
+    rows = []
     for row in cut_list(work):
         layers = work.laminate.patterns[row.pattern]
         sheet = work.laminate.first_cut(layers[0])
         length = sum(contour.length for contour in sheet.contours)
-        found.append(
+        rows.append(
             replace(
                 row,
                 count=len(layers) * panel.batches,
@@ -284,29 +289,31 @@ def _cuts(work: Work, panel: SheetPanel) -> list[Cut]:
                 cut_length=length,
             )
         )
-    return found
+    return rows
 
 
 def _spare_sheets(work: Work, panel: SheetPanel, pattern: str) -> int:
-    """Number of spare sheets of a pattern, for all batches together."""
+    """Return the number of spare sheets of a pattern, for all batches together."""
     layers = work.laminate.patterns[pattern]
     return work.design.order.spare_parts(len(layers) * panel.batches)
 
 
 def _times(work: Work, panel: SheetPanel) -> list[Time]:
-    """How long a batch takes; the paper's handling is of one actuator, and is not known of many."""
+    """Return the times of a batch; the paper's handling is of one actuator, and is not known of
+    many.
+    """
     plan, copies = work.schedule, len(panel.places)
-    steps = " + ".join(say.plain(step.minutes) for step in plan.steps)
+    steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
     tacking, pressed = plan.tacking, plan.total_press_minutes
     assert tacking is not None
     total = None if pressed is None else pressed + tacking.total_minutes
     each = None if total is None else total / copies
-    many = say.count(copies, "actuator")
+    many = units.count(copies, "actuator")
     return [
-        Time("In the press", say.minutes(plan.total_press_minutes), f"{steps} min, one batch"),
+        Time("In the press", units.minutes(plan.total_press_minutes), f"{steps} min, one batch"),
         Time(
             "Tacking, from cold to cold",
-            f"{tacking.total_minutes:.0f} min = {say.hours(tacking.total_minutes)}",
+            f"{tacking.total_minutes:.0f} min = {units.hours(tacking.total_minutes)}",
             f"{tacking.sheets} mask sheets, each {tacking.warm_minutes:g} min to warm the plate, "
             f"{tacking.press_minutes:g} min pressed and {tacking.cool_minutes:g} min to cool it, "
             f"one after the other on one plate; {tacking.basis}. Several plates in turn, or one "
@@ -314,8 +321,8 @@ def _times(work: Work, panel: SheetPanel) -> list[Time]:
         ),
         Time(
             "Both, one batch",
-            say.whole_minutes(total),
-            f"{many}, {say.minutes(each)} each",
+            units.whole_minutes(total),
+            f"{many}, {units.minutes(each)} each",
         ),
         Time(
             "Handling",
@@ -327,14 +334,16 @@ def _times(work: Work, panel: SheetPanel) -> list[Time]:
 
 
 def _carrier(work: Work) -> str:
-    """What must be known of the transfer film before it is pressed, blanks for what is not."""
+    """Return the properties of the transfer film to be known before it is pressed, blanks for
+    unknown.
+    """
     design = work.design.panel
     adhesive = design.carrier_adhesive or "________________"
     limit = "________ °C" if design.carrier_limit_c is None else f"{design.carrier_limit_c:g} °C"
     return (
         f"What carries the masks: {design.carrier}, product ________________, adhesive {adhesive}, "
         f"rated for {limit} by its maker. It goes into the press at "
-        f"{say.temperature(work.design.press.temperature_c)}: without a rating above that it is "
+        f"{units.temperature(work.design.press.temperature_c)}: without a rating above that it is "
         "not used. Acrylic and rubber adhesives hardly hold PTFE; silicone adhesives on polyester "
         "or polyimide are sold for such temperatures. Which of them holds the masks, and lets them "
         "go after the tack, nobody has tried: try one sheet first."
@@ -342,22 +351,26 @@ def _carrier(work: Work) -> str:
 
 
 def _tack_pins(work: Work) -> str:
-    """How high the corner pins stand for the tacks: far lower than for the whole stack."""
+    """Return the height of the corner pins for the tacks: far lower than for the whole stack."""
     tacking = work.schedule.tacking
     assert tacking is not None
-    stands = listed(list(dict.fromkeys(say.millimetres(pin.stands_mm) for pin in tacking.pins)))
-    lengths = listed(list(dict.fromkeys(say.millimetres(pin.length_mm) for pin in tacking.pins)))
+    stands = joined_words(
+        list(dict.fromkeys(units.millimetres(pin.stands_mm) for pin in tacking.pins))
+    )
+    lengths = joined_words(
+        list(dict.fromkeys(units.millimetres(pin.length_mm) for pin in tacking.pins))
+    )
     beneath = tacking.stack_mm + work.design.press.release_thickness
-    out = say.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
+    out = units.millimetres(max(pin.stands_mm for pin in tacking.pins) - beneath)
     return (
         f"pins of {lengths} stand {stands} over the plate (one film with its masks is "
-        f"{say.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
+        f"{units.millimetres(tacking.stack_mm)} high; the pins press {out} into the pad, those for "
         "the whole stack would more)"
     )
 
 
 def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
-    """One film sheet and one mask sheet as they come from the laser, with what they are."""
+    """Return one film sheet and one mask sheet as they come from the laser, with captions."""
     film = laminate.layers[0]
     mask = next(layer for layer in laminate.layers if layer.is_mask)
     return [
@@ -375,7 +388,7 @@ def _pictures(laminate: Laminate, panel: SheetPanel) -> list[tuple[str, str]]:
 
 
 def _picture(laminate: Laminate, panel: SheetPanel, layer: Layer, name: str, words: str) -> str:
-    """A sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
+    """Return a sheet from above, its pins filled, crosses in its fiducials, its slots pink."""
     width, length = panel.size
     scale = min(WIDEST / width, TALLEST / length)
     x0, _, _, y1 = panel.outline.bounds
@@ -412,6 +425,6 @@ def _pin(pin: Pin, at: Point, scale: float) -> tuple[str, str]:
     x, y = at
     r = pin.diameter * scale / 2
     return (
-        f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(r)}" fill="{draw.DARK}"/>',
+        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(r)}" fill="{draw.DARK}"/>',
         label((x, y + r + 2.4), pin.name, 1.9),
     )

@@ -1,19 +1,19 @@
-"""A film sheet as it lies on the machine, every part labelled with its pattern."""
+"""The map of a film sheet as it lies on the machine, every part labelled with its pattern."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from heapq import heappop, heappush, merge
 from itertools import tee
 from typing import NamedTuple
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import Region
-from sbafab.geometry.svg import number
+from sbafab.geometry.region import Region, coord
 from sbafab.laminate.films import Film
 from sbafab.nesting.records import Placement
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller.part_labels import PlacedLabel, first_free, labels
 from sbafab.reports.traveller.shapes import Picture, label
 
 HIGHEST = 118.0
@@ -60,7 +60,7 @@ class _Strip(NamedTuple):
         return x + (p[0] - self.bounds[0]) * self.scale, y + (self.bounds[3] - p[1]) * self.scale
 
     def matrix(self, placement: Placement) -> tuple[float, ...]:
-        """A quarter turn and a shift in the sheet's frame, then to the page."""
+        """Return matrix of a quarter turn and a shift in the sheet's frame, then to the page."""
         u, v = QUARTERS[placement.turn]
         s = self.scale
         # The columns are where the part's axes go.
@@ -69,13 +69,13 @@ class _Strip(NamedTuple):
 
 
 def part_regions(sheets: Sequence[SheetFile]) -> Iterator[tuple[str, Region]]:
-    """The parts that lie on the sheets by id; all sheets of a material share one nest."""
-    seen: set[str] = set()
+    """Yield the parts that lie on the sheets by id; all sheets of a material share one nest."""
+    names: set[str] = set()
     for sheet in sheets:
         for index, part in enumerate(sheet.nest.parts):
             name = _part_id(sheet, index)
-            if name not in seen:
-                seen.add(name)
+            if name not in names:
+                names.add(name)
                 yield name, part.region
 
 
@@ -84,25 +84,25 @@ def _part_id(sheet: SheetFile, index: int) -> str:
 
 
 def is_long(sheet: SheetFile) -> bool:
-    """Whether the sheet is drawn in rows across the page, each a part of its length."""
+    """Return True if the sheet is drawn in rows across the page, each a part of its length."""
     return max(sheet.width, sheet.length) > LONG * min(sheet.width, sheet.length)
 
 
-def rows_said(sheet: SheetFile) -> str:
-    """What is not seen at once in the picture of a sheet: rows, a turn, an empty rest."""
+def picture_note(sheet: SheetFile) -> str:
+    """Return what the picture of a sheet does not show at once: rows, a turn, an empty rest."""
     if not is_long(sheet):
         used = _used(sheet)
         return f"the sheet above {used:.0f} mm is empty" if used < sheet.length else ""
     strips = _strips(sheet)
-    said = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
+    rows = f"shown in {len(strips)} rows, one after the other" if len(strips) > 1 else ""
     if not strips[0].turned:
-        return said
+        return rows
     turn = "turned by 90°: its lower left corner is at the upper left"
-    return f"{turn}; {said}" if said else turn
+    return f"{turn}; {rows}" if rows else turn
 
 
 def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
-    """The sheet in plan, its lower left corner at the lower left; a long one in rows.
+    """Return the sheet in plan, its lower left corner at the lower left; a long one in rows.
 
     A part is labelled with its pattern after the mark of its design, or the design's name.
     """
@@ -146,7 +146,7 @@ def _strips(sheet: SheetFile) -> list[_Strip]:
 
 
 def _used(sheet: SheetFile) -> float:
-    """How far up a sheet its parts and pins reach, and a border more; mm."""
+    """Return the length in mm that parts and pins use, with a border more."""
     nest = sheet.nest
     tops = [nest.region(placement).bounds[3] for placement in nest.on_sheet(sheet.number - 1)]
     tops += [y + diameter / 2 for _, y, diameter in nest.stock.pins]
@@ -154,11 +154,11 @@ def _used(sheet: SheetFile) -> float:
 
 
 def _window(strip: _Strip) -> list[str]:
-    """Opens a picture in the picture that shows nothing beside the strip."""
+    """Return the opening tags of a nested picture that shows nothing beside the strip."""
     (x, y), (wide, high) = strip.corner, strip.size
-    place = " ".join(map(number, (x, y, wide, high)))
+    place = " ".join(map(coord, (x, y, wide, high)))
     return [
-        f'<svg x="{number(x)}" y="{number(y)}" width="{number(wide)}" height="{number(high)}" '
+        f'<svg x="{coord(x)}" y="{coord(y)}" width="{coord(wide)}" height="{coord(high)}" '
         f'viewBox="{place}">',
         draw.box(strip.corner, (x + wide, y + high), fill="#ffffff", stroke="none"),
     ]
@@ -167,22 +167,22 @@ def _window(strip: _Strip) -> list[str]:
 def _draw(
     picture: Picture, sheet: SheetFile, film: Film, strip: _Strip, marks: Mapping[str, str]
 ) -> None:
-    """Parts, pins and labels of a strip."""
-    seen = [
+    """Draw parts, pins and labels of a strip."""
+    visible = [
         (placement, sheet.nest.region(placement))
         for placement in sheet.nest.on_sheet(sheet.number - 1)
     ]
-    seen = [(placement, region) for placement, region in seen if _meets(region.bounds, strip)]
-    for placement, _ in seen:
+    visible = [(placement, region) for placement, region in visible if _meets(region.bounds, strip)]
+    for placement, _ in visible:
         name = _part_id(sheet, placement.part)
         picture.part(name, film, strip.matrix(placement), "fresh")
     for x, y, diameter in sheet.nest.stock.pins:
         at = strip.at((x, y))
-        radius = number(diameter * strip.scale / 2)
+        radius = coord(diameter * strip.scale / 2)
         picture.add(
-            f'<circle cx="{number(at[0])}" cy="{number(at[1])}" r="{radius}" fill="#777777"/>'
+            f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{radius}" fill="#777777"/>'
         )
-    _label(picture, sheet, strip, marks, seen)
+    _label(picture, sheet, strip, marks, visible)
 
 
 def _label(
@@ -190,28 +190,28 @@ def _label(
     sheet: SheetFile,
     strip: _Strip,
     marks: Mapping[str, str],
-    seen: Sequence[tuple[Placement, Region]],
+    visible: Sequence[tuple[Placement, Region]],
 ) -> None:
-    """Every part's pattern; parts that lie alike are labelled alike unless labels would meet."""
-    known: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
+    """Label every part; equal parts are labelled equally unless labels would meet."""
+    by_placement: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
     taken: list[Bounds] = []
     page = (*strip.corner, *_far(strip))
-    for placement, region in seen:
+    for placement, region in visible:
         part = sheet.nest.parts[placement.part]
         words = marked(part.design, part.pattern, marks)
-        alike = placement.part, placement.turn
-        if alike not in known:
+        key = placement.part, placement.turn
+        if key not in by_placement:
             shape = region.mapped(strip.at, strip.scale, mirror=True)
-            known[alike] = region.bounds, labels(words, shape)
-        bounds, places = known[alike]
-        places, kept = tee(places)
-        known[alike] = bounds, kept
+            by_placement[key] = region.bounds, labels(words, shape)
+        bounds, places = by_placement[key]
+        places, copy = tee(places)
+        by_placement[key] = bounds, copy
         (x, y), (first_x, first_y) = strip.at(region.bounds[:2]), strip.at(bounds[:2])
         moved = (place.moved(x - first_x, y - first_y) for place in places)
-        found = first_free(moved, page, taken)
-        if found is not None:
-            taken.append(found.box)
-            picture.add(label(found.at, words, found.size))
+        free = first_free(moved, page, taken)
+        if free is not None:
+            taken.append(free.box)
+            picture.add(label(free.at, words, free.size))
 
 
 def _far(strip: _Strip) -> Point:
@@ -224,5 +224,155 @@ def _meets(bounds: Bounds, strip: _Strip) -> bool:
 
 
 def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
-    """A pattern after the mark of its design, the design's name where it has none."""
+    """Return a pattern after the mark of its design, or the design's name where it has none."""
     return f"{marks.get(design, design)} {pattern}".lstrip()
+
+
+# Places for labels: on the part, off its holes and off other labels.
+
+
+LEGIBLE = 1.5
+"""mm on the page: smaller labels help nobody."""
+STEPS = 6
+"""Places tried from the middle of a part to each of its ends."""
+SIZES = (1.0, 0.8, 0.6)
+OVER = 1.1
+"""Share of its part's width that a label may take."""
+HIGH = 0.8
+"""Height of a label in sizes of its letters."""
+OUTSIDE, HOLE = 3.0, 1.0
+"""What a corner off the part costs, and a hole that is covered; distance from the middle, 1."""
+
+
+class PlacedLabel(NamedTuple):
+    """``at`` is the middle of the words' base line; ``size`` and ``box`` are mm on the page."""
+
+    at: Point
+    size: float
+    box: Bounds
+
+    def moved(self, dx: float, dy: float) -> PlacedLabel:
+        (x, y), (low_x, low_y, high_x, high_y) = self.at, self.box
+        box = low_x + dx, low_y + dy, high_x + dx, high_y + dy
+        return PlacedLabel((x + dx, y + dy), self.size, box)
+
+
+def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
+    """Yield places for the words on a part as it is drawn, the best first.
+
+    They are off its holes if they can be, near its middle and as large as may be; none are yielded
+    where nobody could read them. A place is measured when its turn has come: the first one is
+    nearly always taken.
+    """
+    low_x, _, high_x, _ = part.bounds
+    width = OVER * (high_x - low_x)
+    most = min(draw.SMALL * width / draw.text_width(words, draw.SMALL), draw.SMALL)
+    holes = [hole.bounds for hole in part.holes]
+    em = draw.text_width(words, 1.0)
+    middles = list(_middles(part.bounds))
+    sizes = [(1 - share, share * most) for share in SIZES if share * most >= LEGIBLE]
+    # Nearest first for each size, so labels are made only as far as their turn comes.
+    fresh = merge(*([(far + less, at, size) for far, at in middles] for less, size in sizes))
+    ahead = next(fresh, None)
+    waiting: list[_Candidate] = []
+    while waiting or ahead is not None:
+        while ahead is not None and (not waiting or ahead[0] <= waiting[0].cost):
+            far, middle, size = ahead
+            heappush(waiting, _Candidate(far, _placed_label(em, middle, size), far))
+            ahead = next(fresh, None)
+        best = heappop(waiting)
+        if best.sides is None:
+            covered = [hole for hole in holes if _meet(best.label.box, hole)]
+            heappush(waiting, best.covering(len(covered), _sides(best.label.box, covered)))
+        elif best.sides:
+            heappush(waiting, best.beside(part))
+        else:
+            yield best.label
+
+
+class _Candidate(NamedTuple):
+    """A label with the least that it can cost: ``far`` off the middle and small, holes ``covered``,
+    points ``off`` the part; what is quickly measured comes first.
+
+    ``sides``: points of its box that have not been looked for on the part yet; None where the holes
+    have not been counted either.
+    """
+
+    cost: float
+    label: PlacedLabel
+    far: float
+    covered: int = 0
+    off: int = 0
+    sides: tuple[Point, ...] | None = None
+
+    def covering(self, covered: int, sides: tuple[Point, ...]) -> _Candidate:
+        return self._measured(covered, 0, sides)
+
+    def beside(self, part: Region) -> _Candidate:
+        """Return the candidate measured up to its first point that is off the part, which costs
+        much.
+        """
+        assert self.sides is not None
+        for number, point in enumerate(self.sides):
+            if not part.contains(point):
+                return self._measured(self.covered, self.off + 1, self.sides[number + 1 :])
+        return self._measured(self.covered, self.off, ())
+
+    def _measured(self, covered: int, off: int, sides: tuple[Point, ...]) -> _Candidate:
+        cost = self.far + (HOLE * covered + OUTSIDE * off)
+        return _Candidate(cost, self.label, self.far, covered, off, sides)
+
+
+def first_free(
+    candidates: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
+) -> PlacedLabel | None:
+    """Return the first label that stands on the page and off the boxes of other labels; None for
+    none.
+    """
+    return next(
+        (
+            label
+            for label in candidates
+            if _within(label.box, page) and not any(_meet(label.box, box) for box in taken)
+        ),
+        None,
+    )
+
+
+def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
+    """Return the label of words that are ``em`` sizes of their letters wide."""
+    x, y = middle
+    wide, high = size * em / 2, HIGH * size / 2
+    box = x - wide, y - high, x + wide, y + high
+    return PlacedLabel((x, y + 0.35 * size), size, box)
+
+
+def _middles(bounds: Bounds) -> Iterator[tuple[float, Point]]:
+    """Yield distance from the middle, 0 to 1, and point, over a part's box; nearest first."""
+    low_x, low_y, high_x, high_y = bounds
+    x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
+    for off, u, v in _grid():
+        yield off, (x + u * (high_x - low_x) / 2, y + v * (high_y - low_y) / 2)
+
+
+@cache
+def _grid() -> list[tuple[float, float, float]]:
+    """Return distances and coordinates of a grid over a box from -1 to 1, nearest first."""
+    steps = range(-STEPS, STEPS + 1)
+    grid = [(i / (STEPS + 1), j / (STEPS + 1)) for i in steps for j in steps]
+    nearest = sorted(grid, key=lambda p: (p[0] ** 2 + p[1] ** 2, p))
+    return [(((u**2 + v**2) / 2) ** 0.5, u, v) for u, v in nearest]
+
+
+def _sides(box: Bounds, holes: Sequence[Bounds]) -> tuple[Point, ...]:
+    """Return corners and middles of the words' box that stand on no hole of the part."""
+    points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
+    return tuple([p for p in points if not any(_meet((*p, *p), hole) for hole in holes)])
+
+
+def _meet(a: Bounds, b: Bounds) -> bool:
+    return a[0] < b[2] and a[2] > b[0] and a[1] < b[3] and a[3] > b[1]
+
+
+def _within(box: Bounds, page: Bounds) -> bool:
+    return box[0] >= page[0] and box[1] >= page[1] and box[2] <= page[2] and box[3] <= page[3]

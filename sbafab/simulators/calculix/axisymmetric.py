@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import OutputError
-from sbafab.simulators.calculix.frd import read_frd
+from sbafab.simulators.calculix.deck import TPE, Elastic
+from sbafab.simulators.calculix.results import read_frd
 from sbafab.simulators.calculix.run import run_ccx
-from sbafab.simulators.calculix.settings import TPE, Elastic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,10 +47,10 @@ class MeridianSection(NamedTuple):
         edges = [self.bore / 2, self.neck / 2, self.pocket / 2, self.pocket / 2 + self.ring]
         outside = edges[3] - edges[0]
         counts = [round(ELEMENTS * (b - a) / outside) for a, b in pairwise(edges)]
-        found = [edges[0]]
+        radii_at = [edges[0]]
         for (start, end), count in zip(pairwise(edges), counts, strict=True):
-            found += [start + (end - start) * n / (2 * count) for n in range(1, 2 * count + 1)]
-        return found
+            radii_at += [start + (end - start) * n / (2 * count) for n in range(1, 2 * count + 1)]
+        return radii_at
 
     @property
     def nodes(self) -> list[tuple[float, float]]:
@@ -95,13 +95,13 @@ def axisymmetric_states(
         frames = read_frd(folder / f"{JOB}.frd", len(section.nodes))
     times = np.array([frame.time for frame in frames])
     flat = np.array(section.nodes)
-    found = []
+    states = []
     for kilopascals in pressures:
         moved = frames[np.abs(times - kilopascals).argmin()].displacement
         # The third node is the innermost one on top: the pole, or the neck's edge.
         stroke = 2 * float(moved[2, 1])
-        found.append(SectionState(kilopascals, stroke, _air(section, flat + moved[:, :2])))
-    return found
+        states.append(SectionState(kilopascals, stroke, _air(section, flat + moved[:, :2])))
+    return states
 
 
 def _air(section: MeridianSection, nodes: NDArray[np.float64]) -> float:
@@ -162,8 +162,9 @@ def _deck(pressures: Sequence[float], section: MeridianSection, film: Elastic) -
 
 
 def _pull(section: MeridianSection) -> float:
-    """What necks are pulled apart by, as a share of the pressure on them: air in the bore presses
-    on the ends of the stack, and the bonded rings hold it.
+    """Return the pull on necks as a share of the pressure on them.
+
+    Air in the bore presses on the ends of the stack, and the bonded rings hold it.
     """
     if not section.bore:
         return 0.0
@@ -171,7 +172,7 @@ def _pull(section: MeridianSection) -> float:
 
 
 def _neck(nodes: Sequence[tuple[float, float]], section: MeridianSection) -> Iterator[str]:
-    """What is bonded to the next balloon stays in one plane."""
+    """Yield the lines that keep a neck bonded to the next balloon in one plane."""
     for number, (r, z) in enumerate(nodes, start=1):
         if number > 3 and z == section.thickness and r <= section.neck / 2:
             yield f"*EQUATION\n2\n{number}, 2, 1., 3, 2, -1.\n"

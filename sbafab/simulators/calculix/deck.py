@@ -1,22 +1,212 @@
-"""The input of CalculiX for an actuator, ``actuator.inp``, its mesh, and the same for Abaqus.
+"""What a CalculiX run is asked to do, and the film it does it with.
 
-Both read the same keywords but for what is to be written out.
+Units are mm, N, MPa, t and s; pressures are given in kPa.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from sbafab.laminate.films import in_order
-from sbafab.meshing.conforming.model import Mesh
-from sbafab.meshing.conforming.write_inp import write_inp
-from sbafab.simulators.calculix.imperfection import uneven
-from sbafab.simulators.calculix.settings import DeckSettings
-from sbafab.simulators.calculix.supports import supports
+from sbafab.errors import DesignError
+from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.meshing.formats.inp import write_inp
+from sbafab.simulators.simulator import SimulationRequest, chamber_pressures
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+Procedure = Literal["dynamic", "static"]
+
+PAPER_PRESSURE = 6.0
+"""kPa up to which the paper's model of one balloon is inflated (Fig. 7c)."""
+
+
+class Elastic(NamedTuple):
+    """A film: Young's modulus in MPa, Poisson's ratio, density in t/mm3."""
+
+    modulus: float
+    poisson: float
+    density: float
+
+
+TPE = Elastic(*PAPER_TPE, 1.122e-9)
+"""As in the paper's model. The density is the film's own where there is a laminate."""
+
+
+@dataclass(frozen=True)
+class DeckSettings:
+    """Load and procedure.
+
+    ``pressures`` in kPa by chamber, reached after ``ramp`` seconds and written out ``outputs``
+    times on the way. They rise with the square of time, because a flat film gives way at once and
+    then ever less. Films start ``imperfection`` mm off flat, or wrinkles would be a bifurcation
+    that no Newton iteration gets past; "static" leaves out the inertia that carries a film from
+    one pattern of wrinkles to the next, and mostly stops there. ``film`` is TPE, ``others`` are
+    further films by material.
+    """
+
+    pressures: Mapping[str, float]
+    procedure: Procedure = "dynamic"
+    ramp: float = 1.0
+    outputs: int = 24
+    imperfection: float = 0.010
+    film: Elastic = TPE
+    others: Mapping[str, Elastic] = field(default_factory=dict)
+
+    def times(self) -> list[float]:
+        """When results are written, in s, and the start."""
+        return [self.ramp * n / self.outputs for n in range(self.outputs + 1)]
+
+    def share(self, time: float) -> float:
+        """The part of the pressures that is on at a time; straight between outputs."""
+        at = min(max(time / self.ramp, 0.0), 1.0) * self.outputs
+        n = min(int(at), self.outputs - 1)
+        return (n**2 + (at - n) * (2 * n + 1)) / self.outputs**2
+
+    @property
+    def largest(self) -> float:
+        """The highest of the pressures in kPa."""
+        return max(self.pressures.values())
+
+
+def deck_settings(
+    laminate: Laminate, request: SimulationRequest | None = None, procedure: Procedure = "dynamic"
+) -> DeckSettings:
+    """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
+    names = [chamber.name for chamber in laminate.chambers]
+    pressures = chamber_pressures(names, request or SimulationRequest(), PAPER_PRESSURE)
+    films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
+    film = films.pop("TPE", TPE)
+    return DeckSettings(pressures, procedure, film=film, others=films)
+
+
+def _elastic(film: Film) -> Elastic:
+    """Return the film's elastic constants. Raises DesignError where its modulus is not known."""
+    if film.elastic is None:
+        raise DesignError(
+            f"CalculiX needs Young's modulus of {film.material}; add "
+            f"films.{film.material.lower()}.modulus, in MPa, and poisson, its ratio"
+        )
+    return Elastic(*film.elastic, 1e-12 * density_of(film, "CalculiX"))
+
+
+# A start a little off flat, from which films know which way to wrinkle.
+
+
+WAVES = tuple((0.2 + 0.52 * n, (1.0, 1.7, 2.9)[n % 3], 2.4 * n**2) for n in range(12))
+"""Direction, length from crest to crest in mm, and phase of the waves it is the sum of: lengths
+that a mesh of 0.35 can follow and that films of 0.038 wrinkle at, in directions that no round
+pocket is symmetric to."""
+
+
+def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+    """Points (n, 3) of a stack that lies on a wavy plate, up to ``height`` mm up or down.
+
+    Films and bonds above each other move as one: they stay as thick as they are, and apart.
+    """
+    x, y = points[:, 0], points[:, 1]
+    waves = np.zeros(len(points))
+    for direction, length, phase in WAVES:
+        along = x * np.cos(direction) + y * np.sin(direction)
+        waves += np.cos(2 * np.pi * along / length + phase)
+    moved = points.copy()
+    # The sum seldom comes near what all crests together would give: half of it is its height.
+    moved[:, 2] += height * np.clip(2 * waves / len(WAVES), -1.0, 1.0)
+    return moved
+
+
+# What holds the actuator: its base, or a lone balloon's ring, and planes of symmetry.
+
+
+BASE = "base"
+RING = "bond_001"
+FLAT = 1e-6
+
+
+def is_lone_balloon(mesh: Mesh) -> bool:
+    """Return True if the mesh has two films only: nothing but the bonded ring can hold them."""
+    return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
+
+
+def supports(mesh: Mesh) -> Iterator[str]:
+    """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
+
+    A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
+    paper's model: a few nodes of the ring hold what a rigid body could do, and nothing else.
+    """
+    if is_lone_balloon(mesh):
+        fixed = list(_fixed_freedoms(mesh))
+        nodes = sorted({node for node, _ in fixed})
+        yield "*NSET, NSET=held\n" + "".join(f"{node}\n" for node in nodes)
+        yield "*BOUNDARY\n" + "".join(f"{node}, {axis}\n" for node, axis in fixed)
+    else:
+        yield f"*NSET, NSET=held\n{BASE}\n*BOUNDARY\n{BASE}, 1, 3\n"
+    for name in _planes(mesh):
+        yield from _on_plane(mesh, name)
+
+
+def _planes(mesh: Mesh) -> list[str]:
+    return [name for name in mesh.node_sets if name.startswith("symmetry_")]
+
+
+def _fixed_freedoms(mesh: Mesh) -> Iterator[tuple[int, int]]:
+    """Nodes, from 1, and axes: as many as the planes of symmetry leave a rigid body to do."""
+    ring = mesh.node_sets[RING]
+    x, y = mesh.points[ring, 0], mesh.points[ring, 1]
+    far = float(np.abs(y).max())
+    corners = [
+        int(ring[np.hypot(x - px, y - py).argmin()]) + 1
+        for px, py in ((-far, 0.0), (0.0, far), (0.0, -far))
+    ]
+    planes = _planes(mesh)
+    for node in corners[: 3 - len(planes)]:
+        yield node, 3
+    in_plane = list(zip(corners, (2, 1, 1), strict=True))
+    if planes == ["symmetry_y"]:
+        in_plane = in_plane[1:2]
+    elif planes:
+        in_plane = in_plane[: 2 - len(planes)]
+    yield from in_plane
+
+
+def _on_plane(mesh: Mesh, name: str) -> Iterator[str]:
+    """The nodes of one symmetry plane stay on it."""
+    nodes = mesh.node_sets[name]
+    normal = _normal(mesh.points[nodes, :2])
+    if min(abs(normal)) < FLAT:
+        yield f"*BOUNDARY\n{name}, {1 if abs(normal[0]) > FLAT else 2}\n"
+        return
+    fixed = np.empty(0, dtype=np.int64) if is_lone_balloon(mesh) else mesh.node_sets[BASE]
+    on_axis = nodes[np.hypot(*mesh.points[nodes, :2].T) < FLAT]
+    for node in np.setdiff1d(on_axis, fixed):
+        yield f"*BOUNDARY\n{node + 1}, 1, 2\n"
+    # The first term is the one that is eliminated: that of the larger factor.
+    first, second = (1, 2) if abs(normal[0]) >= abs(normal[1]) else (2, 1)
+    for node in np.setdiff1d(nodes, np.concatenate([fixed, on_axis])):
+        yield (
+            f"*EQUATION\n2\n{node + 1}, {first}, {normal[first - 1]:.12g}, "
+            f"{node + 1}, {second}, {normal[second - 1]:.12g}\n"
+        )
+
+
+def _normal(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit normal of the upright plane through the axis and these places."""
+    x, y = places[np.hypot(*places.T).argmax()]
+    normal: NDArray[np.float64] = np.array([-y, x]) / np.hypot(x, y)
+    return normal
+
+
+# The input of CalculiX for an actuator, ``actuator.inp``, its mesh, and the same for Abaqus.
+#
+# Both read the same keywords but for what is to be written out.
+
 
 JOB = "actuator"
 MESH_FILE = "mesh.inp"
@@ -61,10 +251,10 @@ def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
 
 
 def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    asked = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
+    pressures = ", ".join(f"{name} {value:g} kPa" for name, value in settings.pressures.items())
     yield "*HEADING\n"
     yield "Stacked balloon actuator; units mm, N, MPa, t, s\n"
-    yield f"** Pressures at the end: {asked}\n"
+    yield f"** Pressures at the end: {pressures}\n"
     yield f"*INCLUDE, INPUT={MESH_FILE}\n"
     yield from _cavity_faces(mesh)
     yield from _sections(mesh, settings)

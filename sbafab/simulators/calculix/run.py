@@ -1,21 +1,54 @@
-"""Running ``ccx``: to which load it came, and what stopped it."""
+"""CalculiX: the run of a deck, its results in one folder, and the interface of a simulator."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
-from sbafab.progress import Progress
-from sbafab.simulators.calculix.frd import SAME_TIME, read_sta
-from sbafab.simulators.program import program_path, run_program
+from sbafab.errors import DesignError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.element_mesh import volume_mesh
+from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, images, layup
+from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.process import Progress
+from sbafab.simulators.calculix.deck import (
+    JOB,
+    DeckSettings,
+    Procedure,
+    deck_settings,
+    started,
+    write_deck,
+)
+from sbafab.simulators.calculix.results import (
+    SAME_TIME,
+    Frame,
+    State,
+    deformed_png,
+    history,
+    history_csv,
+    history_svg,
+    read_frd,
+    read_sta,
+    write_deformed,
+)
+from sbafab.simulators.simulator import (
+    INTERRUPTED,
+    OUT_OF_TIME,
+    Result,
+    SimulationRequest,
+    program_path,
+    run_program,
+)
 
 LOG = "ccx.log"
 DIVERGED = "its iterations no longer converge, however small the step"
 
 
 class Ending(NamedTuple):
-    """How a run ended: the last converged time in s, and what stopped it, None if nothing did."""
+    """End of a run: the last converged time in s, and what stopped it, None if nothing did."""
 
     time: float
     stopped: str | None
@@ -55,7 +88,7 @@ def _reached(sta: Path) -> float:
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> str | None:
-    """What went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
+    """Return what went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
 
     A step that diverges and is tried again with less is no failure.
     """
@@ -68,3 +101,171 @@ def _complaint(log: Path, code: int, is_there: bool) -> str | None:
     if error is not None:
         return f"it reports: {error[1].strip().rstrip('.:')}"
     return f"it ended with code {code} and without a word"
+
+
+# A whole run in one folder: mesh, deck, ccx and results.
+
+
+HISTORY = "history.csv"
+KEPT = (".inp", ".frd", ".sta", ".dat")
+DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
+
+
+@dataclass(frozen=True)
+class History:
+    """The states from the unloaded one on, and one sentence if the run stopped early."""
+
+    states: tuple[State, ...]
+    stopped: str | None
+
+
+def deck_mesh(laminate: Laminate, settings: MeshSettings) -> Mesh:
+    """The flat volume mesh that a deck is of. Raises DesignError, OutputError as meshes do."""
+    stack = layup(laminate, settings)
+    return volume_mesh(stack, flat(stack))
+
+
+def simulate(
+    laminate: Laminate,
+    mesh_settings: MeshSettings,
+    settings: DeckSettings,
+    folder: Path,
+    timeout: float,
+    tell: Progress,
+) -> History:
+    """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
+
+    ``timeout`` is in seconds. A run that diverges or takes too long keeps what it has reached.
+    Raises OutputError where ccx is not installed or reaches nothing.
+    """
+    find_ccx()
+    tell("mesh", 0, 1)
+    mesh = deck_mesh(laminate, mesh_settings)
+    write_deck(mesh, settings, folder)
+    ending = run_ccx(folder, JOB, settings.ramp, timeout, tell)
+    tell("results", 0, 1)
+    run_mesh = started(mesh, settings)
+    frames = converged_frames(folder / f"{JOB}.frd", run_mesh, ending)
+    if not frames:
+        raise OutputError(
+            f"ccx stopped at {_place(ending.time, settings)}, before the first result: "
+            f"{ending.stopped}; {_advice(ending, settings)}"
+        )
+    states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
+    _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
+    _tidy(folder)
+    stopped = None if ending.stopped is None else _stopped(ending, states, settings)
+    return History(tuple(states), stopped)
+
+
+def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
+    """The frames of a result file up to where its run converged.
+
+    ccx adds one that did not converge when it gives up. Raises OutputError where the file of a
+    run that ended well is cut short.
+    """
+    if ending.stopped is not None and not frd.exists():
+        return []
+    frames = read_frd(frd, len(mesh.points), whole=ending.stopped is None)
+    return [frame for frame in frames if frame.time <= ending.time * (1 + SAME_TIME)]
+
+
+def _stopped(ending: Ending, states: Sequence[State], settings: DeckSettings) -> str:
+    last = states[-1]
+    return (
+        f"ccx stopped at {_place(ending.time, settings)}: {ending.stopped}; results up to "
+        f"{max(last.pressures.values()):.3g} kPa are kept; {_advice(ending, settings)}"
+    )
+
+
+def _place(time: float, settings: DeckSettings) -> str:
+    reached = settings.largest * settings.share(time)
+    return f"{time:.4g} s, {reached:.3g} of {settings.largest:g} kPa"
+
+
+def _advice(ending: Ending, settings: DeckSettings) -> str:
+    if ending.stopped == INTERRUPTED:
+        return "run it again for the rest"
+    if ending.stopped != DIVERGED and not str(ending.stopped).startswith(OUT_OF_TIME):
+        return "see whether ccx runs on this machine; a larger --h takes less memory"
+    if ending.stopped != DIVERGED:
+        return "give it more --minutes or a larger --h, or less to do with --symmetry"
+    if settings.procedure == "static":
+        return "take --procedure dynamic, which gets past wrinkles"
+    return "ask for less pressure or a smaller --h"
+
+
+def _write_results(
+    mesh: Mesh,
+    name: str,
+    symmetry: Symmetry,
+    states: Sequence[State],
+    last: Frame,
+    folder: Path,
+) -> None:
+    reached = states[-1]
+    pressures = ", ".join(f"{c} {value:.3g} kPa" for c, value in reached.pressures.items())
+    part = "" if symmetry == "full" else f", a {symmetry} of it"
+    caption = f"{name}{part}: {pressures}, stroke {reached.stroke:.3f} mm, true to scale"
+    (folder / HISTORY).write_text(history_csv(states), encoding="utf-8", newline="\n")
+    plot = history_svg(f"{name}, CalculiX", states)
+    (folder / "history.svg").write_text(plot, encoding="utf-8", newline="\n")
+    (folder / "deformed.png").write_bytes(deformed_png(mesh, last, caption))
+    write_deformed(mesh, last, folder / "deformed.vtu")
+
+
+def _tidy(folder: Path) -> None:
+    """Removes what only ccx needs, and dates and names from its result file."""
+    frd = folder / f"{JOB}.frd"
+    frd.write_bytes(DATED.sub(rb"\1", frd.read_bytes()))
+    of_ccx = [path for path in folder.glob(f"{JOB}.*") if path.suffix not in KEPT]
+    for path in (*of_ccx, folder / "spooles.out", folder / LOG):
+        path.unlink(missing_ok=True)
+
+
+# The interface of a simulator.
+
+
+USES = ("h", "symmetry", "procedure")
+
+
+def why_not(laminate: Laminate) -> str | None:
+    """Every laminate can be meshed."""
+    return None
+
+
+def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
+    """Write the deck, and the mesh that it includes."""
+    mesh, settings = _settings(laminate, request)
+    write_deck(deck_mesh(laminate, mesh), settings, folder)
+
+
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
+    """Run the deck; the folder holds deck, results, table and pictures."""
+    mesh, settings = _settings(laminate, request)
+    history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, tell)
+    last = history.states[-1]
+    rows = [(name, value, "kPa") for name, value in last.pressures.items()]
+    rows += [("stroke", last.stroke, "mm")]
+    rows += [("tilt", last.tilt, "degrees")] if last.tilt is not None else []
+    rows += [(f"air in {name}", value, "ul") for name, value in last.volumes.items()]
+    rows += [("von Mises stress, at most", last.stress, "MPa")]
+    figures = {"states": [state.as_dict() for state in history.states]}
+    return Result(tuple(rows), figures, history.stopped)
+
+
+def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSettings, DeckSettings]:
+    defaults = MeshSettings()
+    mesh = MeshSettings(
+        h=defaults.h if request.h is None else request.h,
+        symmetry=cast(Symmetry, request.symmetry or defaults.symmetry),
+        wrapped=False,
+    )
+    settings = deck_settings(laminate, request, cast(Procedure, request.procedure or "dynamic"))
+    for name, meshed in images(laminate, mesh.symmetry).items():
+        if settings.pressures[name] != settings.pressures[meshed]:
+            raise DesignError(
+                f"symmetry {mesh.symmetry} computes {meshed} in place of {name}: give both one "
+                "pressure, or take symmetry full"
+            )
+    return mesh, settings

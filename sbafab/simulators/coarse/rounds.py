@@ -1,4 +1,4 @@
-"""What the coarse mesh needs of a laminate: round pockets on their axes, read off its profiles."""
+"""Round pockets on their axes, read off a laminate's profiles, for the coarse mesh."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from sbafab.errors import DesignError
+from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.region import Contour
-from sbafab.geometry.shapes import disc
+from sbafab.geometry.region import disc
 from sbafab.laminate.films import Film
-from sbafab.laminate.interfaces import Interface
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Interface, Laminate
 
 ON_AXIS = 1e-6
 SUPPORTED = "the coarse shell is made for stacks of round pockets on common plates"

@@ -1,4 +1,4 @@
-"""Inflates a model with MuJoCo and tells what its tip did."""
+"""MuJoCo: the inflation of a model, the motion of its tip, and the interface of a simulator."""
 
 from __future__ import annotations
 
@@ -13,10 +13,17 @@ from typing import Any
 
 from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.progress import Progress
-from sbafab.simulators.coarse.tip import Tip, tip_at
-from sbafab.simulators.mujoco.files import DATA, MODEL, SECTORS, write_model
-from sbafab.simulators.simulator import refuse_time
+from sbafab.process import Progress
+from sbafab.simulators.coarse.shell import PRESSURE
+from sbafab.simulators.mujoco.model import DATA, MODEL, SECTORS, why_no_model, write_model
+from sbafab.simulators.simulator import (
+    Result,
+    SimulationRequest,
+    Tip,
+    chamber_pressures,
+    refuse_time,
+    tip_at,
+)
 
 SECONDS = 5.0
 RAMP = 1.0
@@ -31,7 +38,7 @@ INSTALL = 'install it with: pip install "sbafab[mujoco]"'
 
 @dataclass(frozen=True)
 class MujocoRun:
-    """A run that can be believed: what the tip did, and how it ended.
+    """A valid run: the motion of the tip, and how it ended.
 
     ``stroke`` in mm is by how much the films' centres at both ends have parted upward since flat;
     ``volumes`` in ul by chamber; ``rate`` in steps per s of real time; ``stopped`` is one sentence
@@ -52,7 +59,7 @@ class MujocoRun:
 
     @property
     def drift(self) -> float:
-        """How far in mm the tip moved in the last half second: is it at rest?"""
+        """Distance in mm that the tip moved in the last half second; small if it is at rest."""
         since = [tip for tip in self.tips if tip.time >= self.last.time - 0.5 - TIP_PERIOD / 2]
         return math.dist(since[0].place, self.last.place)
 
@@ -103,7 +110,7 @@ def run_model(
     """
     mujoco = find_mujoco()
     path = folder / MODEL
-    with _said(mujoco) as said:
+    with _warnings(mujoco) as warnings:
         try:
             model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as reason:
@@ -123,10 +130,10 @@ def run_model(
                 stopped = "it was interrupted"
                 break
             step += 1
-            why = inflation.trouble(said)
+            why = inflation.trouble(warnings)
             if why is not None:
-                known = f"the tip is known to {tips[-1].time:g} s"
-                raise OutputError(f"{MODEL} did not run to its end: {why}; {known}")
+                reached_so_far = f"the tip is known to {tips[-1].time:g} s"
+                raise OutputError(f"{MODEL} did not run to its end: {why}; {reached_so_far}")
             if limit is not None and time.monotonic() - started > limit and step < steps:
                 stopped = f"it was stopped after {limit / 60:g} minutes"
             if step % every == 0 or step == steps or stopped is not None:
@@ -134,25 +141,25 @@ def run_model(
                 if tell is not None:
                     tell("mujoco", step, steps)
     rate = step / max(time.monotonic() - started, 1e-9)
-    said_so = None
+    note = None
     if stopped is not None:
         reached = tips[-1].time
-        said_so = f"{MODEL} ran to {reached:g} of {seconds:g} s: {stopped}; what it reached is kept"
-    found = inflation.stroke(), inflation.volumes()
-    return MujocoRun(path, tuple(tips), *found, step, rate, said_so)
+        note = f"{MODEL} ran to {reached:g} of {seconds:g} s: {stopped}; what it reached is kept"
+    shape = inflation.stroke(), inflation.volumes()
+    return MujocoRun(path, tuple(tips), *shape, step, rate, note)
 
 
 class _Inflation:
     """The model's state, and the cavities that the pressures act on."""
 
-    def __init__(self, mujoco: Any, model: Any, told: Mapping[str, Any]) -> None:
+    def __init__(self, mujoco: Any, model: Any, data: Mapping[str, Any]) -> None:
         import numpy as np
 
-        self.mujoco, self.model, self.told = mujoco, model, told
+        self.mujoco, self.model, self.told = mujoco, model, data
         self.state = mujoco.MjData(model)
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, told["start"])
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, data["start"])
         mujoco.mj_resetDataKeyframe(model, self.state, key)
-        self.cavities = {name: np.array(t) for name, t in told["cavities"].items()}
+        self.cavities = {name: np.array(t) for name, t in data["cavities"].items()}
         # The world, body 0, comes before the nodes.
         self.free = model.body_dofnum[1:] > 0
         self.nodes = self._placed()
@@ -176,12 +183,12 @@ class _Inflation:
         self.mujoco.mj_step(self.model, self.state)
         self.nodes = self._placed()
 
-    def trouble(self, said: list[str]) -> str | None:
+    def trouble(self, warnings: list[str]) -> str | None:
         """Why the state cannot be believed."""
         import numpy as np
 
-        if said:
-            return f'MuJoCo says "{" ".join(said[0].split())[:200]}"'
+        if warnings:
+            return f'MuJoCo says "{" ".join(warnings[0].split())[:200]}"'
         if any(warning.number for warning in self.state.warning):
             return "MuJoCo warns of an unstable step"
         # MuJoCo takes a force that is no number for none, and says nothing.
@@ -200,19 +207,58 @@ class _Inflation:
     def volumes(self) -> tuple[tuple[str, float], ...]:
         import numpy as np
 
-        found = []
+        volumes = []
         for name, triangles in self.cavities.items():
             a, b, c = self.nodes[triangles].transpose(1, 0, 2)
-            found.append((name, float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6))
-        return tuple(found)
+            volumes.append((name, float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6))
+        return tuple(volumes)
 
 
 @contextmanager
-def _said(mujoco: Any) -> Iterator[list[str]]:
-    """What MuJoCo says is wrong, which it would otherwise write into the current folder."""
-    said: list[str] = []
-    mujoco.set_mju_user_warning(said.append)
+def _warnings(mujoco: Any) -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings, which it would otherwise write into the current folder."""
+    messages: list[str] = []
+    mujoco.set_mju_user_warning(messages.append)
     try:
-        yield said
+        yield messages
     finally:
         mujoco.set_mju_user_warning(None)
+
+
+# The interface of a simulator.
+
+
+USES = ("seconds",)
+
+
+def why_not(laminate: Laminate) -> str | None:
+    """Return why there is no coarse mesh: it is made of rings, so pockets must be round."""
+    return why_no_model(laminate)
+
+
+def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
+    """The model and a script that inflates it."""
+    refuse_time(SECONDS if request.seconds is None else request.seconds, LEAST_TIME)
+    write_model(laminate, folder, _pressures(laminate, request))
+
+
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
+    """Write the model and inflate it to the end."""
+    pressures = _pressures(laminate, request)
+    seconds = SECONDS if request.seconds is None else request.seconds
+    result = simulate(laminate, folder, pressures, seconds, tell, limit=60 * request.minutes)
+    x, y, z = result.last.place
+    share = min(1.0, result.last.time / RAMP)
+    rows = [(name, share * value, "kPa") for name, value in pressures.items()]
+    rows += [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
+    rows += [("tilt", result.last.tilt, "degrees"), ("stroke", result.stroke, "mm")]
+    rows += [(f"air {name}", value, "ul") for name, value in result.volumes]
+    rows += [("drift in 0.5 s", result.drift, "mm"), ("rate", result.rate, "steps/s")]
+    tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in result.tips]
+    figures = {"stroke": result.stroke, "volumes": dict(result.volumes), "tips": tips}
+    figures |= {"drift": result.drift, "rate": result.rate}
+    return Result(tuple(rows), figures, result.stopped)
+
+
+def _pressures(laminate: Laminate, request: SimulationRequest) -> dict[str, float]:
+    return chamber_pressures([chamber.name for chamber in laminate.chambers], request, PRESSURE)

@@ -1,17 +1,38 @@
-"""The films of an actuator as SOFA takes them: nodes, triangles by stiffness, cavities."""
+"""The films of an actuator for SOFA: nodes, triangles by stiffness, cavities.
+
+Stacks of round pockets take the coarse mesh; drawn pockets, several films and tubes the
+conforming one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
-from sbafab.simulators.coarse.actuator import CoarseActuator, actuator
-from sbafab.simulators.coarse.meridian import Meridian, Start, holding, standing
-from sbafab.simulators.coarse.mesh import CoarseMesh
-from sbafab.simulators.coarse.web import Triangle
+from sbafab.simulators.coarse.rounds import elastic_of
+from sbafab.simulators.coarse.shell import (
+    PRESSURE,
+    CoarseActuator,
+    CoarseMesh,
+    Meridian,
+    Start,
+    Triangle,
+    actuator,
+    checked,
+    holding,
+    standing,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from sbafab.meshing.conforming.layup import Layup
+    from sbafab.meshing.conforming.mesh import Mesh
 
 Reading = Literal["tip", "crowns"]
 """What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""
@@ -78,44 +99,44 @@ def round_actuator(
 
     Raises DesignError where the pockets are not round or a chamber is unknown.
     """
-    made = actuator(laminate, pressures, sectors, start)
-    return replace(made, is_fair=True)
+    coarse = actuator(laminate, pressures, sectors, start)
+    return replace(coarse, is_fair=True)
 
 
-def round_shell(made: CoarseActuator) -> Shell:
+def round_shell(coarse: CoarseActuator) -> Shell:
     """The shell of a stack of round pockets."""
-    mesh = made.mesh
-    membranes, bending = film_groups(made, mesh)
+    mesh = coarse.mesh
+    membranes, bending = film_groups(coarse, mesh)
     triangles = len(mesh.single) + len(mesh.double)
-    held = mesh.volume(made.stack.chambers[0]) / made.balloons
+    balloon_ul = mesh.volume(coarse.stack.chambers[0]) / coarse.balloons
     return Shell(
-        name=made.stack.name,
+        name=coarse.stack.name,
         rest=mesh.rest,
         position=mesh.position,
         membranes=membranes,
         bending=bending,
         cavities=mesh.cavities,
-        pressures=dict(made.pressures),
+        pressures=dict(coarse.pressures),
         fixed=mesh.fixed,
         tip=mesh.tip,
-        mass=made.mass,
-        size=max(made.stack.pockets) / 2.5,
+        mass=coarse.mass,
+        size=max(coarse.stack.pockets) / 2.5,
         about=(
-            f"{len(mesh.rest)} nodes, {triangles} triangles; rings of {made.sectors} corners have "
-            f"the area of\nthe circles. It starts {mesh.height:.4g} mm high ({held:.3g} ul a "
-            "balloon). Inlet tabs and strips are left out."
+            f"{len(mesh.rest)} nodes, {triangles} triangles; rings of {coarse.sectors} corners "
+            f"have the area of\nthe circles. It starts {mesh.height:.4g} mm high "
+            f"({balloon_ul:.3g} ul a balloon). Inlet tabs and strips are left out."
         ),
     )
 
 
 def film_groups(
-    made: CoarseActuator, mesh: CoarseMesh
+    coarse: CoarseActuator, mesh: CoarseMesh
 ) -> tuple[tuple[FilmGroup, ...], tuple[FilmGroup, ...]]:
     """Membranes and bending groups of a coarse mesh."""
-    once, twice, nu = made.bending(1), made.bending(2), made.poisson
+    once, twice, nu = coarse.bending(1), coarse.bending(2), coarse.poisson
     membranes = (
-        FilmGroup("membrane1", mesh.single, made.membrane, nu),
-        FilmGroup("membrane2", mesh.double, 2 * made.membrane, nu),
+        FilmGroup("membrane1", mesh.single, coarse.membrane, nu),
+        FilmGroup("membrane2", mesh.double, 2 * coarse.membrane, nu),
     )
     bending = (
         FilmGroup("bend_lower", mesh.lower, once, nu),
@@ -124,3 +145,182 @@ def film_groups(
         FilmGroup("bend_neck", mesh.necks, twice, nu),
     )
     return membranes, tuple(group for group in bending if group.triangles)
+
+
+# The shell of any laminate, from its conforming mesh: drawn pockets, several films, tubes.
+
+
+STEPS_ACROSS = 3.0
+"""Sides of triangles in the smallest pocket's radius, where its bonds are not narrower."""
+STRETCH, MASS, BENDING, RATIO, LOWEST = range(5)
+"""What is known of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
+
+
+def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None = None) -> Shell:
+    """The shell of a laminate, flat at the start; a radial one wrapped round its tube.
+
+    The mouths of inlets are open and free. Raises DesignError where a chamber is unknown, a
+    film's modulus is not known, or the mesher is not installed.
+    """
+    from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
+    from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, narrowest_ring
+    from sbafab.meshing.conforming.mesh import volumes
+
+    names = tuple(chamber.name for chamber in laminate.chambers)
+    kilopascals = checked(names, pressures, PRESSURE, "pressure", "kPa")
+    for layer in laminate.tpe_layers:
+        elastic_of(layer.film)
+    radii = pocket_radii(laminate)
+    side = min(radii) / STEPS_ACROSS
+    ring = narrowest_ring(laminate)
+    h = side if ring is None else min(side, ring[0])
+    stack = thin(layup(laminate, MeshSettings(h, wrapped=False)))
+    mesh = shell_mesh(stack, flat(stack))
+    number, corners = _linear(mesh)
+    cells = _cells(stack, mesh)
+    rest = position = _vectors(mesh.points[number >= 0])
+    start = "flat"
+    if laminate.tube is not None:
+        start = f"wrapped round a tube of {laminate.tube:.4g} mm, whose axis is z"
+        on_tube = replace(stack, settings=MeshSettings(h))
+        position = _vectors(shell_mesh(on_tube, flat(on_tube)).points[number >= 0])
+    return Shell(
+        name=laminate.name,
+        rest=rest,
+        position=position,
+        membranes=_membranes(corners, cells),
+        bending=_bending(corners, cells),
+        cavities=tuple((name, _walls(mesh.face_sets[f"cavity_{name}"], corners)) for name in names),
+        pressures=kilopascals,
+        fixed=tuple(n for n in number[mesh.node_sets["base"]].tolist() if n >= 0),
+        tip=tuple(int(number[node]) for node in _marks(stack, mesh, number)),
+        mass=float(volumes(mesh.kind, mesh.points, mesh.cells) @ cells[:, MASS]),
+        size=max(radii) / 2.5,
+        about=(
+            f"{len(rest)} nodes, {len(corners)} triangles, inlets and their strips among them.\n"
+            f"It starts {start}."
+        ),
+        reading="tip" if laminate.tube is None else "crowns",
+    )
+
+
+def pocket_radii(laminate: Laminate) -> list[float]:
+    """Half the least width in mm of every pocket."""
+    radii = []
+    for gap in laminate.interfaces:
+        if gap.kind == "chamber":
+            for contour in gap.mask.outers:
+                low_x, bottom, right, top = contour.bounds
+                radii.append(min(right - low_x, top - bottom) / 2)
+    return radii
+
+
+def _vectors(points: NDArray[np.float64]) -> tuple[Vector, ...]:
+    """Six decimals, and no minus before a zero."""
+    return tuple((x, y, z) for x, y, z in (points.round(6) + 0.0).tolist())
+
+
+def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The new number of each node, -1 for those between corners; and the triangles' corners."""
+    import numpy as np
+
+    number = np.full(len(mesh.points), -1)
+    used = np.unique(mesh.cells[:, :3])
+    number[used] = np.arange(len(used))
+    return number, number[mesh.cells[:, :3]]
+
+
+def _walls(faces: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[Triangle, ...]:
+    """A cavity's walls, normals out of the air."""
+    import numpy as np
+
+    # Face 0 of a triangle looks down, face 1 up, each into the air that touches it.
+    walls = corners[faces[:, 0]]
+    return _rows(np.where(faces[:, 1:] == 0, walls, walls[:, ::-1]))
+
+
+def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
+    """Return the properties of each cell, a row each: its films, one on the other, bonded."""
+    import numpy as np
+
+    properties = np.zeros((len(mesh.cells), 5))
+    thickness = np.zeros(len(mesh.cells))
+    properties[:, LOWEST] = -1
+    for k, ply in enumerate(stack.plies):
+        of_ply = mesh.cell_sets[ply.name]
+        young, ratio = elastic_of(ply.layer.film)
+        properties[of_ply, STRETCH] += 1000 * young * ply.thickness
+        properties[of_ply, MASS] += (
+            1e-9 * density_of(ply.layer.film, "a simulation") * ply.thickness
+        )
+        properties[of_ply, RATIO] += ratio * ply.thickness
+        thickness[of_ply] += ply.thickness
+        new = of_ply[properties[of_ply, LOWEST] < 0]
+        properties[new, LOWEST] = k
+    properties[:, RATIO] /= thickness
+    properties[:, BENDING] = (
+        properties[:, STRETCH] * thickness**2 / (12 * (1 - properties[:, RATIO] ** 2))
+    )
+    return properties.round(12)
+
+
+def _membranes(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
+    import numpy as np
+
+    kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
+    kind = kind.ravel()
+    return tuple(
+        FilmGroup(f"membrane{n + 1}", _rows(corners[kind == n]), float(stretch), float(ratio))
+        for n, (stretch, ratio) in enumerate(kinds)
+    )
+
+
+def _bending(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
+    """Groups in which no edge has more than two triangles.
+
+    What begins with the same film lies side by side; films apart go together where they share
+    no node.
+    """
+    import numpy as np
+
+    bins: list[tuple[float, set[int], list[NDArray[np.int64]]]] = []
+    kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
+    kind = kind.ravel()
+    for n, (stiffness, _) in enumerate(kinds):
+        of_kind = corners[kind == n]
+        nodes = set(np.unique(of_kind).tolist())
+        free = (b for b in bins if b[0] == stiffness and not b[1] & nodes)
+        place = next(free, None)
+        if place is None:
+            place = (float(stiffness), set(), [])
+            bins.append(place)
+        place[1].update(nodes)
+        place[2].append(of_kind)
+    return tuple(
+        FilmGroup(f"bend{n + 1}", _rows(np.concatenate(parts)), stiffness, 0.0)
+        for n, (stiffness, _, parts) in enumerate(bins)
+    )
+
+
+def _marks(stack: Layup, mesh: Mesh, number: NDArray[np.int64]) -> tuple[int, ...]:
+    """Nodes of the highest film: the axes of three stacks or more, or four round its middle."""
+    import numpy as np
+
+    top = mesh.node_sets["tip"]
+    top = top[number[top] >= 0]
+    places = mesh.points[top][:, :2]
+
+    def nearest(place: Iterable[float]) -> int:
+        away = np.linalg.norm(places - np.array(list(place)), axis=1)
+        return int(top[int(np.argmin(away))])
+
+    if len(stack.centres) >= 3:
+        return tuple(nearest(centre) for centre in stack.centres)
+    middle = np.mean(stack.centres, axis=0)
+    reach = float(np.abs(places - middle).max())
+    quarters = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return tuple(nearest(middle + reach * np.array(quarter)) for quarter in quarters)
+
+
+def _rows(triangles: NDArray[np.int64]) -> tuple[Triangle, ...]:
+    return tuple((a, b, c) for a, b, c in triangles.tolist())

@@ -88,7 +88,7 @@ function flat(table, prefix = "") {
 export function goBack(studio) {
   const { back, name } = studio;
   studio.commit();
-  if (studio.unsaved && name && !confirm(`Leave ${name} without saving? Undo will not bring it back.`)) return;
+  if (studio.unsaved && name && !confirm(`Leave ${name} without saving? This cannot be undone.`)) return;
   studio.open(back.text, { name: back.name, seen: back.seen, saved: back.savedText });
   if (!name || name === back.source.replace(/^\.\//, "")) return;
   studio.edit([[`parts.${back.part}.design`, JSON.stringify(name)], [`parts.${back.part}.set`, null]]);

@@ -22,15 +22,15 @@ export class Dialogs {
     const { studio } = this;
     const { files } = await ask("/api/start").catch(() => studio);
     const pick = async (load) => {
-      if (studio.unsaved && studio.name && !confirm(`Leave ${studio.name} without saving? Undo will not bring it back.`)) return;
+      if (studio.unsaved && studio.name && !confirm(`Leave ${studio.name} without saving? This cannot be undone.`)) return;
       try { await load(); this.dialog.close(); } catch (error) { alert(error.message); }
     };
     const cards = studio.templates.map((name) => el("button", { onclick: () => pick(async () => studio.open((await ask(`/api/template/${encodeURIComponent(name)}`)).text)) },
       el("img", { src: `templates/${name}.webp`, alt: "", loading: "lazy", width: 320, height: 240 }), el("div", {}, el("strong", {}, name), el("small", {}, ABOUT[name] ?? ""))));
     const own = files.length ? [el("h3", {}, `Design files in ${studio.folder}`), el("div", { class: "files" }, ...files.map((name) => el("button", { onclick: () => pick(async () => { const { text, sha } = await ask(`/api/file/${encodeURIComponent(name)}`); studio.open(text, { name, seen: sha }); }) }, name)))] : [];
     const link = el("input", { type: "text", placeholder: "Paste a link that holds a design", "aria-label": "Link", style: false });
-    const file = el("input", { type: "file", accept: ".toml", "aria-label": "Design file from elsewhere", onchange: () => pick(async () => studio.open(await file.files[0].text(), { saved: "" })) });
-    this.show("Open a design", ...own, el("h3", {}, "Start from a template"), el("div", { class: "gallery" }, ...cards), el("h3", {}, "From elsewhere"),
+    const file = el("input", { type: "file", accept: ".toml", "aria-label": "Other design file", onchange: () => pick(async () => studio.open(await file.files[0].text(), { saved: "" })) });
+    this.show("Open a design", ...own, el("h3", {}, "Start from a template"), el("div", { class: "gallery" }, ...cards), el("h3", {}, "Other sources"),
       el("div", { class: "share" }, link, el("button", { onclick: () => pick(async () => studio.open(await this.unpacked(new URLSearchParams(link.value.split("#")[1] ?? "").get("design") ?? ""), { saved: "" })) }, "Open link"), file));
   }
 

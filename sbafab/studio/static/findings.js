@@ -42,7 +42,7 @@ export class Findings {
     const all = studio.stale.rules ? [...[...fresh.values()].flat(), ...old] : studio.findings;
     const sorted = all.map((finding) => ({ finding, waiting: studio.stale.rules && !fresh.has(finding.rule) })).sort((a, b) => RANK[a.finding.verdict] - RANK[b.finding.verdict]);
     const count = (verdict) => all.filter((finding) => finding.verdict === verdict).length;
-    const said = [["fail", "failed"], ["warn", "to heed"], ["waived", "waived"], ["pass", "hold"]].filter(([verdict]) => count(verdict)).map(([verdict, words]) => `${count(verdict)} ${words}`);
+    const said = [["fail", "failed"], ["warn", "warned"], ["waived", "waived"], ["pass", "passed"]].filter(([verdict]) => count(verdict)).map(([verdict, words]) => `${count(verdict)} ${words}`);
     this.sum.textContent = said.join(", ");
     this.list.replaceChildren(...sorted.map(({ finding, waiting }) => this.line(finding, waiting)));
     if (studio.unmeasured) this.list.append(el("div", { role: "listitem", class: "unmeasured" }, studio.unmeasured));
@@ -78,9 +78,9 @@ export class Findings {
     };
     const { figures, left_out: left, quick, met = [], meets, refused, before: old } = prediction, whole = studio.family === "assembly", others = figures.filter((figure) => !figure.design_with);
     this.figures.replaceChildren(table(figures.filter((figure) => figure.design_with)),
-      old?.figures.length ? el("div", { class: "of-before", role: "group", "aria-label": "Figures of the state before" }, table(old.figures)) : "",
+      old?.figures.length ? el("div", { class: "of-before", role: "group", "aria-label": "Figures of the previous state" }, table(old.figures)) : "",
       ...met.map((words) => el("p", { class: `met${meets ? " beyond" : ""}` }, words)),
-      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, `${old?.figures.length ? "Figures of the state before. " : ""}${later(whole)}`) : "",
+      refused ? el("p", { class: "met beyond" }, refused) : quick ? el("p", { class: "more" }, `${old?.figures.length ? "Figures of the previous state. " : ""}${later(whole)}`) : "",
       this.fold("others", `Other models of the same (${others.length})`, others.length, () => table(others)),
       this.fold("left", `Left out (${left.length})`, left.length, () => el("dl", { class: "left-out" }, ...left.flatMap(({ name, reason }) => [el("dt", {}, name), el("dd", {}, reason)]))));
   }
@@ -93,8 +93,8 @@ export class Findings {
   }
 }
 function later(whole) {
-  if (withoutServer) return whole ? "What the whole does inflated is left out here; sbafab predict has it." : "Without the elastic stack's figures; sbafab predict has them.";
-  return whole ? "What the whole does inflated follows once the design rests." : "The elastic stack's figures follow once the design rests.";
+  if (withoutServer) return whole ? "The prediction of the inflated assembly is not available in this page; use sbafab predict." : "The elastic stack's figures are not available in this page; use sbafab predict.";
+  return whole ? "The prediction of the inflated assembly follows when you stop editing." : "The elastic stack's figures follow when you stop editing.";
 }
 export const named = (figure) => figure.group + figure.name + figure.model;
 export function significant(value) {

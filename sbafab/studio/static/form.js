@@ -231,7 +231,7 @@ export class Form {
   }
 
   explain(field) {
-    if (!field) { this.help.replaceChildren("Point at a key to read what it means. Drag a name sideways to turn its number; ↑ and ↓ step it."); return; }
+    if (!field) { this.help.replaceChildren("Point at a key for its description. Drag its name sideways to change the number; ↑ and ↓ step it."); return; }
     const range = field.least !== undefined && field.least !== null ? ` ${plain(field.least)} to ${field.most === undefined || field.most === null ? "any" : plain(field.most)}${field.unit ? " " + field.unit : ""}.` : "";
     const usual = field.default === null || field.default === undefined || field.default === "" ? "" : ` Default ${typeof field.default === "object" ? JSON.stringify(field.default) : field.default}.`;
     this.help.replaceChildren(el("code", {}, field.key), el("br"), field.meaning, el("span", { class: "range" }, usual + range));

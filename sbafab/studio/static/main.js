@@ -24,7 +24,7 @@ const upper = {};
 async function start() {
   theme(recall("sbafab-theme", matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   let started;
-  if (withoutServer) notice("Python starts in this page; this takes some seconds.");
+  if (withoutServer) notice("Starting Python in this page; this takes some seconds.");
   try {
     started = await ask("/api/start");
   } catch (error) {
@@ -58,7 +58,7 @@ async function start() {
 function alone(lacks) {
   $("#save").title = "Download the design file (Ctrl+S)";
   $("#make").title = "Check and cut: DXF files and film sheets";
-  if (lacks.length) notice(`This page was made without ${lacks.join(" and ")}: layers, section, solid and all rules but those of registration work; prediction, motion and cut files take it.`);
+  if (lacks.length) notice(`This page was made without ${lacks.join(" and ")}: layers, section, solid and all rules but those of registration work; prediction, motion and cut files need it.`);
 }
 
 // What is shown first: a link's design, what the command named, work that a reload interrupted, or the gallery.

@@ -1,6 +1,10 @@
 // Generate with progress, look at what was made, play the cut, take it home as one zip.
 import { $, el, plain } from "./dom.js";
+import { Playing } from "./play_loop.js";
 import { listen, madeLink, tab, withoutServer } from "./server.js";
+
+// ms of a sheet, and the least of a cut.
+const SHEET = 6000, CUT = 16;
 
 export class Make {
   title = "Make";
@@ -19,7 +23,7 @@ export class Make {
     this.element = el("div", { class: "view" }, el("div", { class: "make" },
       el("div", { class: "head" }, this.go, this.stop, withoutServer ? null : el("label", {}, this.keep, " into out/ of the folder"), this.bar, this.said, el("span", { class: "grow" }), this.zip),
       el("div", { class: "body" }, this.list, this.stage)));
-    studio.on("text", () => { if (this.made && this.madeText !== studio.text) this.said.textContent = "Made from an earlier state of the design; generate again."; });
+    studio.on("text", () => { if (this.made && this.madeText !== studio.text) this.said.textContent = "The files are from an earlier state of the design; generate again."; });
     studio.on("opened", () => { this.made = null; this.list.replaceChildren(); this.zip.hidden = true; this.said.textContent = ""; });
   }
   async generate() {
@@ -90,8 +94,9 @@ export class Make {
     }
     const slider = el("input", { type: "range", min: 0, value: 0, step: 1, "aria-label": "Cut order", class: "order" });
     const where = el("output", {});
-    const play = el("button", { onclick: () => (this.timer ? this.pause(play) : this.play(slider, play)) }, "Play");
-    this.stage.replaceChildren(el("div", { class: "surface sheet" }, svg), el("div", { class: "tools" }, play, el("label", {}, "Cut", slider), where));
+    this.playing?.stop();
+    this.playing = new Playing(() => this.cutting(slider, paint));
+    this.stage.replaceChildren(el("div", { class: "surface sheet" }, svg), el("div", { class: "tools" }, this.playing.button, el("label", {}, "Cut", slider), where));
     Object.assign(svg.style, { position: "absolute", inset: "8px 8px 52px", width: "calc(100% - 16px)", height: "calc(100% - 60px)" });
     slider.style.width = "min(40vw, 360px)";
     slider.max = cuts.length;
@@ -107,21 +112,19 @@ export class Make {
       where.textContent = now ? `${now} of ${cuts.length}: ${words_[cuts[now - 1].kind]}` : `0 of ${cuts.length}`;
     };
     slider.addEventListener("input", paint);
-    this.paint = paint;
     paint();
   }
-  play(slider, button) {
-    if (Number(slider.value) >= Number(slider.max)) slider.value = 0;
-    button.textContent = "Pause";
-    const each = Math.max(16, 6000 / Math.max(1, slider.max));
-    this.timer = setInterval(() => {
-      slider.value = Number(slider.value) + 1;
-      this.paint();
-      if (Number(slider.value) >= Number(slider.max)) this.pause(button);
-    }, each);
+  // Moves the slider from cut to cut, from where it stands, and stops after the last.
+  cutting(slider, paint) {
+    const count = Number(slider.max), first = Number(slider.value) >= count ? 0 : Number(slider.value);
+    const each = Math.max(CUT, SHEET / Math.max(1, count));
+    return (elapsed) => {
+      slider.value = first + Math.floor(elapsed / each);
+      paint();
+      if (Number(slider.value) >= count) this.playing.stop();
+    };
   }
-  pause(button) { clearInterval(this.timer); this.timer = null; button.textContent = "Play"; }
-  hide() { clearInterval(this.timer); this.timer = null; }
+  hide() { this.playing?.stop(); }
   async picture() {
     const svg = $("svg", this.stage);
     const { svgBlob } = await import("./layers.js");

@@ -2,28 +2,23 @@
 import { css, el, plain } from "./dom.js";
 import { Balloons } from "./balloons.js";
 import { COARSE, FINE, chart, measured, meshOf } from "./motion_drawing.js";
-import { Playing } from "./playing.js";
+import { Playing, PoseView, angleAt } from "./play_loop.js";
 import { listen, tab } from "./server.js";
 import { Stage3D, THREE } from "./stage3d.js";
 
-// ms between two readings: figures that change oftener cannot be read.
-const READABLE = 110;
 const PER_MM = 0.003;
 
-export class Motion {
+export class Motion extends PoseView {
   title = "Motion";
   constructor(studio) {
-    this.studio = studio;
+    super(studio);
     this.surface = el("div", { class: "surface" });
     this.side = el("div", { class: "side" });
     this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side));
-    this.frames = [];
-    this.times = [];
     this.trace = [];
-    this.costs = [];
     this.build();
     try { this.stage = new Stage3D(this.surface, { up: 10 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
+      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The figures beside it are complete."));
     }
     this.mesh = meshOf(this.stage?.software ? COARSE : FINE);
     if (this.stage) this.scene();
@@ -32,7 +27,6 @@ export class Motion {
     studio.on("theme", () => { if (this.stage) { this.stage.repaint(); this.colours(); } this.plots(); });
   }
   show() { this.stage?.resize(); if (!this.stack) this.load(); }
-  hide() { this.playing.stop(); }
 
   build() {
     this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
@@ -51,7 +45,7 @@ export class Motion {
     this.trust = el("div", { class: "trust", role: "status" });
     this.plot = el("div");
     this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing.button, el("button", { onclick: () => this.set(() => 0) }, "Vent")),
-      el("h3", {}, "Acting on it"), el("label", { class: "knob" }, el("span", {}, plate, " Plate"), this.plateHeight, this.plateOut), el("label", {}, gravity, " Gravity, base level"), el("p", { class: "trust" }, "Drag the top of the actuator to pull it aside."),
+      el("h3", {}, "Loads"), el("label", { class: "knob" }, el("span", {}, plate, " Plate"), this.plateHeight, this.plateOut), el("label", {}, gravity, " Gravity, base level"), el("p", { class: "trust" }, "Drag the top of the actuator to pull it sideways."),
       el("h3", {}, "Supply"), el("label", {}, tube, " Air through a tube, in real time"), this.tubeRows,
       el("h3", {}, "Reading"), this.values, el("label", { class: "knob" }, el("span", {}, "Flow"), this.flow, el("output", {}, "ml/min")), this.trust, this.plot);
     this.tubeRows.hidden = true;
@@ -63,7 +57,7 @@ export class Motion {
   async load() {
     const { studio } = this;
     if (studio.error || !studio.laminate) return;
-    this.say("Working out the balloon of this design", false);
+    this.say("Computing the balloon of this design", false);
     const own = (this.loading = {});
     const text = studio.text;
     try {
@@ -83,7 +77,6 @@ export class Motion {
     this.stage?.draw();
     this.say(message, true);
   }
-  say(words, beyond) { this.trust.textContent = words; this.trust.classList.toggle("beyond", beyond); }
   start(stack, text) {
     const old = this.sliders?.map(({ input }) => input.value) ?? [];
     Object.assign(this, { stack, text });
@@ -102,18 +95,14 @@ export class Motion {
     this.want();
   }
 
-  // The newest wish goes out as soon as the last one is answered.
   want() {
-    this.wanted = true;
     if (this.tubed) this.settled = false;
     clearTimeout(this.rest);
     this.rest = setTimeout(() => { this.curves = true; this.want(); }, 260);
-    if (!this.asking) this.ask();
+    super.want();
   }
-  async ask() {
-    if (!this.stack) return;
-    this.wanted = false;
-    this.asking = true;
+  request() {
+    if (!this.stack) return null;
     const now = performance.now(), dt = Math.min(0.1, (now - (this.stepped ?? now)) / 1000) || 0.01;
     this.stepped = now;
     const tube = this.tubed ? { length: Number(this.tubeLength.value), diameter: Number(this.tubeDiameter.value), dt, restart: this.restart } : null;
@@ -121,30 +110,24 @@ export class Motion {
     const pose = { tube, pressures: this.pressures(), load: this.pull ?? [0, 0, 0], gravity: Boolean(this.gravity), plate: this.plated ? Number(this.plateHeight.value) : null, curves: this.curves };
     if (this.curves) clearTimeout(this.rest);
     this.curves = false;
-    try {
-      await listen("/api/motion", { tab, text: this.text, edits: [], name: this.studio.name, pose }, (answer) => {
-        if (answer.kind === "pose") this.arrived(answer);
-        else if (answer.kind === "curves") { this.way = answer; this.plots(); }
-        else if (answer.kind === "error") this.say(answer.message, true);
-        else if (answer.message) this.say(answer.message, true);
-      });
-    } catch (error) { this.say(error.message, true); }
-    this.asking = false;
-    if (this.wanted) this.ask();
-    else if (!this.tubed || this.settled) this.stepped = null;
+    return { text: this.text, pose };
   }
-  // A pose is drawn in the next frame; while it is painted the one after it is worked out.
+  answer(answer) {
+    if (answer.kind === "pose") this.arrived(answer);
+    else if (answer.kind === "curves") { this.way = answer; this.plots(); }
+    else if (answer.message) this.say(answer.message, true);
+  }
+  idle() { if (!this.tubed || this.settled) this.stepped = null; }
   arrived(pose) {
     const { stack } = this;
     // Asked for of a design that has changed since.
     if (!stack) return;
     if (pose.valves) this.settled = pose.valves.every((p, i) => Math.abs(p - pose.pressures[i]) < 0.01 + 0.002 * p);
     this.newest = pose;
-    this.frame ??= requestAnimationFrame(() => {
-      this.frame = null;
+    this.inFrame(() => {
       if (this.stack !== stack) return;
       // Through a tube the chambers follow their valves until they are as full.
-      if (this.tubed && !this.settled && !this.element.hidden) { this.wanted = true; if (!this.asking) this.ask(); }
+      if (this.tubed && !this.settled && !this.element.hidden) super.want();
       this.take(this.newest);
     });
   }
@@ -152,23 +135,12 @@ export class Motion {
   take(pose) {
     this.pose = pose;
     if (pose.valves?.join() !== this.valves) { this.valves = pose.valves?.join(); this.valvesAt = pose.time; }
-    this.times.push(performance.now());
     this.trace.push([performance.now() / 1000, pose.height, pose.bend, pose.volumes.reduce((sum, one) => sum + one, 0)]);
     while (this.trace.length > 2 && this.trace.at(-1)[0] - this.trace[0][0] > 8) this.trace.shift();
-    if (this.times.length > 240) this.times.shift();
-    const before = performance.now();
-    if (this.stage) this.draw();
-    this.tell();
-    this.costs.push(performance.now() - before);
-    if (this.costs.length > 240) this.costs.shift();
+    this.paint();
   }
-  // Figures and plots, no oftener than one can read them; the last ones always.
-  tell() {
-    const now = performance.now(), wait = READABLE - (now - (this.told ?? -READABLE));
-    clearTimeout(this.telling);
+  readings() {
     if (!this.stack) return;
-    if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
-    this.told = now;
     this.read();
     this.plots();
   }
@@ -178,12 +150,12 @@ export class Motion {
     const volume = pose.volumes.reduce((sum, one) => sum + one, 0), flow = Number(this.flow.value);
     const most = Math.max(...pose.volumes);
     const rows = [["Height", `${pose.height.toFixed(2)} mm`], ["Stroke", `${(pose.height - stack.flat_height).toFixed(2)} mm`], ["Bend", `${pose.bend.toFixed(1)}°`], ["Towards", pose.bend > 0.05 ? `${pose.direction.toFixed(0)}°` : "–"], ["Volume", `${volume.toFixed(1)} µl`], ["Force on plate", this.plated ? `${pose.force.toFixed(3)} N` : "–"], ["Fill time", flow > 0 ? `${((most / 1000 / flow) * 60).toFixed(2)} s` : "–"]];
-    if (pose.valves) rows.push(["In the chambers", `${pose.pressures.map((p) => p.toFixed(1)).join(" · ")} kPa`], ["Since the valves", `${(pose.time - this.valvesAt).toFixed(2)} s${this.settled ? ", filled" : ""}`]);
+    if (pose.valves) rows.push(["Chamber pressures", `${pose.pressures.map((p) => p.toFixed(1)).join(" · ")} kPa`], ["Since the valves changed", `${(pose.time - this.valvesAt).toFixed(2)} s${this.settled ? ", filled" : ""}`]);
     if (this.pull) rows.push(["Pull", `${(1000 * Math.hypot(...this.pull)).toFixed(1)} mN`]);
     this.values.replaceChildren(...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
     const beside = measured(stack);
-    if (!pose.stable) this.say(`Stands as a straight column that would rather buckle. ${beside}`, true);
-    else this.say(`${beside} Elastic films, still air, no calibration on a built actuator; fill time is the fullest chamber at this flow, without the tube's resistance, which Supply has. Walls are drawn as arcs of the film's length.`, false);
+    if (!pose.stable) this.say(`The straight column is unstable: it would buckle. ${beside}`, true);
+    else this.say(`${beside} Elastic films, static air, not calibrated on a built actuator. Fill time is that of the fullest chamber at this flow, without the resistance of a tube (see Supply). Walls are drawn as arcs of the film's length.`, false);
   }
 
   plots() {
@@ -195,7 +167,7 @@ export class Motion {
     }
     if (!this.way?.pressure) return;
     const p = Math.max(...this.pose.pressures);
-    this.plot.replaceChildren(el("h3", {}, "On the way to these pressures"), chart(this.way.pressure, this.way.height, p, this.pose.height, "Height, mm"), chart(this.way.pressure, this.way.bend, p, this.pose.bend, "Bend, °"), chart(this.way.pressure, this.way.volume, p, this.pose.volumes.reduce((sum, one) => sum + one, 0), "Volume, µl"));
+    this.plot.replaceChildren(el("h3", {}, "From 0 to these pressures"), chart(this.way.pressure, this.way.height, p, this.pose.height, "Height, mm"), chart(this.way.pressure, this.way.bend, p, this.pose.bend, "Bend, °"), chart(this.way.pressure, this.way.volume, p, this.pose.volumes.reduce((sum, one) => sum + one, 0), "Volume, µl"));
   }
 
   scene() {
@@ -283,12 +255,10 @@ export class Motion {
   round() {
     if (!this.sliders?.length) return null;
     const most = Math.max(5, ...this.pressures());
-    return (turn) => {
-      this.set((i) => (most * (1 + Math.cos(turn - (i * 2 * Math.PI) / this.sliders.length))) / 2);
+    return (elapsed) => {
+      this.set((i) => (most * (1 + Math.cos(angleAt(elapsed) - (i * 2 * Math.PI) / this.sliders.length))) / 2);
       clearTimeout(this.rest);
     };
   }
-  // Poses drawn a second, over the last ones.
-  rate() { const t = this.times; return t.length > 1 ? (1000 * (t.length - 1)) / (t.at(-1) - t[0]) : 0; }
   picture() { return this.stage.picture("motion.png"); }
 }

@@ -21,7 +21,7 @@ export class PartsCompare {
     studio.on("parts reference figures checked theme", () => this.update());
     studio.on("opened", () => { for (const eye of this.eyes ?? []) eye.touched = false; });
     try { this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true }); } catch {
-      this.halves[1].half.append(el("p", { class: "fallback" }, "The drawings take WebGL, which the browser does not offer here. What differs is listed below."));
+      this.halves[1].half.append(el("p", { class: "fallback" }, "The drawings need WebGL, which this browser does not provide. The differences are listed below."));
       return;
     }
     this.camera = new THREE.OrthographicCamera();

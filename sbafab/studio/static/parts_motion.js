@@ -3,33 +3,31 @@ import { Balloons } from "./balloons.js";
 import { css, el, plain } from "./dom.js";
 import { COARSE, FINE, measured, meshOf } from "./motion_drawing.js";
 import { PartMeshes, THREE, geometryOf, paintOf } from "./parts_scene.js";
-import { Playing } from "./playing.js";
+import { Playing, PoseView, angleAt } from "./play_loop.js";
 import { listen, tab } from "./server.js";
 import { Stage3D } from "./stage3d.js";
 
-// ms between two readings: figures that change oftener cannot be read.
-const READABLE = 110;
 // ms after which parts that no hand moves are at rest.
 const RESTS = 2500;
 // kPa at which a part stands when it is first shown, and the most that a grip is given.
 const FIRST = 5, FIRST_GRIP = 10, MOST_GRIP = 110;
 const TRUST = {
-  stack: "Each actuator by its own elastic stack, no calibration on a built one; what it carries moves with its tip and weighs nothing.",
-  grip: "Grips are lenses of film that does not stretch, equally high at any pressure.",
-  all: "Contact between parts is not felt here: where they meet, and what hangs on the tips, stands under Prediction. Supply tubes, and lines through an arm that moves, are left out.",
+  stack: "Each actuator is an elastic stack, not calibrated on a built one; the parts that it carries move with its tip, without weight.",
+  grip: "Grips are lenses of inextensible film, equally high at any pressure.",
+  all: "Contact between parts is ignored here; contacts and loads on the tips are under Prediction. Supply tubes, and lines through a moving arm, are left out.",
 };
 
-export class PartsMotion {
+export class PartsMotion extends PoseView {
   title = "Motion";
   constructor(studio) {
-    this.studio = studio;
+    super(studio);
     this.surface = el("div", { class: "surface" });
     this.side = el("div", { class: "side" });
     this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side), el("div", { class: "stale-mark" }, "Updating"));
-    Object.assign(this, { movers: new Map(), kept: new Map(), times: [], costs: [] });
+    Object.assign(this, { movers: new Map(), kept: new Map() });
     this.build();
     try { this.stage = new Stage3D(this.surface, { up: 16 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The figures beside it are the same."));
+      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The figures beside it are complete."));
     }
     if (this.stage) {
       this.mesh = meshOf(this.stage.software ? COARSE : FINE);
@@ -45,7 +43,6 @@ export class PartsMotion {
   // Whether a hand moves it, so that what takes seconds waits.
   get moving() { return !this.element.hidden && performance.now() - (this.moved ?? -RESTS) < RESTS; }
   show() { this.stage?.resize(); if (!this.text) this.load(); }
-  hide() { this.playing.stop(); }
 
   build() {
     this.knobs = el("div", { role: "group", "aria-label": "Pressures" });
@@ -54,14 +51,13 @@ export class PartsMotion {
     this.trust = el("div", { class: "trust", role: "status" });
     this.side.append(el("h3", {}, "Pressure, kPa"), this.knobs, el("div", { class: "group" }, this.playing.button, el("button", { onclick: () => this.set(() => 0) }, "Vent")), el("h3", {}, "Reading"), this.values, this.trust);
   }
-  say(words, beyond) { this.trust.textContent = words; this.trust.classList.toggle("beyond", beyond); }
 
   // What moves and how; the map of a balloon takes a second or two, once a shape.
   async load() {
     const { studio } = this, { text } = studio;
     if (studio.error || !studio.parts) return;
     const own = (this.loading = {});
-    this.say("Working out the balloons of these designs", false);
+    this.say("Computing the balloons of these designs", false);
     try {
       await listen("/api/motion", { tab, text, edits: [], name: studio.name, pose: {} }, (answer) => {
         if (this.loading !== own) return;
@@ -93,51 +89,34 @@ export class PartsMotion {
     this.want();
   }
 
-  // The newest wish goes out as soon as the last one is answered.
   want() {
-    this.wanted = true;
     this.moved = performance.now();
     // What takes seconds gives way to the hand.
     if (this.studio.prediction?.quick) this.studio.askElastic();
-    if (!this.asking) this.ask();
+    super.want();
   }
-  async ask() {
-    if (!this.text) return;
-    this.wanted = false;
-    this.asking = true;
-    const { text } = this, stacks = [...this.movers.values()].filter((mover) => mover.is === "stack");
-    try {
-      await listen("/api/motion", { tab, text, edits: [], name: this.studio.name, pose: { parts: Object.fromEntries(stacks.map((mover) => [mover.part, this.pressures(mover)])) } }, (answer) => {
-        if (answer.kind === "poses") this.arrived(answer.poses, text);
-        else if (answer.message) this.say(answer.message, true);
-      });
-    } catch (error) { this.say(error.message, true); }
-    this.asking = false;
-    if (this.wanted) this.ask();
+  request() {
+    if (!this.text) return null;
+    this.asked = this.text;
+    const stacks = [...this.movers.values()].filter((mover) => mover.is === "stack");
+    return { text: this.text, pose: { parts: Object.fromEntries(stacks.map((mover) => [mover.part, this.pressures(mover)])) } };
   }
-  // Poses are drawn in the next frame; while it is painted the next ones are worked out.
+  answer(answer) {
+    if (answer.kind === "poses") this.arrived(answer.poses, this.asked);
+    else if (answer.message) this.say(answer.message, true);
+  }
   arrived(poses, text) {
     this.newest = poses;
-    this.frame ??= requestAnimationFrame(() => {
-      this.frame = null;
+    this.inFrame(() => {
       if (this.text !== text) return;
       for (const [part, pose] of Object.entries(this.newest)) if (this.movers.has(part)) this.movers.get(part).pose = pose;
-      const before = performance.now();
-      if (this.stage) this.draw();
-      this.times.push(before);
-      this.costs.push(performance.now() - before);
-      for (const list of [this.times, this.costs]) if (list.length > 240) list.shift();
-      this.tell();
+      this.paint();
     });
   }
-  tell() {
-    const now = performance.now(), wait = READABLE - (now - (this.told ?? -READABLE));
-    clearTimeout(this.telling);
-    if (wait > 0) { this.telling = setTimeout(() => this.tell(), wait); return; }
-    this.told = now;
+  readings() {
     this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])), mover.is === "stack" && mover.pose ? el("p", { class: "more" }, measured(mover)) : ""]));
     const leaning = [...this.movers.values()].find(({ pose }) => pose && !pose.stable);
-    this.say(leaning ? `${leaning.part} stands as a straight column that would rather buckle` : this.trusted(), Boolean(leaning));
+    this.say(leaning ? `${leaning.part} is unstable as a straight column: it would buckle` : this.trusted(), Boolean(leaning));
     this.surface.firstChild?.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);
   }
 
@@ -203,7 +182,7 @@ export class PartsMotion {
   round() {
     if (!this.text) return null;
     const most = new Map([...this.movers].map(([name, mover]) => [name, Math.max(5, ...this.pressures(mover))]));
-    return (turn) => this.set((i, { part, is, sliders }) => (is === "grip" ? most.get(part) : (most.get(part) * (1 + Math.cos(turn - (i * 2 * Math.PI) / sliders.length))) / 2));
+    return (elapsed) => this.set((i, { part, is, sliders }) => (is === "grip" ? most.get(part) : (most.get(part) * (1 + Math.cos(angleAt(elapsed) - (i * 2 * Math.PI) / sliders.length))) / 2));
   }
   picture() { return this.stage.picture("assembly-motion.png"); }
 }
@@ -214,7 +193,7 @@ function rows(mover, pressures) {
   if (mover.is !== "grip") return [];
   const [p] = pressures, inside = mover.room !== null, across = p > 0 ? (inside ? mover.lumen : mover.free) : mover.deflated;
   const found = [["Diameter", `${across.toFixed(2)} mm`]];
-  if (inside) found.push(["Push of each stack on the wall", p > 0 ? `${(p * mover.push).toFixed(3)} N` : "–"]);
+  if (inside) found.push(["Force of each stack on the wall", p > 0 ? `${(p * mover.push).toFixed(3)} N` : "–"]);
   else if (mover.lumen) found.push([`Wall of ${plain(mover.lumen, 2)} mm`, "not reached"]);
   return found;
 }

@@ -51,7 +51,7 @@ export class PartsPlan {
       el("div", { class: "tools right-top", role: "group", "aria-label": "Seen from" }, ...this.buttons),
       el("div", { class: "stale-mark" }, "Updating"));
     try { this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here."));
+      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide."));
       return;
     }
     this.renderer.localClippingEnabled = true;

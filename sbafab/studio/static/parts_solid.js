@@ -20,7 +20,7 @@ export class PartsSolid {
       el("div", { class: "tools right-top", role: "group", "aria-label": "Camera" }, ...ways.map(([words, way]) => el("button", { onclick: () => { this.stage.touched = false; this.stage.look(...way); this.stage.fit(this.meshes.box()); } }, words))),
       el("div", { class: "stale-mark" }, "Updating"));
     try { this.stage = new Stage3D(this.surface, { up: 22 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. The parts and rules are listed all the same."));
+      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The parts and rules are listed beside it."));
       return;
     }
     this.meshes = new PartMeshes(studio);

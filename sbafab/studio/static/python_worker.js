@@ -41,7 +41,7 @@ async function work() {
 async function answer(studio, wish) {
   const { number } = wish;
   if (wish.made) {
-    const found = studio.made(wish.made), content = found?.toJs() ?? null;
+    const found = studio.made_bytes(wish.made), content = found?.toJs() ?? null;
     found?.destroy();
     postMessage({ number, content, done: true });
     return;

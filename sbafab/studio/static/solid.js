@@ -28,7 +28,7 @@ export class Solid {
     try {
       this.stage = new Stage3D(this.surface, { up: 22 });
     } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view takes WebGL, which the browser does not offer here. Section and Layers show the same design."));
+      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. Section and Layers show the same design."));
       return;
     }
     this.clip = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);

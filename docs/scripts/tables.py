@@ -1,0 +1,191 @@
+"""Tables kept as CSV in docs/measured: read, written, summarised, and each shown whole on a page.
+
+``validation`` holds every figure of the paper beside its prediction, ``sensitivity`` the calibrated
+forces with one assumption changed, ``balloons`` the elastic balloon beside CalculiX, ``faults`` what
+each rule says of each faulty folder. ``write`` makes the pages, which no sidebar lists.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+FOLDER = Path(__file__).parents[1] / "measured"
+
+
+class Table(NamedTuple):
+    """A table as its page shows it: texts, a line a row."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    @property
+    def markdown(self) -> str:
+        """The table as a page has it."""
+        rule = ["---"] * len(self.columns)
+        return "\n".join("| " + " | ".join(row) + " |" for row in (self.columns, rule, *self.rows))
+
+    def cell(self, row: str, column: str) -> str:
+        """One cell, by the first cell of its row and its column's head."""
+        (cells,) = (cells for cells in self.rows if cells[0] == row)
+        return cells[list(self.columns).index(column)]
+
+    @property
+    def csv(self) -> str:
+        """The table as a CSV file has it."""
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows((self.columns, *self.rows))
+        return text.getvalue()
+
+
+def from_csv(text: str) -> Table:
+    """Return the table of a CSV text, its first line the columns."""
+    columns, *rows = csv.reader(io.StringIO(text))
+    return Table(columns, rows)
+
+
+def table(name: str) -> Table:
+    """Return the table ``docs/measured/NAME.csv``."""
+    return from_csv((FOLDER / f"{name}.csv").read_text(encoding="utf-8"))
+
+
+def markdown_rows(text: str, heading: str = "") -> Iterator[list[str]]:
+    """Yield the rows of all Markdown tables of a text, each after the heading it stands below."""
+    header: list[str] = []
+    for line in text.splitlines():
+        if line.startswith("## "):
+            heading = line.removeprefix("## ")
+        if not line.startswith("|"):
+            header = []
+            continue
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if header and not set(cells[0]) <= {"-"}:
+            yield [heading, *cells]
+        header = header or cells
+
+
+SHOWN = (
+    # Figure, model and section of the CSV, and the figure's name in the summary.
+    (
+        "1-DoF, 100 kPa, at 75 % of full stroke",
+        "virtual work on Eq. 4",
+        "blocked force, 1-DoF, 75 % of stroke",
+    ),
+    ("3-DoF, 100 kPa, flat", "virtual work on Eq. 4", "blocked force, 3-DoF, flat"),
+    (
+        "3-DoF, 100 kPa, at 75 % of full stroke",
+        "virtual work on Eq. 4",
+        "blocked force, 3-DoF, 75 % of stroke",
+    ),
+    ("3-DoF, 100 kPa, flat", "elastic stack", "blocked force, 3-DoF, flat"),
+    (
+        "3-DoF, 100 kPa, at 75 % of full stroke",
+        "elastic stack",
+        "blocked force, 3-DoF, 75 % of stroke",
+    ),
+    ("3-DoF, 100 kPa, bent by 60 deg", "elastic stack, 2 chambers", "force when bent by 60 deg"),
+    (
+        "height of the 3-DoF of 15 balloons",
+        "elastic stack, 10 kPa in the chambers",
+        "height of the 3-DoF",
+    ),
+    ("largest bend", "elastic stack, 10 kPa in one chamber", "largest bend"),
+    ("largest bend", "elastic stack, 10 kPa in 2 chambers", "largest bend"),
+    (
+        "time to 10 kPa, water, 35 ml/min",
+        "Eq. 4 over flow, three chambers of 15 balloons at 17.5 mm",
+        "time to fill, water",
+    ),
+    ("time to 10 kPa, air, 2.5 l/min", "Eq. 4 over flow, squeezed to 10 kPa", "time to fill, air"),
+    (
+        "cantilever modulus, 3-DoF",
+        "E = F l^3 / (3 delta I), elastic stack at 10 kPa, chambers shut",
+        "lateral modulus, 3-DoF",
+    ),
+    ("3-DoF of 15 balloons, deflated", "sum of the films", "deflated height of the 3-DoF"),
+)
+
+
+def validation_summary() -> Table:
+    """Return the paper's main figures beside their predictions, one row a figure and model."""
+    every = table("validation")
+    at = list(every.columns).index
+    rows = []
+    for figure, model, name in SHOWN:
+        (cells,) = (
+            row for row in every.rows if (row[at("figure")], row[at("model")]) == (figure, model)
+        )
+        share = re.findall(r"([+-][\d.]+)%", cells[at("residual")])[0]
+        brief = model.replace("E = F l^3 / (3 delta I), ", "").split(", three chambers")[0]
+        rows.append([name, cells[at("paper")], cells[at("predicted")], f"{share} %", brief])
+    return Table(["figure", "paper", "predicted", "residual", "model"], rows)
+
+
+def balloons_summary() -> Table:
+    """Return the largest differences of stroke and air by pocket and how its rim was held."""
+    every = table("balloons")
+    largest: dict[tuple[str, str], list[float]] = {}
+    for name, *cells in every.rows:
+        size, _, rim = name.split(", ", 2)
+        rim = "even ripples" if "ripples" in rim else rim
+        off = [max(abs(float(value)) for value in cells[k].split(",")) for k in (3, 6)]
+        before = largest.get((rim, size), [0.0, 0.0])
+        largest[rim, size] = [max(pair) for pair in zip(before, off, strict=True)]
+    rows = [
+        [size.replace("d = ", "") + " mm", rim, f"{stroke:.1f} %", f"{air:.1f} %"]
+        for (rim, size), (stroke, air) in largest.items()
+    ]
+    return Table(["pocket", "rim", "stroke within", "air within"], rows)
+
+
+def faults_summary() -> Table:
+    """Return the number of kinds, of faults and of faulty folders."""
+    rows = table("faults").rows
+    folders = sum(not cell.startswith("n/a") for row in rows for cell in row[4:])
+    counts = (len({row[0] for row in rows}), len(rows), folders)
+    return Table(["kinds", "faults", "faulty folders"], [[str(count) for count in counts]])
+
+
+def sofa_summary() -> Table:
+    """Return height in mm and tilt in degrees of SOFA's scenes at 5 kPa, and their steps a second."""
+    columns, rows = json.loads((FOLDER / "sofa.json").read_text(encoding="utf-8"))["tables"][
+        "pressures"
+    ].values()
+    return Table(columns, [row for row in rows if row[0].startswith(("5, ", "steps"))])
+
+
+SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
+    ("validation", "summary"): validation_summary,
+    ("balloons", "summary"): balloons_summary,
+    ("faults", "summary"): faults_summary,
+    ("sofa", "summary"): sofa_summary,
+}
+"""What a page may name in ``<!-- measured: NAME TABLE -->`` beside the tables of the records."""
+
+TITLES = {
+    "validation": ("Every figure of the paper beside its prediction", "validation"),
+    "sensitivity": ("Calibrated forces with one assumption changed", "validation"),
+    "balloons": ("The elastic balloon beside CalculiX", "prediction"),
+    "faults": ("Every fault in every template", "faults"),
+}
+
+
+def write(folder: Path) -> None:
+    """Write a page for each table; a first column ``section`` becomes headings."""
+    for name, (title, page) in TITLES.items():
+        shown = table(name)
+        parts = [f"---\norphan: true\n---\n\n# {title}\n\nExplained in [{page}](../{page}.md).\n"]
+        if shown.columns[0] == "section":
+            first = 2 if shown.columns[1] == "note" else 1
+            for heading in dict.fromkeys(tuple(row[:first]) for row in shown.rows):
+                rows = [row[first:] for row in shown.rows if tuple(row[:first]) == heading]
+                said = "\n\n".join(heading)
+                parts.append(f"## {said}\n\n{Table(shown.columns[first:], rows).markdown}\n")
+        else:
+            parts.append(shown.markdown + "\n")
+        (folder / f"{name}-table.md").write_text("\n".join(parts), encoding="utf-8")

@@ -1,0 +1,186 @@
+"""Assembly files in and out: TOML to records, resolved TOML, hashes, and the entries of parts."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from sbafab.actuators import load_design, records
+from sbafab.assemblies.build import Assembled, PlacedPart, design_source
+from sbafab.assemblies.records import KINDS, AnyPart, Assembly, CheckName
+from sbafab.design.files import (
+    ASSEMBLY,
+    Change,
+    add_waivers,
+    changed_keys,
+    checked,
+    design_path,
+    listed,
+    override,
+    read_toml,
+    shown,
+    toml_tables,
+)
+from sbafab.design.identity import actuator_sha256, design_sha256
+from sbafab.design.records import Design, validated
+from sbafab.design.sections import RuleName
+from sbafab.errors import DesignError
+
+
+def load(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Design | Assembly:
+    """Return a design or an assembly, whichever the file holds. Raises DesignError."""
+    changes = list(changes)
+    path = design_path(source)
+    data = override(read_toml(path), changes)
+    if data.get("family") != ASSEMBLY:
+        return load_design(source, changes, waivers)
+    return changed_assembly(data, path, changes, waivers)
+
+
+def load_text(text: str, path: Path) -> Design | Assembly:
+    """Return the design or assembly of a text as if read from ``path``. Raises DesignError."""
+    data = toml_tables(text, path.name)
+    if data.get("family") == ASSEMBLY:
+        return assembly_of(data, path)
+    data.setdefault("name", path.stem)
+    return validated(data, records(), path.parent)
+
+
+def load_assembly(
+    source: str | Path, changes: Iterable[Change] = (), waivers: Sequence[str] = ()
+) -> Assembly:
+    """Return an assembly from a template's name or a TOML file. Raises DesignError."""
+    result = load(source, changes, waivers)
+    if isinstance(result, Assembly):
+        return result
+    raise DesignError(
+        f'{result.name} is no assembly; give a file with family = "{ASSEMBLY}" and [parts.NAME] '
+        "tables"
+    )
+
+
+def changed_assembly(
+    data: dict[str, Any], path: Path, changes: Sequence[Change], waivers: Sequence[str]
+) -> Assembly:
+    """Return the assembly of a file's tables with the changes made. Raises DesignError."""
+    _start_where_the_user_stands(data, changes)
+    names = (*get_args(RuleName), *get_args(CheckName))
+    return assembly_of(add_waivers(data, waivers, names), path)
+
+
+def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
+    """Return the record of an assembly file's tables. Raises DesignError with one sentence."""
+    tables = data.get("parts")
+    if not isinstance(tables, dict) or not tables:
+        raise DesignError(
+            "an assembly has a table for each part; add [parts.NAME] with kind = one of "
+            f"{listed(KINDS)}"
+        )
+    parts = {name: _part(name, table) for name, table in tables.items()}
+    whole = checked(Assembly, {"name": path.stem, **data, "parts": parts}, {})
+    return whole.placed(path.parent)
+
+
+def _part(name: str, table: object) -> AnyPart:
+    where = f"parts.{shown(name).strip(chr(39))}"
+    if not isinstance(table, dict):
+        raise DesignError(f"{where} = {shown(table)} must be a table of keys, [{where}]")
+    kind = table.get("kind")
+    if kind is None:
+        raise DesignError(f"{where}.kind is missing; add kind = one of {listed(KINDS)}")
+    if not isinstance(kind, str) or kind not in KINDS:
+        near = difflib.get_close_matches(shown(kind).strip("'"), KINDS, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise DesignError(f"{where}.kind = {shown(kind)} must be one of {listed(KINDS)}{hint}")
+    return checked(KINDS[kind], table, {}, f"{where}.")
+
+
+def _start_where_the_user_stands(data: dict[str, Any], changes: Sequence[Change]) -> None:
+    """Resolve a design's path on the command line against the current folder."""
+    for key in changed_keys(changes):
+        match key.split("."):
+            case ["parts", name, "design"] if source := data["parts"][name].get("design"):
+                if isinstance(design_source(str(source), Path()), Path):
+                    data["parts"][name]["design"] = str(Path(str(source)).absolute())
+
+
+DESIGN_FILE = "design.toml"
+
+
+def plain_tables(assembly: Assembly) -> dict[str, Any]:
+    """Return the assembly's own keys as tables, with every default written out."""
+    return _without_none(assembly.model_dump(mode="json"))
+
+
+def resolved(assembled: Assembled) -> dict[str, Any]:
+    """The assembly with every default written out; designs are those of the parts' folders."""
+    assembly = assembled.assembly
+    table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
+    for name, part in table["parts"].items():
+        source = assembled[name].made
+        if source is not None:
+            # The folder's design holds the keys that were set, the assembly's own among them.
+            part["design"] = f"{source.design.name}/{DESIGN_FILE}"
+            del part["set"]
+    return _without_none(table)
+
+
+def _without_none(table: dict[str, Any]) -> dict[str, Any]:
+    return {
+        key: _without_none(value) if isinstance(value, dict) else value
+        for key, value in table.items()
+        if value is not None
+    }
+
+
+def assembly_toml(assembled: Assembled) -> str:
+    """Return the ``design.toml`` of an output folder; it builds the same assembly again."""
+    import tomli_w
+
+    return tomli_w.dumps(resolved(assembled))
+
+
+def assembly_sha256(assembled: Assembled) -> str:
+    """Return the hash of all inputs of the output, the designs of the parts included."""
+    table = resolved(assembled)
+    digests = {source.design.name: design_sha256(source.design) for source in assembled.designs}
+    text = json.dumps([table, digests], sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def assembled_sha256(assembled: Assembled) -> str:
+    """Return the hash of the assembly itself: parts, places, glue, and the actuators among them.
+
+    Without name, order, pose of the pictures, notes and limits.
+    """
+    parts = {}
+    for name, part in resolved(assembled)["parts"].items():
+        source = assembled[name].made
+        actuator = {} if source is None else {"design": actuator_sha256(source.design)}
+        parts[name] = {**part, **actuator, "note": None}
+    text = json.dumps(parts, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def part_entry(placed: PlacedPart) -> dict[str, Any]:
+    """A part and its place: turned about its own axis, bent round a radius, rows and shift."""
+    part = placed.part
+    rounded = [[round(value, 9) + 0.0 for value in row] for row in placed.pose.rows]
+    return {
+        "name": placed.name,
+        "kind": part.kind,
+        "design": None if placed.made is None else placed.made.design.name,
+        "on": part.on,
+        "at": part.at,
+        "glue": part.glue,
+        "turn": part.turn,
+        "bent_radius": placed.radius,
+        "rows": rounded,
+        "shift": [round(value, 6) + 0.0 for value in placed.pose.shift],
+    }

@@ -1,0 +1,546 @@
+"""The formats of files and of what commands print with ``--json``: a JSON schema and an id each.
+
+What a document holds of a record as it is comes from the record's own types (``of``); the rest is
+written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, get_args, get_type_hints
+
+from pydantic import TypeAdapter
+
+from sbafab import actuators
+from sbafab.assemblies.records import Assembly
+from sbafab.cutting.calibration import Value
+from sbafab.errors import ERROR_SCHEMA
+from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.output import schema_ids as ids
+from sbafab.output.checked import CHECKS_SCHEMA
+from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
+from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.tables import PRESS_SCHEMA
+from sbafab.reports.assembly_prediction import (
+    AssemblyFigure,
+    AssemblyPrediction,
+    BentTouch,
+    Touch,
+)
+from sbafab.results.records import Record
+from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tolerance
+from sbafab.rules.finding import Finding, Place, Verdict
+from sbafab.rules.rule import Explanation
+from sbafab.search.find import Binding, RangeEnd, Spare
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+TEXT = {"type": "string"}
+COUNT = {"type": "integer", "minimum": 0}
+
+
+def number(*more: str) -> dict[str, Any]:
+    return {"type": ["number", *more]}
+
+
+def table(**properties: Any) -> dict[str, Any]:
+    """An object with all of these; further keys may be added."""
+    return {"type": "object", "required": list(properties), "properties": properties}
+
+
+def of(record: type, *left_out: str, **changed: Any) -> dict[str, Any]:
+    """Return an object with the fields of a record but those left out, each of its own type."""
+    own = {
+        name: TypeAdapter(hint).json_schema()
+        for name, hint in get_type_hints(record, include_extras=True).items()
+        if name not in (*left_out, *changed)
+    }
+    return table(**own, **changed)
+
+
+def and_perhaps(body: dict[str, Any], **properties: Any) -> dict[str, Any]:
+    """Add keys that may be missing, as those which a command prints beside what is in the file."""
+    return {**body, "properties": {**body["properties"], **properties}}
+
+
+def array(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {"type": "array", "items": dict(item)}
+
+
+def finding() -> dict[str, Any]:
+    """Return the schema of a finding."""
+    where = of(
+        Place,
+        interface={"type": ["integer", "null"], "description": "counted from 1, bottom to top"},
+        layers=array(COUNT),
+        x={**number("null"), "description": "mm"},
+        y={**number("null"), "description": "mm"},
+    )
+    return of(Finding, "by_user", "remedy", where=where)
+
+
+# Runs, records, measurements.
+
+
+YES = {"type": "boolean"}
+PATHS = {**array(TEXT), "description": "what lies in the folder"}
+SHARE = {"passed": COUNT, "tested": COUNT, "share": number(), "low": number(), "high": number()}
+
+
+def _run() -> dict[str, Any]:
+    return table(
+        schema={"const": ids.RUN_SCHEMA},
+        folder=TEXT,
+        failed=YES,
+        findings=array(finding()),
+        notes=array(TEXT),
+        files=PATHS,
+    )
+
+
+def _nested() -> dict[str, Any]:
+    one = table(name=TEXT, failed=YES, findings=array(finding()), notes=array(TEXT))
+    return table(
+        schema={"const": ids.NESTED_SCHEMA},
+        folder=TEXT,
+        failed=YES,
+        designs=array(one),
+        files=PATHS,
+    )
+
+
+def _records() -> dict[str, Any]:
+    numbers = {
+        "type": "object",
+        "additionalProperties": number(),
+        "description": "units stand in the keys",
+    }
+    record = of(
+        Record,
+        numbers=numbers,
+        recorded={**TEXT, "description": "UTC"},
+        actuator_sha256={**TEXT, "description": "equal for all designs that build this"},
+        design=TEXT,
+        corrected_by={"type": ["integer", "null"]},
+    )
+    return table(schema={"const": ids.RECORDS_SCHEMA}, records=array(record))
+
+
+def _report() -> dict[str, Any]:
+    verdict = {"verdict": TEXT}
+    measured = of(Comparison, ratio=number("null"), **verdict)
+    tolerance = of(Tolerance, found=of(Most), **verdict)
+    by_errors = of(
+        MeasuredYield,
+        tolerances={
+            "type": "object",
+            "additionalProperties": array(number()),
+            "description": "of each key the largest error measured and the most it leaves room for",
+        },
+    )
+    promise = table(
+        design=TEXT,
+        promised=number(),
+        by_measured_errors={**by_errors, "type": ["object", "null"]},
+        **SHARE,
+        verdict=TEXT,
+    )
+    return table(
+        schema={"const": ids.REPORT_SCHEMA},
+        records=COUNT,
+        actuators=COUNT,
+        success=array(of(Success, "share", **SHARE)),
+        measured=array(measured),
+        tolerances=array(tolerance),
+        promises=array(promise),
+        contradictions=array(TEXT),
+    )
+
+
+def _sweep() -> dict[str, Any]:
+    counts = {"type": "object", "additionalProperties": COUNT}
+    return table(
+        schema={"const": ids.SWEEP_SCHEMA},
+        folder=TEXT,
+        designs=COUNT,
+        measured_now=COUNT,
+        no_longer_asked=COUNT,
+        outcomes={**counts, "description": "designs by what became of them"},
+        files=PATHS,
+    )
+
+
+def _kerf() -> dict[str, Any]:
+    value = of(Value)
+    maybe = {**value, "type": ["object", "null"]}
+    offsets = {
+        "type": "object",
+        "additionalProperties": value,
+        "description": "mm that each instrument reads too much; empty where it cannot be told",
+    }
+    estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
+    of_axis = {**estimate, "type": ["object", "null"]}
+    return table(
+        schema={"const": ids.KERF_SCHEMA},
+        all={**estimate, "description": "kerf in mm, scale as a ratio, with 95 % half widths"},
+        x=of_axis,
+        y=of_axis,
+        difference={**maybe, "description": "kerf along x less that along y, mm"},
+        differs=YES,
+        warnings=array(TEXT),
+        remarks=array(TEXT),
+        toml={**TEXT, "description": "lines for the design file"},
+    )
+
+
+def _explain() -> dict[str, Any]:
+    return of(Explanation, schema={"const": ids.EXPLAIN_SCHEMA}, rule=TEXT)
+
+
+def _explained() -> dict[str, Any]:
+    rules = {"type": "object", "additionalProperties": of(Explanation)}
+    return table(schema={"const": ids.EXPLAINED_SCHEMA}, rules=rules)
+
+
+def _templates() -> dict[str, Any]:
+    return array(table(name=TEXT, summary=TEXT))
+
+
+def _simulate() -> dict[str, Any]:
+    numbers = {"type": "object", "additionalProperties": number("null")}
+    place = {**array(number()), "minItems": 3, "maxItems": 3}
+    tip = table(time=number(), place=place, tilt=number())
+    state = {"type": "object", "description": "pressures, stroke, tip, tilt, volumes, stress, work"}
+    body = table(
+        schema={"const": ids.SIMULATE_SCHEMA},
+        units={"type": "object", "additionalProperties": TEXT},
+        stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
+    )
+    return and_perhaps(
+        body,
+        folder=TEXT,
+        states={**array(state), "description": "calculix"},
+        scene={**TEXT, "description": "sofa"},
+        tips={**array(tip), "description": "sofa, mujoco"},
+        rate={**number("null"), "description": "sofa, mujoco"},
+        stroke={**number(), "description": "mujoco"},
+        volumes={**numbers, "description": "mujoco"},
+        drift={**number(), "description": "mujoco: mm in the last 0.5 s"},
+    )
+
+
+def _assembly_predict() -> dict[str, Any]:
+    measured = {
+        **TEXT,
+        "description": "what the paper measured of one actuator, where the model is off by more "
+        "than a quarter of it",
+    }
+    volume = {**number(), "description": "mm3"}
+    bend = {**number(), "description": "degrees"}
+    return of(
+        AssemblyPrediction,
+        schema={"const": ids.ASSEMBLY_PREDICT_SCHEMA},
+        figures=array(of(AssemblyFigure, measured=measured)),
+        touches=array(of(Touch, volume=volume)),
+        bent_touches=array(of(BentTouch, volume=volume, bend=bend)),
+    )
+
+
+def _balloon_map() -> dict[str, Any]:
+    rows = array(array(number()))
+    grid = {**rows, "description": "a row a pressure, a column a height"}
+    sizes = ("pocket_radius_mm", "neck_radius_mm", "bore_radius_mm", "film_mm", "modulus_kpa")
+    balloon = table(
+        **dict.fromkeys((*sizes, "poisson"), number()),
+        pressure=array(number()),
+        height=array(number()),
+        force=grid,
+        volume=grid,
+        potential=grid,
+    )
+    return table(
+        schema={"const": ids.MAP_SCHEMA},
+        design=TEXT,
+        units={"type": "object", "additionalProperties": TEXT},
+        levels={**array(COUNT), "description": "which of the balloons stands there, from 1"},
+        flat_level_mm=number(),
+        chamber_axes_mm=rows,
+        balloons=array(balloon),
+    )
+
+
+def _reproduction() -> dict[str, Any]:
+    row = table(
+        section=TEXT,
+        figure=TEXT,
+        unit=TEXT,
+        where=TEXT,
+        paper=number("null"),
+        error=number("null"),
+        predicted=number("null"),
+        model=TEXT,
+        why=TEXT,
+    )
+    found = table(schema={"const": ids.REPRODUCTION_SCHEMA}, rows=array(row))
+    return and_perhaps(found, folder=TEXT)
+
+
+def _design() -> dict[str, Any]:
+    schema = actuators.schema(Assembly)
+    return {key: value for key, value in schema.items() if key != "$schema"}
+
+
+def _manifest(record: type[Manifest | JobManifest], identity: str) -> dict[str, Any]:
+    body = record.model_json_schema(by_alias=True)
+    body["properties"]["schema"] = {"const": identity}
+    return body
+
+
+def _checks() -> dict[str, Any]:
+    counts = dict.fromkeys(get_args(Verdict), COUNT)
+    advice = table(
+        target_yield=number(),
+        bond_width={**number("null"), "description": "mm"},
+        mask_overhang={**number("null"), "description": "mm"},
+        measured=number("null"),
+        interval={"type": ["array", "null"], "items": number()},
+        message=TEXT,
+    )
+    sizes = {"type": "object", "additionalProperties": number()}
+    printed = {
+        "sizes": {
+            "description": "mm by name, of each design by its name",
+            "type": "object",
+            "additionalProperties": sizes,
+        },
+        "notes": array(TEXT),
+        "advice": {**advice, "description": "of --target-yield"},
+    }
+    found = table(
+        schema={"const": CHECKS_SCHEMA},
+        design={**TEXT, "description": "name of the design or assembly, or the folder's path"},
+        source={"enum": ["design", "as-built"]},
+        summary=table(holds={"type": "boolean"}, **counts),
+        kits=array({"type": "object"}),
+        findings=array(finding()),
+    )
+    return and_perhaps(found, **printed)
+
+
+def _error() -> dict[str, Any]:
+    kinds = ["usage", "input", "too-large", "defect", "stopped", "memory", "files"]
+    error = table(kind={"enum": kinds}, message=TEXT, exit_code={"type": "integer"})
+    return table(schema={"const": ERROR_SCHEMA}, error=error)
+
+
+def _press() -> dict[str, Any]:
+    body = TypeAdapter(Schedule).json_schema(mode="serialization")
+    body["properties"] = {"schema": {"const": PRESS_SCHEMA}, **body["properties"]}
+    body["properties"]["batch"] = _batch()
+    body["required"] = ["schema", *body["required"]]
+    return body
+
+
+def _batch() -> dict[str, Any]:
+    pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
+    place = {**array(number()), "minItems": 2, "maxItems": 2}
+    times = ("press_minutes", "hands_minutes", "total_minutes")
+    count_or_null = {**COUNT, "type": ["integer", "null"]}
+    perhaps = {"type": ["integer", "null"], "minimum": 1}
+    entry = table(
+        day=COUNT,
+        start_minutes={**number(), "description": "after the start of the shift"},
+        minutes=number(),
+        task={"enum": ["cut", "press", "finish"]},
+        cycle=perhaps,
+        step=perhaps,
+        copies={**array(COUNT), "minItems": 2, "maxItems": 2, "description": "first and last"},
+    )
+    return table(
+        copies=COUNT,
+        at_once=COUNT,
+        at_once_at_most=COUNT,
+        cycles={**array(COUNT), "description": "copies pressed in each cycle"},
+        places_mm=array(place),
+        **{name: number() if name == "hands_minutes" else number("null") for name in times},
+        a_day_one_by_one=count_or_null,
+        a_day_in_batches=count_or_null,
+        shift_minutes=number(),
+        plan={**array(entry), "description": "empty where no minutes are stated"},
+        patterns=array(pattern),
+    )
+
+
+def _predict() -> dict[str, Any]:
+    loss = {**number(), "description": "mm"}
+    factors = of(Factors, pocket_loss=loss)["properties"]
+    asked = of(PredictionRequest, "calibration", **factors)
+    design_with = {
+        "type": "boolean",
+        "description": "false where another model gives the same quantity, and that one is to "
+        "design with",
+    }
+    measured = _counterpart()
+    measured["type"] = ["object", "null"]
+    measured["description"] = (
+        "what the paper measured, where validation shows the model to be off by more than a "
+        "quarter of it"
+    )
+    between = {
+        **array(number()),
+        "type": ["array", "null"],
+        "description": "bounds of a drawn pocket that is taken for a disc",
+    }
+    figure = table(
+        group=TEXT,
+        name=TEXT,
+        value=number(),
+        unit=TEXT,
+        model=TEXT,
+        trust=TEXT,
+        design_with=design_with,
+        measured=measured,
+        between=between,
+    )
+    relation = table(
+        name=TEXT,
+        title=TEXT,
+        x={**TEXT, "description": "label of the axis, with its unit"},
+        y={**TEXT, "description": "label of the axis, with its unit"},
+        lines=array(of(Points, "error", model=TEXT, trust=TEXT)),
+        measured=array(of(Points)),
+        plot={**TEXT, "description": "its file in the folder"},
+    )
+    found = table(
+        schema={"const": ids.PREDICTION_SCHEMA},
+        name=TEXT,
+        family=TEXT,
+        design_sha256=TEXT,
+        generator=TEXT,
+        asked=asked,
+        verdict=array(of(VerdictLine)),
+        figures=array(figure),
+        left_out=array(of(LeftOut)),
+        relations=array(relation),
+    )
+    return and_perhaps(found, failed=array(TEXT), folder=TEXT)
+
+
+def _counterpart() -> dict[str, Any]:
+    return table(
+        sentence=TEXT,
+        value=number(),
+        error={**number(), "description": "0 where the paper gives none"},
+        unit=TEXT,
+        actuator=TEXT,
+        source=TEXT,
+        model_gave={**number(), "description": "the same model for that actuator, in the unit"},
+    )
+
+
+def _find() -> dict[str, Any]:
+    figures = {"type": "object", "additionalProperties": number()}
+    shown = table(
+        keys={"type": "object", "description": "keys of the design that were found"},
+        figures={**figures, "description": "quantities in mm, deg, N, g or a share"},
+    )
+    return table(
+        schema={"const": ids.FIND_SCHEMA},
+        holds={"type": "boolean"},
+        file={"type": ["string", "null"], "description": "the design file, null where none holds"},
+        started_from=TEXT,
+        tries=COUNT,
+        is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
+        best=shown,
+        full_stroke={**number("null"), "description": "mm, of the best, as predict has it"},
+        measured={
+            "type": "object",
+            "description": "what the paper measured, by quantity, where the model is off by more "
+            "than a quarter of it",
+            "additionalProperties": _counterpart(),
+        },
+        missed=array(TEXT),
+        binds=array(of(Binding)),
+        range_ends=array(of(RangeEnd, "step")),
+        without_room=array(of(Spare)),
+        front=array(shown),
+        on_front=COUNT,
+    )
+
+
+# All formats.
+
+
+class Format(NamedTuple):
+    """A format: the id that stands in the files, what it describes, and what makes its schema."""
+
+    identity: str
+    about: str
+    body: Callable[[], dict[str, Any]]
+
+
+FORMATS: Mapping[str, Format] = {
+    "design": Format(ids.DESIGN_SCHEMA, "design and assembly files (TOML)", _design),
+    "checks": Format(CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints", _checks),
+    "manifest": Format(
+        SCHEMA, "`manifest.json` of a design's folder", lambda: _manifest(Manifest, SCHEMA)
+    ),
+    "job": Format(
+        JOB_SCHEMA,
+        "`manifest.json` of several designs cut together by `nest`",
+        lambda: _manifest(JobManifest, JOB_SCHEMA),
+    ),
+    "assembly": Format(
+        ASSEMBLY_SCHEMA,
+        "`manifest.json` of an assembly's folder",
+        lambda: _manifest(AssemblyManifest, ASSEMBLY_SCHEMA),
+    ),
+    "press": Format(PRESS_SCHEMA, "`press.json`, the heat-press schedule", _press),
+    "predict": Format(
+        ids.PREDICTION_SCHEMA,
+        "`predict.json`, and what `predict --json` prints of a design",
+        _predict,
+    ),
+    "find": Format(ids.FIND_SCHEMA, "what `find --json` prints", _find),
+    "run": Format(
+        ids.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`", _run
+    ),
+    "nested": Format(ids.NESTED_SCHEMA, "what `nest --json` prints", _nested),
+    "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
+    "report": Format(ids.REPORT_SCHEMA, "what `record --report --json` prints", _report),
+    "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
+    "simulate": Format(
+        ids.SIMULATE_SCHEMA,
+        "`result.json` of a simulator's folder, and what `simulate --json` prints",
+        _simulate,
+    ),
+    "assembly-predict": Format(
+        ids.ASSEMBLY_PREDICT_SCHEMA,
+        "what `predict --json` prints of an assembly",
+        _assembly_predict,
+    ),
+    "reproduction": Format(
+        ids.REPRODUCTION_SCHEMA,
+        "`reproduction.json`, and what `reproduce --json` prints",
+        _reproduction,
+    ),
+    "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
+    "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),
+    "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain RULE --json` prints", _explain),
+    "explained": Format(
+        ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained
+    ),
+    "templates": Format(
+        ids.TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id", _templates
+    ),
+    "error": Format(
+        ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error", _error
+    ),
+}
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """Return the JSON schema of a format in ``FORMATS``."""
+    form = FORMATS[name]
+    head = {"$schema": DIALECT, "$id": f"urn:{form.identity.replace('/', ':')}"}
+    return {**head, **form.body()}

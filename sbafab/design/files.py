@@ -1,0 +1,459 @@
+"""Design files: TOML in and out, changes to keys, messages for faults, hashes, and templates."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from copy import deepcopy
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from sbafab.design.sections import RuleName
+from sbafab.errors import DesignError
+
+
+def listed(values: Iterable[object]) -> str:
+    """Return values in quotes, separated by commas."""
+    return ", ".join(f'"{value}"' for value in values)
+
+
+def shown(value: object) -> str:
+    """Return a value as it may appear in a message: short, on one line."""
+    try:
+        text = repr(str(value)) if isinstance(value, str | Path) else str(value)
+        if isinstance(value, bool):
+            text = text.lower()
+    except ValueError:
+        # Python does not write out integers of thousands of digits.
+        text = "a number of thousands of digits"
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def sentence(
+    error: ValidationError,
+    record: type[BaseModel],
+    families: Mapping[str, type[BaseModel]],
+    prefix: str,
+) -> str:
+    problems = error.errors(include_url=False)
+    unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
+    first = (unknown or problems)[0]
+    # Alternatives of a union put their own name in the location; a key is what the file holds.
+    where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
+    field = (prefix + ".".join(where)).rstrip(".")
+    count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
+    more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
+    if first["type"] == "extra_forbidden":
+        return prefix + _unknown_key(where, record, families) + more
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):
+        short = ".".join(where[:-1])
+        return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
+    if first["type"] == "missing":
+        return f"{field} is missing; add it to the design file{more}"
+    if not where:
+        return f"{field} {_allowed(first)}{more}"
+    return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
+
+
+def _plain(part: int | str) -> str:
+    """A key as it may appear in a message."""
+    text = str(part)
+    return text if text.isprintable() and len(text) <= 60 else shown(text)
+
+
+def _is_alternative(part: int | str) -> bool:
+    text = str(part)
+    return text in {"float", "int", "str"} or "[" in text or "(" in text
+
+
+def _allowed(problem: Any) -> str:
+    kind, context = problem["type"], problem.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    limits = {
+        "greater_than": "must be greater than {gt}",
+        "greater_than_equal": "must be at least {ge}",
+        "less_than": "must be less than {lt}",
+        "less_than_equal": "must be at most {le}",
+        "string_too_long": "must have at most {max_length} letters",
+        "too_long": "must have at most {max_length} entries",
+        "too_short": "must have at least {min_length} entries",
+    }
+    if kind == "literal_error":
+        near = difflib.get_close_matches(
+            str(problem["input"]), re.findall("'([^']*)'", context["expected"]), 1
+        )
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return f"must be {context['expected']}{hint}"
+    if kind in limits:
+        return limits[kind].format(**context)
+    plain = {
+        "string_pattern_mismatch": "must be 1 to 64 letters, digits, dots, dashes or underscores, "
+        "beginning with a letter or digit",
+        "finite_number": "must be a finite number",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "int_parsing_size": "is out of range",
+        "float_type": "must be a number",
+        "string_type": "must be a text in quotes",
+        "string_unicode": "must be plain text; remove what is no letter in it",
+        "bool_type": "must be true or false",
+        "model_type": "must be a table of keys",
+        "model_attributes_type": "must be a table of keys",
+        "tuple_type": "must be a list in brackets",
+        "list_type": "must be a list in brackets",
+    }
+    return plain.get(kind, f"is not allowed: {problem['msg'].lower()}")
+
+
+def _unknown_key(
+    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[BaseModel]]
+) -> str:
+    field = ".".join(where)
+    families_with_key = [name for name, model in families.items() if field in key_paths(model)]
+    if families_with_key:
+        return f"{field} is not a key of this family; it belongs to {listed(families_with_key)}"
+    paths = key_paths(record)
+    siblings = [path for path in paths if path.split(".")[:-1] == list(where[:-1])]
+    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], paths, 0.75)
+    if near:
+        return f"{field} is not a key of a design file; did you mean {near}?"
+    return f"{field} is not a key of a design file; known here: {', '.join(siblings)}"
+
+
+def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
+    """The path whose last part is most like ``key``."""
+    leaves = {path.split(".")[-1]: path for path in paths}
+    near = difflib.get_close_matches(key, leaves, 1, cutoff)
+    return leaves[near[0]] if near else None
+
+
+def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
+    """Return every dotted key of a record, as a file spells it, with its annotation."""
+    paths: dict[str, object] = {}
+    for name, info in record.model_fields.items():
+        key = info.alias or name
+        paths[prefix + key] = info.annotation
+        if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
+            paths.update(key_paths(info.annotation, f"{prefix}{key}."))
+    return paths
+
+
+# Design files and templates in: TOML to validated records, and one clear sentence if not.
+
+
+Change = str | Mapping[str, Any]
+"""A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
+OUTLINE = "chamber.outline"
+DIAMETER = "chamber.diameter"
+KIT = "kit"
+AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
+MOST_BYTES = 1_000_000
+ASSEMBLY = "assembly"
+"""The family of files that name several designs; :mod:`sbafab.assemblies` reads them."""
+DEEPEST = 8
+"""Most parts of a dotted key; a design file needs three."""
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*"""
+_TOO_DEEP = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}){{{DEEPEST}}}")
+_AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
+_UNQUOTED = re.compile(r"[^=#]*=\s*([-+.\d]+\s*[A-Za-z\u00b5\u03bc]+)\s*(?:#.*)?")
+"""A line whose value is a number and a unit without quotes."""
+
+
+def design_path(source: str | Path) -> Path:
+    """Return the file behind a template's name or a path. Raises DesignError if there is none."""
+    names = template_names()
+    if str(source) in names:
+        return templates_folder() / f"{source}.toml"
+    path = Path(source)
+    try:
+        if path.is_file():
+            return path
+        is_folder = path.is_dir()
+    except (OSError, ValueError):
+        is_folder = False
+    if is_folder:
+        raise DesignError(f"{shown(source)} is a folder; give a design file (.toml) or a template")
+    raise DesignError(f"{shown(source)} is neither a template nor a design file; {_hint(path)}")
+
+
+def _hint(missing: Path) -> str:
+    """Suggestion for a design that does not exist."""
+    names = template_names()
+    with suppress(OSError, ValueError):
+        beside = [path.name for path in missing.parent.iterdir() if _may_be_a_design(path)]
+        exact = f"{missing.name}.toml"
+        near = [exact] if exact in beside else difflib.get_close_matches(missing.name, beside, 1)
+        if near:
+            return f"did you mean {missing.with_name(near[0])}?"
+    near = difflib.get_close_matches(str(missing), names, 1)
+    return f"did you mean {near[0]}?" if near else f"the templates are {', '.join(names)}"
+
+
+def _may_be_a_design(path: Path) -> bool:
+    return path.suffix == ".toml" or (path / "design.toml").is_file()
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a design file. Raises DesignError where it cannot be read."""
+    try:
+        with path.open("rb") as opened:
+            content = opened.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            size = path.stat().st_size
+            raise DesignError(
+                f"{path} has {size:,} bytes; a design file has at most {MOST_BYTES:,}"
+            )
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise DesignError(f"{path} is not a text file in UTF-8; save it as UTF-8") from None
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read: {error.strerror or error}") from None
+    return toml_tables(text, path)
+
+
+def toml_tables(text: str, path: str | Path) -> dict[str, Any]:
+    """The tables of a design file's text; ``path`` names it in messages. Raises DesignError."""
+    # The parser's time grows with the square of the parts of a key.
+    deep = _TOO_DEEP.search(text)
+    if deep is not None:
+        raise DesignError(
+            f"{path} has a key of {DEEPEST} or more parts in line "
+            f"{text.count(chr(10), 0, deep.start()) + 1}; write [table] and key = value"
+        )
+    try:
+        return deepcopy(_parsed(text))
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        reason = str(error) or "nested too deeply"
+        # The parser names no key, but its line shows it.
+        number = _AT_LINE.search(reason)
+        line = text.split("\n")[int(number[1]) - 1] if number else text.rstrip().split("\n")[-1]
+        quotes = _UNQUOTED.fullmatch(line)
+        hint = f'; a value with a unit stands in quotes: "{quotes[1]}"' if quotes else ""
+        raise DesignError(
+            f"{path} is not valid TOML: {reason[:1].lower()}{reason[1:]}, "
+            f"{shown(line.strip())}{hint}"
+        ) from None
+
+
+@lru_cache(maxsize=8)
+def _parsed(text: str) -> dict[str, Any]:
+    """The tables of a text; a file that is varied is read again and again."""
+    return tomllib.loads(text)
+
+
+def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
+    """Return ``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
+
+    The value in a text is TOML, or else plain text. Raises DesignError for an invalid change.
+    """
+    changed = _copied(data)
+    for change in changes:
+        if isinstance(change, str):
+            key, equals, text = change.partition("=")
+            if not equals or not all(_key_parts(key)):
+                raise DesignError(
+                    f"--set {shown(change)} is not KEY=VALUE; write for example "
+                    "--set chamber.diameter=6"
+                )
+            _set(changed, key, _value(text.strip()))
+        else:
+            for key, value in change.items():
+                _set(changed, key, value)
+    return changed
+
+
+def changed_keys(changes: Iterable[Change]) -> Iterator[str]:
+    """Every dotted key that the changes set."""
+    for change in changes:
+        if isinstance(change, str):
+            yield ".".join(_key_parts(change.partition("=")[0]))
+            continue
+        for key, value in change.items():
+            inner = changed_keys([value]) if isinstance(value, Mapping) else ()
+            yield from (f"{key}.{name}" for name in inner)
+            yield key
+
+
+def _key_parts(key: str) -> list[str]:
+    return [part.strip() for part in key.split(".")]
+
+
+def _set(table: dict[str, Any], key: str, value: Any) -> None:
+    """Sets a dotted key; a table as value changes only the keys that it holds."""
+    parts = _key_parts(key)
+    if len(parts) > DEEPEST:
+        raise DesignError(f"--set {shown(key)} has {len(parts)} parts; a design's keys have three")
+    for part in parts[:-1]:
+        inner = table.setdefault(part, {})
+        if not isinstance(inner, dict):
+            raise DesignError(f"--set {key}: {part} is a value, not a table")
+        table = inner
+    current = table.get(parts[-1])
+    if isinstance(value, Mapping):
+        table[parts[-1]] = override(current if isinstance(current, dict) else {}, [value])
+    else:
+        table[parts[-1]] = list(value) if isinstance(value, tuple) else value
+
+
+def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """Make the paths of drawings and kits that a change names relative to the working directory."""
+    keys = set(changed_keys(changes))
+    if OUTLINE in keys:
+        chamber = data["chamber"]
+        chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+    if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
+        data[KIT] = str(Path(data[KIT]).absolute())
+
+
+def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
+    """Clear ``chamber.diameter`` if changes set ``fits`` and not the diameter."""
+    keys = set(changed_keys(changes))
+    chamber = data.get("chamber")
+    fits = DIAMETER not in keys and any(key.startswith(f"{FITS}.") for key in keys)
+    if fits and isinstance(chamber, dict):
+        chamber.pop("diameter", None)
+
+
+def add_waivers(
+    data: dict[str, Any], waivers: Sequence[str], rule_names: Sequence[str] = get_args(RuleName)
+) -> dict[str, Any]:
+    """Return ``data`` with rule names added to ``rules.waive``.
+
+    Raises DesignError for a name that is not among ``rule_names``, in the command line's words.
+    """
+    for name in waivers:
+        if name not in rule_names:
+            near = difflib.get_close_matches(name, rule_names, 3) or [
+                rule for rule in rule_names if rule.startswith(name)
+            ]
+            hint = (
+                f"did you mean {' or '.join(near)}"
+                if near
+                else f"it may be {', '.join(rule_names)}"
+            )
+            raise DesignError(f"--waive {shown(name)}: no rule has that name; {hint}")
+    rules = data.get("rules", {})
+    if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):
+        return data
+    return {**data, "rules": {**rules, "waive": [*rules.get("waive", []), *waivers]}}
+
+
+def _copied(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        key: _copied(value) if isinstance(value, dict) else value for key, value in data.items()
+    }
+
+
+def _value(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError):
+        return text
+
+
+def checked(
+    record: type[AnyRecord],
+    data: Mapping[str, Any],
+    families: Mapping[str, type[BaseModel]],
+    prefix: str = "",
+) -> AnyRecord:
+    """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
+    try:
+        return record.model_validate(data)
+    except ValidationError as error:
+        raise DesignError(sentence(error, record, families, prefix)) from None
+
+
+# Designs out: resolved TOML, design hash, JSON schema.
+
+
+FITS = "fits"
+
+
+# The designs and kits that ship, and files that start from them.
+
+
+KITS = "kits"
+"""The folder of the kits that ship, among the templates."""
+
+
+@cache
+def templates_folder() -> Path:
+    """Return the folder of the templates: in the installed package, or beside it in a checkout."""
+    packaged = Path(__file__).parents[1] / "templates"
+    return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
+
+
+def template_names() -> list[str]:
+    return list(_designs_in(templates_folder()))
+
+
+def kit_names() -> list[str]:
+    """Return the names of the kits that ship."""
+    return list(_designs_in(templates_folder() / KITS))
+
+
+@cache
+def _designs_in(folder: Path) -> tuple[str, ...]:
+    """Names of what ships in a folder, which stays as it is while a process runs."""
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
+
+
+def template_text(name: str) -> str:
+    """Return the commented text of a template. Raises DesignError if there is none."""
+    if name not in template_names():
+        raise DesignError(
+            f"{shown(name)} is not a template; there are {', '.join(template_names())}"
+        )
+    return (templates_folder() / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def template_summaries() -> dict[str, str]:
+    """Return template names with the first comment line of each."""
+    return {
+        name: (templates_folder() / f"{name}.toml")
+        .read_text(encoding="utf-8")
+        .partition("\n")[0]
+        .lstrip("# ")
+        for name in template_names()
+    }
+
+
+def write_new(template: str, file: Path | None) -> Path:
+    """Copy a template's commented file, named after the new file; never over an old one."""
+    names = template_names()
+    if template not in names:
+        near = difflib.get_close_matches(template, names, 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+        raise DesignError(f"{shown(template)} is not a template; {hint}")
+    return write_copy(templates_folder() / f"{template}.toml", file or Path(f"{template}.toml"))
+
+
+def name_of(file: Path) -> str:
+    """Return a design's name from that of its file; empty if no character of it is allowed."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem).strip("-._")[:64]
+
+
+def write_copy(source: Path, target: Path) -> Path:
+    """Copy a commented file, named after the new one; never over an old one."""
+    text = source.read_text(encoding="utf-8")
+    name = name_of(target) or source.stem
+    text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)
+    try:
+        with target.open("x", encoding="utf-8", newline="\n") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise DesignError(f"{target} exists; choose another name or remove it first") from None
+    except OSError as error:
+        missing = f"; make the folder {target.parent} first"
+        hint = missing if isinstance(error, FileNotFoundError) else "; name another place"
+        raise DesignError(f"{target} cannot be written: {error.strerror or error}{hint}") from None
+    return target

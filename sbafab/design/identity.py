@@ -1,0 +1,221 @@
+"""Identity of a design: its hashes, and its kit with the departures from it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from sbafab.design.files import (
+    FITS,
+    checked,
+)
+from sbafab.design.films import UNCALIBRATED, LayerFilms
+from sbafab.design.kits import DEFAULT, SCHEMA, Kit, KitFile, load_kit
+from sbafab.design.records import Design, resolved, without_none
+from sbafab.design.sections import (
+    Acceptance,
+    Inlet,
+    Order,
+    Press,
+    Registration,
+)
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
+
+LATER: Mapping[str, Sequence[str]] = {
+    "order": ("success_rate", "certainty", "shift_hours"),
+    "laser": ("hold_tpe", "hold_ptfe"),
+    "panel": ("carrier_adhesive", "carrier_limit_c"),
+}
+"""Keys that came after the first hashes, which have none of them."""
+
+
+FIRST_SPARES = 2
+"""What ``order.spares`` was by default, of masks alone; today's default keeps its hash."""
+
+
+def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the kit's hash for its path, and without later keys that have their defaults.
+
+    A design that names no kit and no layup keeps the hash that it had before there were any.
+    """
+    table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
+    if design.layup == LayerFilms():
+        table["layup"] = None
+    if design.inlet.adhesive == Inlet().adhesive:
+        table["inlet"]["adhesive"] = None
+    # What came later, where it says what was always so.
+    if design.acceptance == Acceptance():
+        table["acceptance"] = None
+    for key in ("minutes_for", "time_constant"):
+        if getattr(design.press, key) == getattr(Press(), key):
+            table["press"][key] = None
+    tpe = design.films.tpe
+    if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
+        table["films"]["tpe"] |= {"modulus": None, "poisson": None}
+    _as_first_ordered(table, design)
+    table["registration"]["pin_error"] = design.pin_error
+    for name, key, usual in (
+        ("registration", "plate_made_by", Registration().plate_made_by),
+        ("press", "underlay_thickness", Press().underlay_thickness),
+    ):
+        if table[name][key] == usual:
+            table[name][key] = None
+    return without_none(table)
+
+
+def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
+    """Remove later keys that have their defaults, and keys that only permit a method."""
+    table["registration"].pop("experimental")
+    has_usual_spares = all(
+        getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
+    )
+    if has_usual_spares:
+        table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
+    for section, keys in LATER.items():
+        current = getattr(design, section)
+        default = type(current)()
+        for key in keys:
+            if getattr(current, key) == getattr(default, key):
+                table[section][key] = None
+
+
+def design_sha256(design: Design) -> str:
+    """Return the hash of all that decides the output; a drawn outline counts by its content."""
+    return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
+
+
+def actuator_sha256(design: Design) -> str:
+    """Return the hash of an actuator of the design, however many are made, and on which tools.
+
+    It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
+    registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
+    Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
+    """
+    table = _with_drawing(resolved(design), design)
+    for section in NO_ACTUATOR:
+        table.pop(section, None)
+    films = _films(design)
+    table["layup"] = {role: films.get(name) for role, name in table["layup"].items()}
+    table["bore"] = {"diameter": design.bore.diameter}
+    method = design.registration.method
+    table["registration"] = [
+        method,
+        *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
+    ]
+    table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
+    table["press"] = [getattr(design.press, key) for key in BONDED]
+    return _sha256(table)
+
+
+NO_ACTUATOR = (
+    *("name", "kit", "films", "laser", "sheets", "order", "rules", "acceptance"),
+    FITS,
+)
+"""Sections that do not make another actuator; of films and laser the layup says what counts."""
+
+
+PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
+
+
+BRIDGED = ("bridge_width", "stub", "tack_minutes")
+
+
+BONDED = (
+    *("temperature_c", "pressure_kpa", "platen_width", "platen_length", "flash_bottom_minutes"),
+    *("bond_bottom_minutes", "flash_middle_minutes", "bond_all_minutes"),
+)
+
+
+def _films(design: Design) -> dict[str, list[object]]:
+    """Films by table name: kind, product, thickness, and True if the kerf is measured."""
+    kerfs = {name: film.kerf for name, film in design.films.others.items()}
+    kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
+    return {
+        name: [film.kind, film.product, film.thickness, kerfs[name] != UNCALIBRATED]
+        for name, film in design.films.stock.items()
+    }
+
+
+def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """The table with the drawn outline's content in place of its path."""
+    if design.drawing is not None:
+        table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
+    return table
+
+
+def _sha256(table: dict[str, Any]) -> str:
+    text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+OTHER_TUBE = "tubing of your choice"
+"""What a tube is called whose name stands for another size in the kit."""
+
+
+def kit_of(design: Design) -> Kit:
+    """Return the kit that a design names. Raises DesignError."""
+    return load_kit(design.kit, design.folder)
+
+
+def departures(design: Design) -> list[str]:
+    """Return the dotted keys that a design sets otherwise than its kit."""
+    kit = kit_of(design)
+    values, kit_values = resolved(design), dict(_values(kit))
+    keys = [key for key, value in kit_values.items() if _at(values, key) != value]
+    tube = kit.tubes.get(design.inlet.tube)
+    if kit.tubes and tube is None:
+        keys.append("inlet.tube")
+    elif tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
+        keys.append("inlet.tube_outer_diameter")
+    if kit.adhesives and design.inlet.adhesive not in kit.adhesives:
+        keys.append("inlet.adhesive")
+    return keys
+
+
+def tube_name(design: Design) -> str:
+    """Return the design's tubing, unless a tube of that name has another size in the kit."""
+    tube = kit_of(design).tubes.get(design.inlet.tube)
+    if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
+        return OTHER_TUBE
+    return design.inlet.tube
+
+
+def _values(kit: Kit) -> Iterator[tuple[str, object]]:
+    """Every key that a kit gives, and its value as a design would have it."""
+    record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
+    usual = record.model_dump(mode="json")
+    for key in _dotted(kit.tables):
+        yield key, _at(usual, key)
+
+
+def _dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}"
+
+
+def _at(table: Any, key: str) -> object:
+    for part in key.split("."):
+        table = table.get(part) if isinstance(table, dict) else None
+    return table
+
+
+def citation(design: Design) -> dict[str, Any]:
+    """Return the kit's entry in manifest and checks: name, version, hash, departures."""
+    kit = kit_of(design)
+    return {
+        "name": kit.name,
+        "version": kit.version,
+        "sha256": kit.sha256,
+        "departures": departures(design),
+    }
+
+
+def cited(design: Design) -> str:
+    """Return the kit's name, version and hash in words."""
+    kit = kit_of(design)
+    return f"kit {kit.name}, version {kit.version} (sha256 {kit.sha256[:12]})"

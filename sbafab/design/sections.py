@@ -1,0 +1,487 @@
+"""Sections of a design file that all families share, with defaults in mm."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    field_validator,
+)
+
+from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
+from sbafab.design.section import Section, writable
+from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
+from sbafab.laminate.base_plate import PlateMachine
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
+
+MOST = 1000
+"""Actuators of one order."""
+
+
+ROUNDING = 1e-9
+
+
+class Order(Section):
+    """How many, for whom, and how long a working day is."""
+
+    copies: int = Field(default=1, ge=1, le=MOST)
+    """How many of the actuator are made; more where order.good takes more."""
+    success_rate: float = Field(default=0.9, gt=0, le=1)
+    """Share of builds that come out good (paper Sec. 4: under 10 % failed). Take your lab's own
+    from "sbafab record --report" once it has one."""
+    certainty: float = Field(default=0.8, gt=0, lt=1)
+    """With what probability at least order.good come out good (ours): 20 good ones at 0.9 take 23
+    with 0.81, 24 with 0.91, 25 with 0.97."""
+    good: int | None = Field(default=None, ge=1, le=MOST)
+    """How many must come out good. As many more are made as order.success_rate and order.certainty
+    ask for; none asked for by default."""
+    spare_share: float = Field(default=0.05, ge=0, le=2)
+    """Spare parts as a share of the number that the actuators take of each pattern, rounded up
+    (ours). A part that is lost or torn at the press else costs a trip to the laser."""
+    spares: int = Field(default=1, ge=0, le=100)
+    """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
+    shift_hours: float = Field(default=8.0, ge=1, le=24)
+    """A working day of one person at one press: no press cycle takes more copies than fit in it."""
+    made_for: str = Field(default="", max_length=120)
+    """Printed on the traveller."""
+    note: str = Field(default="", max_length=400)
+    """Printed on the traveller."""
+
+    @field_validator("good")
+    @classmethod
+    def _copies_suffice(cls, good: int | None, info: ValidationInfo) -> int | None:
+        rate, certainty = info.data.get("success_rate"), info.data.get("certainty")
+        if good is None or rate is None or certainty is None:
+            return good
+        needed = builds_for(good, rate, certainty)
+        odds = f"at success_rate = {rate:g} and certainty = {certainty:g}"
+        if needed is None:
+            raise ValueError(
+                f"{odds} takes more than {MOST} builds; lower good or certainty, or split the order"
+            )
+        if 1 < info.data.get("copies", 1) < needed:
+            raise ValueError(
+                f"{odds} takes {needed}, and order.copies = {info.data['copies']}; leave copies or "
+                "good out, or lower certainty"
+            )
+        return good
+
+    @property
+    def quantity(self) -> int:
+        """Number of actuators that are made."""
+        if self.good is None:
+            return self.copies
+        needed = builds_for(self.good, self.success_rate, self.certainty)
+        return max(self.copies, needed or MOST)
+
+    @property
+    def why(self) -> str:
+        """Sentence on what the number that is made is good for; empty where none was asked for."""
+        if self.good is None:
+            return ""
+        likely = probability_of(self.good, self.quantity, self.success_rate)
+        return (
+            f"{self.quantity} are made for {self.good} good ones: if {self.success_rate:.0%} of "
+            "builds come out good, each whatever the others do, at least "
+            f"{self.good} of {self.quantity} do with a probability of {likely:.0%} (binomial)."
+        )
+
+    def spare_parts(self, needed: int) -> int:
+        """Number of spares of a pattern of which the actuators take ``needed`` parts."""
+        return max(self.spares, math.ceil(self.spare_share * needed - ROUNDING)) if needed else 0
+
+
+def probability_of(good: int, builds: int, rate: float) -> float:
+    """Probability that at least ``good`` of ``builds`` succeed, each with probability ``rate``.
+
+    The upper tail of the binomial distribution, summed over the number of failures. Builds are
+    taken as independent of each other, which those of one press cycle are not wholly.
+    """
+    return math.fsum(
+        math.comb(builds, failed) * rate ** (builds - failed) * (1 - rate) ** failed
+        for failed in range(builds - good + 1)
+    )
+
+
+def builds_for(good: int, rate: float, certainty: float) -> int | None:
+    """Least number of builds of which ``good`` succeed with this certainty; None beyond MOST."""
+    low, high = good, MOST
+    if probability_of(good, high, rate) < certainty:
+        return None
+    # The probability grows with the number of builds.
+    while low < high:
+        middle = (low + high) // 2
+        if probability_of(good, middle, rate) >= certainty:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+PAPER_FILM = film_name(PAPER_PRODUCT, PAPER_THICKNESS)
+
+
+FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
+"""For the paper's tube of 0.635 mm bore, which it stretches by 13 %; 23 G (0.641 mm) by 1 %."""
+
+
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+
+
+RuleName = Literal[
+    "bond-width",
+    "mask-overhang",
+    "facing-films",
+    "sealing",
+    "channel-clear",
+    "tube-fit",
+    "piece-count",
+    "pin-holes",
+    "pin-fit",
+    "bridges",
+    "scrap",
+    "film-limits",
+    "press-fit",
+    "registration-nominal",
+    "registration-worst-case",
+    "registration-yield",
+]
+
+
+class Bond(Section):
+    """Where two structural films melt together."""
+
+    width: Length = 0.75
+    """Width of every bonded ring, web and strip edge."""
+
+
+class Mask(Section):
+    """The Teflon that keeps films apart."""
+
+    overhang: Length = 0.5
+    """How far a mask reaches past the edges of the TPE layers it keeps apart."""
+
+
+class Bore(Section):
+    """The channel along the axis of a chamber."""
+
+    diameter: Length = 1.04
+    """Channel between the balloons of a chamber, and hole for its dowel pin (the paper gives
+    none)."""
+    clearance: Annotated[float, Millimetres(0, 1)] = 0.04
+    """By how much the bore is wider than its dowel pin. Ours: what registration leaves, for 0.75 -
+    2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must be left of a bond at worst."""
+    pin_diameter: Length | None = None
+    """Dowel pin of the bore; by default the bore less the clearance."""
+
+    @property
+    def pin(self) -> float:
+        """Diameter of the bore's dowel pin."""
+        if self.pin_diameter is not None:
+            return self.pin_diameter
+        return round(max(self.diameter - self.clearance, self.diameter / 2), 6)
+
+
+class Fillet(Section):
+    """Rounded corners."""
+
+    radius: LengthOrZero = 1.0
+    """Rounding of the concave corners of outlines (the paper gives none); 0 leaves them sharp."""
+
+
+class Inlet(Section):
+    """Tab, strip and tube through which a chamber is filled."""
+
+    tube: str = Field(default="Braintree RPT040", max_length=80)
+    """The tubing to order."""
+    tube_outer_diameter: Length = 1.016
+    """Outer diameter of the tubing."""
+    adhesive: str = Field(
+        default="Loctite Vinyl, Fabric & Plastic Flexible Adhesive", min_length=1, max_length=120
+    )
+    """What seals tube and mouth (paper Sec. 2)."""
+    width: Length | None = None
+    """Width of the inlet strip; by default what tube and strip need together, with cutting error
+    and an unknown kerf taken off, rounded up to 0.05."""
+    tab_length: Length = 5.0
+    """How far the inlet tab reaches past the outline (the paper gives none)."""
+
+
+class Registration(Section):
+    """What keeps the layers in register, and how far off they may lie."""
+
+    method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
+    """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
+    paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
+    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
+    which registration.experimental allows."""
+    experimental: bool = Field(default=False, validate_default=True)
+    """Whether a proposal that no bench has tried may be made, as --experimental says."""
+    pin_diameter: Length = 1.5
+    """Dowel pins of the ears, and of the corners of registered sheets."""
+    full_bond_pins: Literal["out", "in"] = "out"
+    """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
+    bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
+    coat. Neither was tried."""
+    pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
+    """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
+    pin_stretch: float = Field(default=0.3, ge=0, le=2)
+    """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
+    less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
+    D3369, Table 1); skived film stands less, TPE more."""
+    pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
+    """Whose diameters and lengths the dowel pins have; order them ground to m6."""
+    pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
+    """Lengths of pins that you have, in place of the standard's."""
+    cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
+    """The most by which a cut edge lies off its place (paper Sec. 2)."""
+    plate_made_by: PlateMachine = "jig-borer"
+    """What makes the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to its
+    pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed H7)."""
+    pin_error: Annotated[float, Millimetres(0, 1)] | None = None
+    """The most by which a layer on its pins lies off its place; by default what plate_made_by
+    gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
+    of a plate's only pin does not count: there each gives 0.004."""
+    hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
+    """The most by which what no pin holds lies off what it is laid on. The paper gives none: this,
+    with hand_turn, is calibrated so that the designs it built keep their limits as often as it
+    succeeded, nine times in ten. A rougher hand takes larger values of both."""
+    hand_turn: float = Field(default=0.4, ge=0, le=10)
+    """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
+    hand_placement."""
+
+    @field_validator("experimental")
+    @classmethod
+    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
+        if info.data.get("method") == "sheet" and not experimental:
+            raise ValueError(
+                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
+                'add --experimental, or set it to true, to have it all the same, or use "ears"'
+            )
+        return experimental
+
+    @property
+    def hole_diameter(self) -> float:
+        """Diameter of the holes in ears and tails."""
+        return self.pin_diameter + self.pin_clearance
+
+
+class PanelSection(Section):
+    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
+
+    bridge_width: Length = 1.0
+    """Width of the bridges that hold a film's part in its sheet until the second cut."""
+    stub: LengthOrZero = 0.25
+    """How far past the outline the second cut goes through a bridge."""
+    margin: Annotated[float, Millimetres(10, 100)] = 12.0
+    """Sheet round all copies, for pins and fiducials."""
+    web: Annotated[float, Millimetres(1, 100)] = 4.0
+    """Sheet between two copies."""
+    carrier: str = Field(default="transfer film of low tack", max_length=80)
+    """What holds the masks in register until they are tacked to their film."""
+    carrier_adhesive: str = Field(default="", max_length=80)
+    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
+    blank."""
+    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
+    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
+    default, and the traveller leaves a blank."""
+    tack_minutes: float = Field(default=1.0, gt=0, le=60)
+    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
+    sheet_error: LengthOrZero = 0.05
+    """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
+    second_cut_error: LengthOrZero = 0.2
+    """The most by which the second cut lies off the first."""
+
+
+NOT_MEASURED: Literal["not measured"] = "not measured"
+
+
+LONGEST_CONSTANT = 120.0
+"""Minutes, of a plate between platens."""
+
+
+def named_film(text: str) -> tuple[str, float]:
+    """Return product and thickness (mm) of a text such as "Stretchlon 200, 0.038 mm".
+
+    Raises ValueError with a sentence that says what is allowed.
+    """
+    product, _, thickness = text.rpartition(",")
+    try:
+        thick = millimetres(thickness)
+    except ValueError:
+        thick = 0.0
+    if not product.strip() or not SHORTEST <= thick <= 1:
+        raise ValueError(f'must be product and thickness of a film, such as "{PAPER_FILM}"')
+    return product.strip(), thick
+
+
+def _named_film(text: str) -> str:
+    writable(text)
+    named_film(text)
+    return text
+
+
+def _time_constant(value: object) -> object:
+    if value == NOT_MEASURED:
+        return value
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not 0 < float(str(value)) <= LONGEST_CONSTANT:
+        raise ValueError(
+            f'must be minutes, more than 0 and at most {LONGEST_CONSTANT:g}, or "{NOT_MEASURED}"'
+        )
+    return float(str(value))
+
+
+TimeConstant = Annotated[float | Literal["not measured"], BeforeValidator(_time_constant)]
+"""Minutes, or "not measured"."""
+
+
+class Press(Section):
+    """The heat press: temperature, pressure, minutes, platen."""
+
+    temperature_c: float = Field(default=135.0, gt=0, le=500)
+    """C; between the TPE's melting point and the PTFE's limit."""
+    pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
+    """On the whole platen."""
+    platen_width: Length = 152.4
+    """Heated area; the paper's press has 6 x 6 in."""
+    platen_length: Length = 152.4
+    """Heated area, the other way."""
+    plate_material: str = Field(default="steel", max_length=80)
+    """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
+    plate_thickness: Length | None = None
+    """Of the base plate; by default the thinnest plate sold, from 6 mm, that takes the pins."""
+    release_film: str = Field(default="PTFE film", max_length=80)
+    """What TPE does not stick to, one sheet below and one above (the paper names none)."""
+    release_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.05
+    """Thickness of one release film; PTFE film is sold in this thickness."""
+    underlay_thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.1
+    """Thickness of the printed underlay, where one lies on the plate; plain paper of 80 g/m2."""
+    pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
+    """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
+    pad_thickness: Length | None = None
+    """Of the press pad; by default the thinnest sold that gives films 1.5 times the pressure."""
+    pad_hardness: float = Field(default=10.0, ge=5, le=90)
+    """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
+    D; sheets of solid silicone rubber have 40 to 70."""
+    flash_bottom_minutes: float = Field(default=3.0, gt=0, le=600)
+    """Step 1: the bottom balloon's upper two layers."""
+    bond_bottom_minutes: float = Field(default=12.0, gt=0, le=600)
+    """Step 2: the bottom balloon, full bond."""
+    flash_middle_minutes: float = Field(default=10.0, gt=0, le=600)
+    """Step 3: all layers between the bottom balloon and the top layer."""
+    bond_all_minutes: float = Field(default=20.0, gt=0, le=600)
+    """Step 4: the whole laminate, full bond."""
+    minutes_for: tuple[Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...] = (
+        Field(default=(PAPER_FILM,), max_length=20, strict=False)
+    )
+    """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
+    other structural film gets no minutes: blanks on the traveller, null in press.json."""
+    time_constant: TimeConstant = NOT_MEASURED
+    """Minutes in which the edge of the base plate, laid cold between the hot platens under the
+    pad, makes 63 % of its way; measured once at the bench."""
+
+
+class Acceptance(Section):
+    """What an actuator must stand before it is handed on: all ours but the burst that it stays
+    below.
+    """
+
+    leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
+    """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""
+    leak_seconds: float = Field(default=60.0, gt=0, le=36000)
+    """How long it is held."""
+    proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
+    """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower where 60 % of the
+    estimated burst pressure is less."""
+    proof_seconds: float = Field(default=60.0, gt=0, le=36000)
+    """How long it is held."""
+    fitting: str = Field(default=FITTING, min_length=1, max_length=200)
+    """What joins the tube to a syringe, regulator or gauge."""
+
+
+HoldDown = Literal["border", "carrier", "vacuum"]
+"""What holds a film under the beam."""
+
+
+class Laser(Section):
+    """The laser: what it can cut, its kerf, how film is held, speeds for estimates."""
+
+    least_feature: Length = 0.2
+    """The narrowest slot or web the laser cuts well."""
+    cut_speed: float = Field(default=20.0, gt=0, le=5000)
+    """mm/s; for estimates of time only, no setting of a machine."""
+    travel_speed: float = Field(default=200.0, gt=0, le=5000)
+    """mm/s between cuts; for estimates of time only."""
+    pierce_seconds: float = Field(default=0.1, ge=0, le=60)
+    """Time to begin a contour; for estimates only."""
+    heat_distance: LengthOrZero = 3.0
+    """Parts nearer to each other than this are not cut one right after the other."""
+    kerf_tpe: KerfWidth = UNCALIBRATED
+    """Full kerf width in TPE, measured, or [along x, along y]; "uncalibrated" writes nominal edges
+    and says so."""
+    kerf_ptfe: KerfWidth = UNCALIBRATED
+    """Full kerf width in PTFE, measured, likewise."""
+    hold_tpe: HoldDown = "border"
+    """What holds TPE, and other films that bond, under the beam: its "border" taped to card, a
+    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
+    stays in a bond may leak."""
+    hold_ptfe: HoldDown = "carrier"
+    """What holds PTFE, and other masks, likewise. Ours, not tried: masks are light and loose, and
+    nothing bonds to them."""
+    unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
+    """What a kerf that was not measured may take off the width of a part: ours."""
+
+
+class Sheets(Section):
+    """The film sheets to cut from, and how parts are placed on them."""
+
+    tpe: Sheet = Sheet.model_construct()
+    ptfe: Sheet = Sheet.model_construct()
+    engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
+    """What looks for places; "spyrrow" (an extra) packs tighter and takes its time."""
+    seconds: float = Field(default=20.0, gt=0, le=3600)
+    """How long spyrrow looks, for each sheet."""
+    label: bool = True
+    """Whether name, material, number and design hash are engraved into the border."""
+
+
+class Rules(Section):
+    """Limits of the rule deck, and what is waived."""
+
+    bond_width: Length = 0.75
+    """Every bond must be at least this wide."""
+    mask_overhang: Length = 0.5
+    """Every mask must reach at least this far past the edges it keeps apart."""
+    worst_bond_width: LengthOrZero = 0.5
+    """What must be left of every bond with all errors of cutting and registration at worst."""
+    worst_mask_overhang: LengthOrZero = 0.25
+    """What must be left of every overhang with all errors at worst."""
+    target_yield: float | None = Field(default=None, gt=0, lt=1)
+    """The share of random builds that must keep the two limits above; none asked for by default."""
+    yield_builds: Annotated[int, Field(ge=100, le=1_000_000)] | None = None
+    """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
+    validated_balloons: int = Field(default=20, ge=1, le=1000)
+    """More balloons than this draw a warning (paper Sec. 6)."""
+    waive: tuple[RuleName, ...] = Field(default=(), strict=False)
+    """Rules whose failure shall not stop the cut files; every file then says so."""
+
+
+class Stack(Section):
+    """How high the actuator is."""
+
+    balloons: int = Field(default=6, ge=1, le=1000)
+    """Balloons in each chamber, bottom to top."""
+
+
+class Chamber(Section):
+    """The pockets of one chamber; a family adds their sizes."""
+
+    outline: str | None = Field(default=None, max_length=1000)
+    """DXF or SVG file with one closed path: the pocket, in place of the shape that the family gives
+    it. Drawn round (0, 0) it stays as it lies, else its centroid comes to the chamber's axis."""

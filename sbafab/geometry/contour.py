@@ -1,0 +1,511 @@
+"""Contours: closed chains of lines and arcs, their tidy form, chords that replace arcs, and copies.
+
+A contour keeps the material on its left: outer contours run counter-clockwise, holes clockwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+from operator import sub
+
+from sbafab.geometry.cache import cached_attribute
+from sbafab.geometry.edges import (
+    EPSILON,
+    SAME,
+    Arc,
+    Bounds,
+    Edge,
+    Line,
+    Point,
+    box_round,
+    distance_to,
+    left_normal,
+    quarter_arcs,
+    runs,
+    same_support,
+    turns_round,
+)
+
+Mark = tuple[float, float, float]
+Similarity = Callable[[Point], Point]
+"""A similarity of the plane, by its effect on points."""
+
+MANY = 32
+"""Edges from which on filing them by place is worth its cost."""
+
+
+@dataclass(frozen=True)
+class Contour:
+    """One closed chain of edges; each edge starts where the one before it ends."""
+
+    edges: tuple[Edge, ...]
+
+    @cached_attribute
+    def area(self) -> float:
+        """Enclosed area in mm2: positive counter-clockwise, negative for a hole."""
+        ox, oy = self.edges[0].start
+        twice = bulges = 0.0
+        for edge in self.edges:
+            x0, y0 = edge.start
+            x1, y1 = edge.end
+            twice += (x0 - ox) * (y1 - oy) - (x1 - ox) * (y0 - oy)
+            bulges += edge.segment_area
+        return twice / 2 + bulges
+
+    @cached_attribute
+    def length(self) -> float:
+        """Length in mm."""
+        return sum([edge.length for edge in self.edges])
+
+    @cached_attribute
+    def boxes(self) -> tuple[Bounds, ...]:
+        """The bounds of each edge."""
+        return tuple([edge.bounds for edge in self.edges])
+
+    @cached_attribute
+    def bounds(self) -> Bounds:
+        """Least x, least y, largest x, largest y, mm."""
+        return box_round(self.boxes)
+
+    @cached_attribute
+    def is_hole(self) -> bool:
+        """True if the contour runs clockwise."""
+        return self.area < 0
+
+    @cached_attribute
+    def start_hash(self) -> int:
+        """A hash of the points where edges start: equal for equal edges, rarely for others."""
+        return hash(tuple([edge.start for edge in self.edges]))
+
+    @cached_attribute
+    def circle(self) -> tuple[Point, float] | None:
+        """Centre and radius if the contour is one full circle."""
+        first = self.edges[0]
+        if not isinstance(first, Arc):
+            return None
+        for edge in self.edges[1:]:
+            if not isinstance(edge, Arc) or not same_support(first, edge):
+                return None
+        return first.centre, first.radius
+
+    @cached_attribute
+    def runs(self) -> tuple[tuple[Edge, ...], ...]:
+        """The edges gathered by the line or circle they lie on, from the first corner on."""
+        return tuple(runs(self.edges))
+
+    @property
+    def vertices(self) -> tuple[Mark, ...]:
+        """x, y and bulge of each vertex, as a DXF polyline carries them."""
+        return tuple((*edge.start, edge.bulge) for edge in self.edges)
+
+    @cached_attribute
+    def marks(self) -> tuple[Mark, ...]:
+        """The vertices with their bulges; of one circle, which may be split anywhere, its centre
+        and radius (negative for a hole).
+        """
+        if self.circle is None:
+            return self.vertices
+        centre, radius = self.circle
+        return ((*centre, -radius if self.is_hole else radius),)
+
+    def coincides(self, other: Contour) -> bool:
+        """Return True if corners and middles of the edges of both lie within SAME of each other."""
+        if len(self.marks) != len(other.marks) or self.is_hole != other.is_hole:
+            return False
+        if any(abs(a - b) > SAME for a, b in zip(self.bounds, other.bounds, strict=True)):
+            return False
+        if self.circle is not None or other.circle is not None:
+            return (self.circle is None) == (other.circle is None)
+        return any(
+            all(_coincide(a, b) for a, b in zip(self.edges, edges, strict=True))
+            for first, edge in enumerate(other.edges)
+            if _coincide(self.edges[0], edge)
+            for edges in [other.edges[first:] + other.edges[:first]]
+        )
+
+    def reversed(self) -> Contour:
+        """Return the contour run through the other way: a hole for an outline."""
+        result = Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
+        values, new = self.__dict__, result.__dict__
+        new["circle"] = self.circle
+        for name, sign in (("length", 1), ("area", -1)):
+            if name in values:
+                new[name] = sign * values[name]
+        if "bounds" in values:
+            new["bounds"] = values["bounds"]
+        return result
+
+    def mapped(self, point: Similarity, scale: float, mirror: bool) -> Contour:
+        """Return the contour under a similarity given by its effect on points."""
+        # Each edge starts where the one before it ends.
+        starts = [point(edge.start) for edge in self.edges]
+        ends = [*starts[1:], starts[0]]
+        edges = tuple(
+            [
+                Line(start, end)
+                if isinstance(edge, Line)
+                else Arc(start, end, point(edge.centre), edge.radius * scale, edge.ccw ^ mirror)
+                for edge, start, end in zip(self.edges, starts, ends, strict=True)
+            ]
+        )
+        image = Contour(edges)
+        values, new = self.__dict__, image.__dict__
+        if "length" in values:
+            new["length"] = scale * values["length"]
+        if "area" in values:
+            # A mirrored image keeps the material on its left once it is reversed.
+            new["area"] = scale * scale * values["area"] * (-1 if mirror else 1)
+        if self.circle is not None:
+            (x, y), radius = point(self.circle[0]), self.circle[1] * scale
+            new["circle"] = (x, y), radius
+            new["bounds"] = x - radius, y - radius, x + radius, y + radius
+        return image.reversed() if mirror else image
+
+    @cached_attribute
+    def _simple_circle(self) -> tuple[Point, float, int] | None:
+        """Centre, radius and direction of a full circle that runs round once."""
+        if self.circle is None:
+            return None
+        centre, radius = self.circle
+        if abs(abs(self.area) - math.pi * radius * radius) > SAME * radius:
+            return None
+        return centre, radius, -1 if self.area < 0 else 1
+
+    def winding(self, p: Point) -> int:
+        """Return the winding number round ``p`` (not on an edge), positive counter-clockwise."""
+        px, py = p
+        low_x, low_y, high_x, high_y = self.bounds
+        if not (low_x <= px <= high_x and low_y <= py <= high_y):
+            return 0
+        if self._simple_circle is not None:
+            (cx, cy), radius, turns = self._simple_circle
+            room = radius - math.hypot(px - cx, py - cy)
+            if abs(room) > SAME:
+                return turns if room > 0 else 0
+        turns = 0
+        if len(self.edges) < MANY:
+            for edge, box in zip(self.edges, self.boxes, strict=True):
+                if box[1] - EPSILON <= py <= box[3] + EPSILON:
+                    turns += turns_round(edge, p)
+            return turns
+        low, step, rows = self._rows
+        for edge in rows[min(len(rows) - 1, int((py - low) / step))]:
+            turns += turns_round(edge, p)
+        return turns
+
+    @cached_attribute
+    def _rows(self) -> tuple[float, float, list[list[Edge]]]:
+        """Edges by level: lowest y, height of a row, and each row's edges."""
+        _, low, _, high = self.bounds
+        count = len(self.edges) // 4
+        step = (high - low) / count
+        rows: list[list[Edge]] = [[] for _ in range(count)]
+        for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True):
+            # One row more at both ends: a row's own limits are rounded.
+            first, last = int((bottom - low) / step) - 1, int((top - low) / step) + 1
+            for row in range(max(0, first), min(count - 1, last) + 1):
+                rows[row].append(edge)
+        return low, step, rows
+
+    def polygon(self, sagitta: float = 0.001) -> list[Point]:
+        """Return vertices of a polygon whose chords stay within ``sagitta`` mm of the arcs."""
+        return facets(self, sagitta, keeps_area=False)
+
+
+def _coincide(a: Edge, b: Edge) -> bool:
+    return math.dist(a.start, b.start) < SAME and math.dist(a.at(0.5), b.at(0.5)) < SAME
+
+
+@lru_cache(maxsize=256)
+def circle(centre: Point, radius: float) -> Contour:
+    """Return a full circle, counter-clockwise, as four quarter arcs.
+
+    All layers that a bore goes through share one contour and the values cached in it.
+    """
+    x, y = centre
+    compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
+    contour = Contour(
+        tuple([Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4)])
+    )
+    # No need to work these out from the arcs.
+    contour.__dict__.update(
+        circle=(centre, radius),
+        area=math.pi * radius * radius,
+        length=math.tau * radius,
+        bounds=(x - radius, y - radius, x + radius, y + radius),
+    )
+    return contour
+
+
+# Similarities of the plane.
+
+
+def shift(dx: float, dy: float) -> Similarity:
+    return lambda p: (p[0] + dx, p[1] + dy)
+
+
+def turn(direction: Point, about: Point) -> Similarity:
+    """Return the rotation about a point that turns the x axis into a direction."""
+    (c, s), (ax, ay) = direction, about
+    return lambda p: (
+        ax + (p[0] - ax) * c - (p[1] - ay) * s,
+        ay + (p[0] - ax) * s + (p[1] - ay) * c,
+    )
+
+
+def scale(factor: float) -> Similarity:
+    return lambda p: (p[0] * factor, p[1] * factor)
+
+
+def flip(p: Point) -> Point:
+    """Return the point mirrored in the y axis."""
+    return -p[0], p[1]
+
+
+# Chords of arcs. On one circle they end at the same angles in every contour: at whole multiples
+# of one step, of which a whole number makes a quarter turn.
+
+
+CHORD_ROOM = 0.05
+"""Share of a chord's angle within which no vertex stands beside the end of a run of chords that
+keep to one side of it.
+"""
+
+
+def chord_step(half: float, least: int) -> float:
+    """Angle of a chord: no more than twice ``half``, at most a ``least``-th of a whole turn."""
+    return math.tau / (4 * math.ceil(max(least, math.ceil(math.pi / half)) / 4))
+
+
+def ticks(run: Sequence[Edge], step: float, room: float) -> list[float]:
+    """Angles, in the run's direction, of the chords' ends on a run of arcs of one circle.
+
+    Nearer than ``room`` steps to the run's ends there is none; a whole circle has all.
+    """
+    first = run[0]
+    assert isinstance(first, Arc)
+    sweep = run_sweep(run)
+    if run[-1].end == first.start:
+        numbers = range(round(math.tau / step))
+    else:
+        low, high = sorted((first.start_angle / step, (first.start_angle + sweep) / step))
+        numbers = range(math.ceil(low + room), math.floor(high - room) + 1)
+    return [number * step for number in (numbers if first.ccw else reversed(numbers))]
+
+
+def run_sweep(run: Sequence[Edge]) -> float:
+    """The angle that a run of arcs of one circle turns through, positive counter-clockwise."""
+    return sum([edge.sweep for edge in run if isinstance(edge, Arc)])
+
+
+def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Point]:
+    """Vertices in mm of a polygon that stands in for the contour.
+
+    The height of an arc over its chord is ``sagitta`` mm at most. To keep the area, vertices on a
+    circle stand two thirds of the sagitta outside it; corners, where arcs meet other edges, do not.
+    """
+    points: list[Point] = []
+    for run in contour.runs:
+        first = run[0]
+        if not isinstance(first, Arc):
+            points += [edge.start for edge in run]
+            continue
+        if contour.circle is None:
+            points.append(first.start)
+        half = math.acos(1 - min(1.0, sagitta / first.radius))
+        if keeps_area:
+            step = chord_step(half, 12)
+            # Half a step from the ends: nearer, a vertex outside the circle would make a dent.
+            angles = ticks(run, step, 0.5)
+            radius = first.radius * math.sqrt(step / math.sin(step))
+            if not angles:
+                points.append(first.on_circle(first.start_angle + run_sweep(run) / 2))
+        else:
+            angles = ticks(run, chord_step(half, 8), 1e-7)
+            radius = first.radius
+        circle = Arc(first.start, first.end, first.centre, radius, first.ccw)
+        points += [circle.on_circle(math.remainder(angle, math.tau)) for angle in angles]
+    if len(points) < 3:
+        return [edge.at(t) for edge in contour.edges for t in (0.0, 0.5)]
+    return points
+
+
+def run_chords(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
+    """Vertices of chords within ``error`` mm of a run, without the last, where the next run begins.
+
+    If it ``grows``, all that lies to the left of the run lies to the left of the chords; otherwise
+    all that lies to the left of the chords lies to the left of the run.
+    """
+    first = run[0]
+    if isinstance(first, Line):
+        return [first.start]
+    step = chord_step(math.acos(first.radius / (first.radius + error)) / (1 + CHORD_ROOM), 8)
+    angles = ticks(run, step, CHORD_ROOM)
+    is_whole = run[-1].end == first.start
+    if is_whole:
+        angles.append(angles[0] + (math.tau if first.ccw else -math.tau))
+    else:
+        angles = [first.start_angle, *angles, first.start_angle + run_sweep(run)]
+    if first.ccw == grows:
+        corners = [_apex(first, a, b) for a, b in pairwise(angles)]
+    else:
+        corners = [first.on_circle(angle) for angle in angles[not is_whole : -1]]
+    return corners if is_whole else [first.start, *corners]
+
+
+def _apex(arc: Arc, a: float, b: float) -> Point:
+    """Return the point where the tangents at two angles meet."""
+    middle, radius = (a + b) / 2, arc.radius / math.cos((b - a) / 2)
+    return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)
+
+
+# The tidy form, in which booleans return contours: edges of one support joined, dust left out.
+
+
+LEAST_AREA = 1e-7
+"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON, as
+they are on average where no place in them is SLIVER wide.
+"""
+SLIVER = 50 * EPSILON
+"""mm: a tenth of a micrometre."""
+QUARTER = math.pi / 2
+NANOMETRE = 1e-6
+"""mm."""
+
+
+def tidy(loop: Sequence[Edge]) -> Contour | None:
+    """Return a closed chain with edges of one support joined and arcs of at most a quarter turn.
+
+    None if it encloses rounding dust only.
+    """
+    contour = Contour(tuple(loop))
+    if abs(contour.area) < LEAST_AREA:
+        return None
+    if abs(contour.area) < 2 * EPSILON * contour.length and not _has_room(contour):
+        return None
+    if contour.circle is not None:
+        whole = circle(*contour.circle)
+        return whole if contour.area > 0 else whole.reversed()
+    edges = [edge for run in contour.runs for edge in _joined(run)]
+    first = _first_edge(edges)
+    return Contour((*edges[first:], *edges[:first]))
+
+
+def _has_room(contour: Contour) -> bool:
+    """True if a contour of hardly any width has a place beside an edge that is SLIVER wide.
+
+    A long sliver would hide it in its average.
+    """
+    into = -SLIVER / 2 if contour.area < 0 else SLIVER / 2
+    for edge in contour.edges:
+        if edge.length < SLIVER:
+            continue
+        for share in (0.25, 0.5, 0.75):
+            x, y = edge.at(share)
+            nx, ny = left_normal(edge, (x, y))
+            p = (x + into * nx, y + into * ny)
+            if contour.winding(p) and all(
+                distance_to(border, p) > 0.99 * SLIVER / 2 for border in contour.edges
+            ):
+                return True
+    return False
+
+
+def _first_edge(edges: Sequence[Edge]) -> int:
+    """Number of the edge whose start has the least x, of these the least y, to 1 nm."""
+    limit = min([edge.start[0] for edge in edges]) + 2 * NANOMETRE
+    first, least = 0, (math.inf, math.inf)
+    for i, edge in enumerate(edges):
+        x, y = edge.start
+        # Starts farther to the right are not rounded to the least x.
+        if x <= limit and (place := (nanometres(x), nanometres(y))) < least:
+            first, least = i, place
+    return first
+
+
+def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
+    head, end = run[0], run[-1].end
+    if isinstance(head, Line):
+        return [Line(head.start, end)]
+    if len(run) == 1 and 0 < (head.sweep if head.ccw else -head.sweep) < QUARTER:
+        return run
+    return quarter_arcs(head.start, end, head.centre, head.radius, run_sweep(run))
+
+
+def nanometres(value: float) -> int:
+    """Return the whole nanometres nearest to a length in mm.
+
+    Shapes that differ by a hair come in one order if their coordinates are compared so.
+    """
+    return math.floor(value * 1e6 + 0.5)
+
+
+def in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
+    """Outer contours, then holes, each from left to right."""
+    # Most regions have one or two.
+    return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
+
+
+def _reading_order(contour: Contour) -> tuple[bool, int, int, int]:
+    low_x, low_y, high_x, _ = contour.bounds
+    return contour.is_hole, nanometres(low_x), nanometres(low_y), nanometres(high_x)
+
+
+# Contours that are copies of each other: measures of one hold for all.
+
+
+COPIED = 1e-8
+"""mm: ten times the rounding of numbers in files; far below the distances of distinct edges."""
+
+
+class Copies:
+    """Contours, each matched with an earlier one of the same form at another place, if any."""
+
+    def __init__(self) -> None:
+        self._by_size: dict[tuple[int, ...], list[tuple[list[float], Contour]]] = defaultdict(list)
+        self._firsts: dict[int, tuple[Contour, Contour]] = {}
+
+    def first(self, contour: Contour) -> Contour:
+        """Return the first contour that this one is a copy of, edge by edge, moved: else itself.
+
+        Ends, centres and radii agree within ``COPIED``.
+        """
+        if id(contour) not in self._firsts:
+            self._firsts[id(contour)] = contour, self._match(contour)
+        return self._firsts[id(contour)][1]
+
+    def _match(self, contour: Contour) -> Contour:
+        ox, oy = contour.edges[0].start
+        numbers: list[float] = []
+        for edge in contour.edges:
+            x, y = edge.start
+            numbers += (x - ox, y - oy)
+            if isinstance(edge, Arc):
+                (x, y), radius = edge.centre, edge.radius
+                numbers += (x - ox, y - oy, radius if edge.ccw else -radius)
+        low_x, low_y, high_x, high_y = contour.bounds
+        # The rounded size nearly always agrees between copies and differs between others.
+        sizes = round(100 * (high_x - low_x)), round(100 * (high_y - low_y))
+        candidates = self._by_size[len(contour.edges), len(numbers), *sizes]
+        for candidate, first in candidates:
+            if max(map(abs, map(sub, numbers, candidate))) < COPIED:
+                return first
+        candidates.append((numbers, contour))
+        return contour
+
+    def lying(self, contour: Contour) -> tuple[int, Point]:
+        """Return a number of the contour's form, and its place: centre, or where it starts."""
+        if contour.circle is not None:
+            centre, radius = contour.circle
+            return -round(radius / COPIED), centre
+        return id(self.first(contour)), contour.edges[0].start
+
+
+def between(a: Point, b: Point) -> tuple[int, int]:
+    """Return the vector from the first of two points to the second, in whole ``COPIED``."""
+    return round((b[0] - a[0]) / COPIED), round((b[1] - a[1]) / COPIED)

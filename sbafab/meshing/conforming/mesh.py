@@ -1,0 +1,397 @@
+"""A mesh of second-order elements with its named sets, and the shape functions of its elements.
+
+Node order is that of Abaqus and CalculiX: corners first, then the middles of the edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import TYPE_CHECKING, Literal
+
+from sbafab.errors import DesignError
+from sbafab.meshing.surface import Surface
+
+if TYPE_CHECKING:
+    import meshio
+    import numpy as np
+    import pyvista
+    from numpy.typing import NDArray
+
+ElementKind = Literal["wedge15", "tetra10", "triangle6"]
+
+EDGES: dict[ElementKind, tuple[tuple[int, int], ...]] = {
+    "triangle6": ((0, 1), (1, 2), (2, 0)),
+    "tetra10": ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+    "wedge15": ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+}
+"""Corners of each edge, in the order of the mid-edge nodes."""
+
+FACES: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
+    "triangle6": ((0, 2, 1, 5, 4, 3), (0, 1, 2, 3, 4, 5)),
+    "tetra10": (
+        (0, 2, 1, 6, 5, 4),
+        (0, 1, 3, 4, 8, 7),
+        (1, 2, 3, 5, 9, 8),
+        (0, 3, 2, 7, 9, 6),
+    ),
+    "wedge15": (
+        (0, 2, 1, 8, 7, 6),
+        (3, 4, 5, 9, 10, 11),
+        (0, 1, 4, 3, 6, 13, 9, 12),
+        (1, 2, 5, 4, 7, 14, 10, 13),
+        (2, 0, 3, 5, 8, 12, 11, 14),
+    ),
+}
+"""Nodes of each face, counter-clockwise seen from outside; face numbers are those of Abaqus, less
+one; a triangle's are its lower side (SNEG) and its upper one (SPOS)."""
+
+CORNERS: dict[ElementKind, int] = {"triangle6": 3, "tetra10": 4, "wedge15": 6}
+VTK_TYPES = {"triangle": 5, "triangle6": 22, "tetra10": 24, "wedge15": 26}
+
+_REFERENCE: dict[ElementKind, tuple[tuple[float, ...], ...]] = {
+    "triangle6": ((0, 0), (1, 0), (0, 1)),
+    "tetra10": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "wedge15": ((0, 0, -1), (1, 0, -1), (0, 1, -1), (0, 0, 1), (1, 0, 1), (0, 1, 1)),
+}
+_THIRDS = ((1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3))
+_TETRA = 0.1381966011250105
+_GAUSS: dict[ElementKind, tuple[float, tuple[tuple[float, ...], ...]]] = {
+    "triangle6": (1 / 6, _THIRDS),
+    "tetra10": (
+        1 / 24,
+        tuple(
+            tuple(1 - 3 * _TETRA if axis == place else _TETRA for axis in range(3))
+            for place in range(4)
+        ),
+    ),
+    "wedge15": (1 / 6, tuple((*p, t) for t in (-(3**-0.5), 3**-0.5) for p in _THIRDS)),
+}
+"""Weight and places of the integration points that integrate a Jacobian exactly."""
+
+
+def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
+    plane = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    if kind == "triangle6":
+        return plane
+    if kind == "wedge15":
+        flat = tuple((*p, t) for t in (0, 1) for p in plane)
+        return (*flat, *((*p, 2) for p in plane[:3]))
+    space = [(i, j, k) for i in range(3) for j in range(3) for k in range(3)]
+    return tuple(powers for powers in space if sum(powers) <= 2)
+
+
+@cache
+def _slopes(kind: ElementKind, integration: bool) -> NDArray[np.float64]:
+    """Derivatives (places, nodes, dimensions) of the shape functions, at nodes or Gauss points."""
+    import numpy as np
+
+    corners = np.array(_REFERENCE[kind], dtype=float)
+    nodes = np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in EDGES[kind]]])
+    powers = np.array(_monomials(kind))
+    shape = np.linalg.inv(np.prod(nodes[:, None, :] ** powers, axis=2))
+    places = np.array(_GAUSS[kind][1]) if integration else nodes
+    slopes = []
+    for axis in range(powers.shape[1]):
+        lowered = powers.copy()
+        lowered[:, axis] = np.maximum(lowered[:, axis] - 1, 0)
+        terms = np.prod(places[:, None, :] ** lowered, axis=2) * powers[:, axis]
+        slopes.append(terms @ shape)
+    return np.stack(slopes, axis=2)
+
+
+def jacobians(
+    kind: ElementKind,
+    points: NDArray[np.float64],
+    cells: NDArray[np.int64],
+    integration: bool = False,
+) -> NDArray[np.float64]:
+    """Matrices (cells, places, space, dimensions) of the map from the reference element.
+
+    Places are the element's nodes, or its integration points.
+    """
+    import numpy as np
+
+    matrices: NDArray[np.float64] = np.einsum(
+        "cni,pnj->cpij", points[cells], _slopes(kind, integration), optimize=True
+    )
+    return matrices
+
+
+def scaled_jacobians(
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Least scaled Jacobian of each cell at its nodes and integration points.
+
+    Determinant over the product of the lengths of its columns: 1 where edges are at right
+    angles, 0.87 in an equilateral triangle, negative where the element is inverted.
+    """
+    import numpy as np
+
+    least = np.full(len(cells), np.inf)
+    for integration in (False, True):
+        matrices = jacobians(kind, points, cells, integration)
+        lengths = np.prod(np.linalg.norm(matrices, axis=2), axis=2)
+        ratio = _determinant(matrices) / np.maximum(lengths, 1e-300)
+        least = np.minimum(least, ratio.min(axis=1))
+    return least
+
+
+def volumes(
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Volume of each cell in mm3, or area in mm2 of triangles."""
+    import numpy as np
+
+    determinants = _determinant(jacobians(kind, points, cells, integration=True))
+    sizes: NDArray[np.float64] = np.sum(determinants, axis=1) * _GAUSS[kind][0]
+    return sizes
+
+
+def aspects(
+    kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Longest edge over shortest of each cell, between its corners."""
+    import numpy as np
+
+    lengths = np.stack(
+        [np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in EDGES[kind]]
+    )
+    ratio: NDArray[np.float64] = lengths.max(axis=0) / np.maximum(lengths.min(axis=0), 1e-300)
+    return ratio
+
+
+def _determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    import numpy as np
+
+    m = matrices
+    if m.shape[-2:] == (2, 2):
+        flat: NDArray[np.float64] = m[..., 0, 0] * m[..., 1, 1] - m[..., 0, 1] * m[..., 1, 0]
+        return flat
+    if m.shape[-2:] == (3, 2):
+        normals = np.cross(m[..., 0], m[..., 1])
+        mean = normals.mean(axis=1, keepdims=True)
+        mean = mean / np.linalg.norm(mean, axis=2, keepdims=True)
+        along: NDArray[np.float64] = np.sum(normals * mean, axis=2)
+        return along
+    solid: NDArray[np.float64] = np.einsum(
+        "...i,...i->...", np.cross(m[..., 0], m[..., 1]), m[..., 2]
+    )
+    return solid
+
+
+def integrals(
+    points: NDArray[np.float64], cells: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Stiffness (cells, 6, 6) and load (cells, 6) of Poisson's equation on plane triangles."""
+    import numpy as np
+
+    matrices = jacobians("triangle6", points, cells, integration=True)
+    sizes = _determinant(matrices) * _GAUSS["triangle6"][0]
+    inverse = np.linalg.inv(matrices)
+    slopes = np.einsum(
+        "pnj,cpji->cpni", _slopes("triangle6", integration=True), inverse, optimize=True
+    )
+    stiffness = np.einsum("cpni,cpmi,cp->cnm", slopes, slopes, sizes, optimize=True)
+    load = np.einsum("pn,cp->cn", _values(), sizes)
+    return stiffness, load
+
+
+def _values() -> NDArray[np.float64]:
+    """Shape functions (places, 6) of the triangle at its integration points."""
+    import numpy as np
+
+    r, s = np.array(_GAUSS["triangle6"][1]).T
+    q = 1 - r - s
+    corners = [q * (2 * q - 1), r * (2 * r - 1), s * (2 * s - 1)]
+    return np.column_stack([*corners, 4 * q * r, 4 * r * s, 4 * s * q])
+
+
+# Prisms as tetrahedra, second-order triangles as flat ones.
+
+
+TETRAHEDRA = (
+    ((0, 0), (1, 0), (2, 0), (2, 2)),
+    ((0, 0), (1, 2), (1, 0), (2, 2)),
+    ((0, 0), (0, 2), (1, 2), (2, 2)),
+)
+"""Corners of the tetrahedra in a prism: its columns by rank, and the level (0 below, 2 above)."""
+
+
+SIDE = (-1, 3, 5, 4)
+"""The mid-edge node between two corners of a triangle, by the sum of their places."""
+
+
+def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Three tetrahedra (3 x m, 10) of second order for each prism, in its order.
+
+    ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts below
+    the smaller number of two, so that neighbours agree.
+    """
+    import numpy as np
+
+    side = np.array(SIDE)
+    ranked = np.argsort(corners, axis=1)
+    is_even = (ranked[:, 1] - ranked[:, 0]) % 3 == 1
+    cells = np.empty((len(prisms), 3, 10), dtype=np.int64)
+    rows = np.arange(len(prisms))
+    for number, tetra in enumerate(TETRAHEDRA):
+        # A mirrored prism takes its first two corners the other way round.
+        for turned, chosen in (((0, 1, 2, 3), is_even), ((1, 0, 2, 3), ~is_even)):
+            ends = [tetra[place] for place in turned]
+            pairs = [(end, end) for end in ends]
+            pairs += [(ends[a], ends[b]) for a, b in EDGES["tetra10"]]
+            for node, ((column, level), (second, second_level)) in enumerate(pairs):
+                i, j = ranked[chosen, column], ranked[chosen, second]
+                local = i if column == second else side[i + j]
+                height = 3 * (level + second_level)
+                cells[rows[chosen], number, node] = prisms[rows[chosen], height + local]
+    return cells.reshape(-1, 10)
+
+
+def split_wedges(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Three tetrahedra (3 x m, 4) of first order for each wedge (m, 6), in its order.
+
+    Which way a side is cut hangs on the lower nodes' numbers, so that neighbours agree.
+    """
+    import numpy as np
+
+    prisms = np.repeat(corners, 3, axis=1)
+    prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
+    return tetrahedra(prisms, corners[:, :3])[:, :4]
+
+
+TRIANGLE_PARTS = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
+"""The four flat triangles through the nodes of a second-order one."""
+
+
+# The mesh that every writer reads.
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Elements of one kind, and named parts of them.
+
+    ``points`` (n, 3) mm; ``cells`` (m, nodes) indices of points. ``node_sets`` and ``cell_sets``
+    hold sorted indices; ``face_sets`` rows of cell and face number, as in ``elements.FACES``.
+    ``cavities`` are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter-
+    clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
+    shell's, in mm, a value a cell set. ``notes`` are sentences for whoever reads a file of it.
+    ``materials`` names the film that each part of a volume mesh is of; a bond is of what melts.
+    ``rest`` (n, 3) is where the points are in the flat laminate, free of stress; None where they
+    are there.
+    """
+
+    name: str
+    kind: ElementKind
+    points: NDArray[np.float64]
+    cells: NDArray[np.int64]
+    node_sets: Mapping[str, NDArray[np.int64]]
+    cell_sets: Mapping[str, NDArray[np.int64]]
+    face_sets: Mapping[str, NDArray[np.int64]]
+    cavities: Mapping[str, NDArray[np.int64]]
+    thickness: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    materials: Mapping[str, str] = field(default_factory=dict)
+    rest: NDArray[np.float64] | None = None
+
+    @property
+    def parts(self) -> dict[str, NDArray[np.int64]]:
+        """The cell sets that share the cells out: films and bonds, or a shell's thicknesses."""
+        names = self.thickness or self.cell_sets
+        return {name: self.cell_sets[name] for name in names}
+
+    def cavity(self, name: str) -> tuple[Surface, NDArray[np.int64]]:
+        """A cavity as a surface of its own, and the mesh's node of each of its points."""
+        import numpy as np
+
+        nodes, faces = np.unique(self.cavities[name], return_inverse=True)
+        return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
+
+    def node_fields(self) -> dict[str, NDArray[np.uint8]]:
+        """Return the node sets other than bonds, each as 0 or 1 a node."""
+        return {
+            name: _marked(len(self.points), nodes)
+            for name, nodes in self.node_sets.items()
+            if not name.startswith("bond_")
+        }
+
+    def cell_fields(self) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
+        """Return ``part``, each cell's part from 1, and the face sets as 0 or 1 a cell."""
+        import numpy as np
+
+        part = np.zeros(len(self.cells), dtype=np.int32)
+        for number, cells in enumerate(self.parts.values(), start=1):
+            part[cells] = number
+        faces = {
+            name: _marked(len(self.cells), rows[:, 0]) for name, rows in self.face_sets.items()
+        }
+        return {"part": part, **faces}
+
+    def meshio(self) -> meshio.Mesh:
+        """Return the mesh for meshio (extra "python"), with its fields, point and cell sets.
+
+        meshio 5.3 refuses wedges of 15 nodes: they come as wedges of their six corners, and the
+        points of their mid-edge nodes belong to no cell. Tetrahedra keep their second order.
+        Raises DesignError without meshio.
+        """
+        try:
+            import meshio
+        except ImportError as error:
+            raise _not_installed("meshio") from error
+        cells: tuple[str, NDArray[np.int64]] = self.kind, self.cells
+        if self.kind == "wedge15":
+            cells = "wedge", self.cells[:, : CORNERS["wedge15"]]
+        return meshio.Mesh(
+            self.points,
+            [cells],
+            point_data=self.node_fields(),
+            cell_data={name: [values] for name, values in self.cell_fields().items()},
+            point_sets=dict(self.node_sets),
+            cell_sets={name: [cells] for name, cells in self.cell_sets.items()},
+        )
+
+    def pyvista(self) -> pyvista.UnstructuredGrid:
+        """Return the mesh for PyVista (extra "python"), with the fields that a VTU file has.
+
+        Raises DesignError without pyvista.
+        """
+        try:
+            import pyvista
+        except ImportError as error:
+            raise _not_installed("pyvista") from error
+        grid = pyvista.UnstructuredGrid({VTK_TYPES[self.kind]: self.cells}, self.points)
+        for name, values in self.node_fields().items():
+            grid.point_data[name] = values
+        for name, marks in self.cell_fields().items():
+            grid.cell_data[name] = marks
+        return grid
+
+    def linear(self) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+        """Points, and tetrahedra or triangles of first order through the corners; the cell of each.
+
+        Wedges become three tetrahedra each.
+        """
+        import numpy as np
+
+        count = CORNERS[self.kind]
+        corners = self.cells[:, :count]
+        owner = np.arange(len(corners))
+        if self.kind == "wedge15":
+            corners = split_wedges(corners)
+            owner = np.repeat(owner, 3)
+        nodes, cells = np.unique(corners, return_inverse=True)
+        return self.points[nodes], cells.reshape(corners.shape), owner
+
+
+def _marked(count: int, indices: NDArray[np.int64]) -> NDArray[np.uint8]:
+    import numpy as np
+
+    marks = np.zeros(count, dtype=np.uint8)
+    marks[indices] = 1
+    return marks
+
+
+def _not_installed(library: str) -> DesignError:
+    return DesignError(f'{library} is not installed; add it with pip install "sbafab[python]"')

@@ -1,0 +1,532 @@
+"""Energy of a stack under load: kinematics of its chain of plates, springs of its levels, and
+external forces.
+
+A level has three freedoms: its rise (mm) and the tilt of its upper plate, a rotation vector in the
+lower plate's plane (rad). Half of the tilt comes before the rise and half after, as by constant
+curvature within a level. Arrays have a row a level.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, derivatives, horner
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from sbafab.models.balloon_map import BalloonMap
+    from sbafab.models.film_elements import Array
+
+SMALL = 1e-8
+"""Square of the angle below which functions of the angle are replaced by those at this one."""
+BASE = np.eye(3)
+LEVI_CIVITA = np.zeros((3, 3, 3))
+"""The Levi-Civita symbol."""
+LEVI_CIVITA[[0, 1, 2], [1, 2, 0], [2, 0, 1]] = 1.0
+LEVI_CIVITA[[0, 2, 1], [2, 1, 0], [1, 0, 2]] = -1.0
+CROSS = LEVI_CIVITA.transpose(1, 2, 0).reshape(3, 9)
+
+
+def _force_motion_matrix() -> Array:
+    """Return the matrix (12, 24) behind ``force_motions``."""
+    matrix = np.zeros((12, 6, 4))
+    arms, forces = matrix[:9].reshape(3, 3, 6, 4), matrix[9:]
+    unit = np.eye(3)
+    # (turn x x) x f is x (turn . f) less turn (x . f).
+    arms[:, :, :3, :3] = np.einsum("kc,lr->klrc", unit, unit) - np.einsum("kl,rc->klrc", unit, unit)
+    arms[:, :, :3, 3] = LEVI_CIVITA.transpose(1, 2, 0)
+    forces[:, 3:, :3] = -LEVI_CIVITA.transpose(1, 2, 0)
+    forces[:, 3:, 3] = unit
+    return matrix.reshape(12, 24)
+
+
+FORCE_MOTION = _force_motion_matrix()
+
+
+def _rotation_matrix() -> Array:
+    """Return the matrix (12, 13) of ``_rotations``: by 1, x, y, xx, xy, yx, yy, 1, xx .. yy."""
+    matrix = np.zeros((12, 13))
+    turn, rate = matrix[:, :9].reshape(12, 3, 3), matrix[:, 9:].reshape(12, 2, 2)
+    turn[0] = BASE
+    # The vector (x, y, 0) as a cross product, then that twice.
+    turn[1:3] = LEVI_CIVITA[:, :2].transpose(1, 0, 2)
+    turn[3:7] = (turn[1:3, None] @ turn[None, 1:3]).reshape(4, 3, 3)
+    rate[7] = BASE[:2, :2]
+    rate[8:] = np.eye(4).reshape(4, 2, 2)
+    return matrix
+
+
+ROTATION = _rotation_matrix()
+
+
+class Chain(NamedTuple):
+    """Plates of a chain, the base first: places (n + 1, 3) in mm and axes (n + 1, 3, 3), whose
+    columns are the plates' x, y and z; ``rises`` (n, 3) are the levels' directions.
+
+    A level's tilt turns all beyond it about its middle: ``middles`` (n, 3) in mm; ``turns``
+    (n, 2, 3) are the rotations by a unit of either tilt.
+    """
+
+    places: Array
+    axes: Array
+    rises: Array
+    middles: Array
+    turns: Array
+
+
+def plate_chain(freedoms: Array, pitch: float) -> Chain:
+    """Return the plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
+    count = len(freedoms)
+    turned, rates = _rotations(freedoms[:, 1:] / 2)
+    axes = np.empty((count + 1, 3, 3))
+    axes[0] = BASE
+    np.matmul(turned, turned, out=axes[1:])
+    reach = 1
+    while reach < count:
+        # Each is already the product of ``reach`` levels up to its own.
+        axes[reach + 1 :] = axes[1:-reach] @ axes[reach + 1 :]
+        reach *= 2
+    middle = axes[:-1] @ turned
+    rises = middle[:, :, 2]
+    steps = rises * (freedoms[:, :1] + pitch)
+    places = _sums(count) @ steps
+    # What the first half of a tilt turns by and what the second does differ along the plates
+    # between them alone, across which the level rises: together they turn about its middle.
+    turns = rates @ middle[:, :, :2].transpose(0, 2, 1)
+    return Chain(places, axes, rises, places[1:] - steps / 2, turns)
+
+
+@lru_cache(maxsize=16)
+def _sums(count: int) -> Array:
+    """Return the matrix (count + 1, count) that adds up the rows before each place."""
+    return np.tri(count + 1, count, -1)
+
+
+def _rotations(vectors: Array) -> tuple[Array, Array]:
+    """Return rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and the rotation by a unit of
+    each component, half before and half after, in the xy plane between (n, 2, 2): Rodrigues'
+    formula, and the mean of the left and the right Jacobian.
+    """
+    count = len(vectors)
+    # A column a level: numpy is the faster the longer its last axis.
+    each = vectors.T
+    pairs = (each[:, None] * each).reshape(4, count)
+    safe = np.maximum(pairs[0] + pairs[3], SMALL)
+    angle = np.sqrt(safe)
+    sine = np.sin(angle) / angle
+    parts = np.empty((12, count))
+    parts[0] = 1.0
+    np.multiply(sine, each, out=parts[1:3])
+    np.multiply((1 - np.cos(angle)) / safe, pairs, out=parts[3:7])
+    parts[7] = sine
+    np.multiply((1 - sine) / safe, pairs, out=parts[8:])
+    rows = parts.T @ ROTATION
+    return rows[:, :9].reshape(count, 3, 3), rows[:, 9:].reshape(count, 2, 2)
+
+
+def crossing(vectors: Array) -> Array:
+    """Return matrices (..., 3, 3) of the vector product of vectors (..., 3) with a row."""
+    return np.asarray((vectors @ CROSS).reshape(*vectors.shape, 3))
+
+
+def force_motions(arms: Array, forces: Array) -> Array:
+    """Return moments and work of forces f at points x under motions as of ``level_motions``: (n, 6,
+    4).
+
+    From the sum of x f (n, 3, 3) and of f (n, 3) over the points. The first three of the last axis
+    are the sum of (motion of x) x f, the fourth is that of (motion of x) . f.
+    """
+    both = np.concatenate([arms.reshape(-1, 9), forces], axis=1)
+    return np.asarray((both @ FORCE_MOTION).reshape(-1, 6, 4))
+
+
+def level_motions(at: Chain) -> Array:
+    """Return the motion of all plates beyond a level by a unit of each of its freedoms: (n, 3, 6).
+
+    The first three turn, the others move: a point x of these plates moves by turn x x + move.
+    """
+    motions = np.zeros((len(at.rises), 3, 6))
+    motions[:, 0, 3:] = at.rises
+    motions[:, 1:, :3] = at.turns
+    np.matmul(at.turns, crossing(at.middles), out=motions[:, 1:, 3:])
+    return motions
+
+
+# Springs of the levels: energy of balloons and of rims that meet.
+#
+# Arrays have a row a level, or a row a kind of balloon; lengths mm, energies uJ, volumes ul.
+
+
+RING_POINTS = 6
+"""Points of each balloon at which its gap is evaluated."""
+RIM_STIFFNESS = 2e4
+"""Contact stiffness in mN/mm of a flat balloon, and of rims: no film gives way visibly."""
+
+
+class GapPlaces(NamedTuple):
+    """Points at which the gaps of levels are evaluated, at any pressure.
+
+    ``begins`` (rows, chambers x points) is the first row of each point's potential in the table of
+    springs. ``ring`` (rows, chambers x points, 3) are the gaps there, in pieces of the spline, by
+    rise and tilt, ``squares`` (rows, chambers x points, 9) their products. ``meet`` (rows, 3,
+    points) are all gaps that may close: those of the rings, then the rims in mm; ``shut`` (rows,
+    points, 9) their products times the contact stiffness.
+    """
+
+    begins: NDArray[np.int_]
+    ring: Array
+    squares: Array
+    meet: Array
+    shut: Array
+
+    @classmethod
+    def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
+        """Return a row a kind of balloon, with gaps at its ring and round its rim, in mm."""
+        count = gaps.shape[1]
+        begins = np.arange(len(maps) * count // RING_POINTS).reshape(len(maps), -1) * PIECES_IN_ALL
+        spans = np.array([[kind.spans] for kind in maps])
+        ring = gaps * spans[..., None]
+        stiff = np.full((len(maps), count + rims.shape[1]), RIM_STIFFNESS / RING_POINTS)
+        stiff[:, :count] /= spans * spans
+        meet = np.concatenate([ring, rims], axis=1)
+        squares = (meet[..., :, None] * meet[..., None, :]).reshape(*meet.shape[:2], 9)
+        return cls(
+            np.repeat(begins, RING_POINTS, axis=1),
+            ring,
+            squares[:, :count],
+            np.ascontiguousarray(meet.transpose(0, 2, 1)),
+            squares * stiff[..., None],
+        )
+
+    def at(self, levels: NDArray[np.int_]) -> GapPlaces:
+        """Return a row for each level; one row for all where they are equal."""
+        if len(self.begins) == 1:
+            return self
+        begins, ring, squares, meet, shut = self
+        return GapPlaces(begins[levels], ring[levels], squares[levels], meet[levels], shut[levels])
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """Elastic response of levels at given pressures, evaluated in ``places``.
+
+    ``table`` holds the ``derivatives`` of the potentials of all splines, then of their volumes.
+    """
+
+    table: Array
+    places: GapPlaces
+
+    @classmethod
+    def pressed(
+        cls,
+        maps: Sequence[BalloonMap],
+        pressures: Array,
+        places: GapPlaces,
+        sucked: bool = False,
+    ) -> Springs:
+        """Return the springs of maps at pressures, one a chamber, below 0 only where ``sucked``."""
+        polynomials = np.stack([kind.pressed(pressures, sucked) for kind in maps])
+        # Each point has its share of its balloon.
+        rows = polynomials.transpose(2, 0, 1, 3, 4).reshape(-1, DEGREE + 1) / RING_POINTS
+        return cls(derivatives(rows), places)
+
+    def meeting(self, freedoms: Array, move: Array) -> tuple[Array, Array] | None:
+        """Return gradient (rows, 3) and second derivatives (rows, 3, 3) of the contact of those
+        rims that a move closes, as if shut from the start; None where it closes none.
+        """
+        first = self.places.begins.shape[1]
+        rims = self.places.meet[:, :, first:]
+        ends = ((freedoms + move)[:, None] @ rims)[:, 0]
+        if ends.min() >= 0:
+            return None
+        met = (ends < 0) & ((freedoms[:, None] @ rims)[:, 0] >= 0)
+        if not met.any():
+            return None
+        stiffer = self._shut(met, first)
+        return (stiffer @ freedoms[..., None])[..., 0], stiffer
+
+    def _shut(self, met: NDArray[np.bool_], first: int = 0) -> Array:
+        """Return the contact stiffness (rows, 3, 3) of the points ``met`` (rows, points)."""
+        each = met.astype(float)[:, None] @ self.places.shut[:, first:]
+        return np.asarray(each.reshape(-1, 3, 3))
+
+    def energy(self, freedoms: Array) -> tuple[Array, Array, Array]:
+        """Return energy (rows) in uJ, gradient (rows, 3), second derivatives (rows, 3, 3)."""
+        begins, ring, squares, meet, _ = self.places
+        gaps = (freedoms[:, None] @ meet)[:, 0]
+        value, first, second = horner(self.table, begins, gaps[:, : begins.shape[1]])
+        value = value @ np.ones(value.shape[-1])
+        gradient = (first[:, None] @ ring)[:, 0]
+        matrix = (second[:, None] @ squares).reshape(-1, 3, 3)
+        if gaps.min() < 0:
+            stiffer = self._shut(gaps < 0)
+            push = (stiffer @ freedoms[..., None])[..., 0]
+            value += (push * freedoms).sum(-1) / 2
+            gradient += push
+            matrix += stiffer
+        return value, gradient, matrix
+
+    def contents(self, freedoms: Array) -> tuple[Array, Array]:
+        """Return ul in each balloon (rows, chambers), and the potential of each row."""
+        begins, ring = self.places.begins, self.places.ring
+        gaps = (ring @ freedoms[..., None])[..., 0]
+        both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
+        stored, volumes = horner(self.table[:, 0], both, gaps)
+        return volumes.reshape(len(volumes), -1, RING_POINTS).sum(-1), stored.sum(-1)
+
+
+# External loads, and the energy of a stack under them.
+
+
+WALL_STIFFNESS = 1e6
+"""mN/mm of an outer plate."""
+WALL_POINTS = 12
+"""Points round the top's outline that may touch the outer plate."""
+WALL_TURNS = np.arange(WALL_POINTS) * math.tau / WALL_POINTS
+WALL_RIM = np.stack([np.cos(WALL_TURNS), np.sin(WALL_TURNS), 0 * WALL_TURNS], -1)
+
+
+def vector_of(values: Sequence[float], quantity: str) -> Array:
+    """Return three numbers (3,). Raises DesignError where they are not three, or not finite."""
+    try:
+        vector = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise DesignError(f"{quantity} must be three finite numbers, such as (0, 0, -0.1)")
+    return vector
+
+
+def direction_of(values: Sequence[float], quantity: str) -> Array:
+    """Return the direction (3,) of three numbers. Raises DesignError where they have none."""
+    vector = vector_of(values, quantity)
+    length = float(np.linalg.norm(vector))
+    if not length:
+        raise DesignError(f"{quantity} has no direction; give three numbers that are not all 0")
+    return vector / length
+
+
+class OuterPlate(NamedTuple):
+    """An outer plate: the line (``point`` and ``normal``) on which the tip meets it; with
+    ``sticks`` friction holds the tip on that line.
+
+    Points fixed to the top may not pass the plate: those round its rim, then, where it sticks, its
+    middle either way across the line. ``local`` (points, 3) are their places on the top in mm,
+    ``ways`` (points, 3) the constrained directions, ``crosses`` (points, 3, 3) the matrices of the
+    vector product with these; ``least`` (points) the least depth in mm at which each is in contact.
+    """
+
+    point: Array
+    normal: Array
+    sticks: bool
+    local: Array
+    ways: Array
+    crosses: Array
+    least: Array
+
+    @classmethod
+    def of(cls, point: Array, normal: Array, sticks: bool, outline: float) -> OuterPlate:
+        """Return the plate for a top whose rim has the radius ``outline`` in mm."""
+        local, ways, least = (
+            outline * WALL_RIM,
+            np.tile(normal, (WALL_POINTS, 1)),
+            np.zeros(WALL_POINTS),
+        )
+        if sticks:
+            aside = np.eye(3)[np.argmin(np.abs(normal))]
+            aside = aside - (normal @ aside) * normal
+            aside /= np.linalg.norm(aside)
+            both = np.stack([aside, np.cross(normal, aside)])
+            local = np.concatenate([local, np.zeros((2, 3))])
+            ways = np.concatenate([ways, both])
+            least = np.concatenate([least, [-np.inf, -np.inf]])
+        return cls(point, normal, sticks, local, ways, -crossing(ways), least)
+
+    @property
+    def is_level(self) -> bool:
+        """True if it lies level."""
+        return float(self.normal[2]) > 0.999
+
+
+@lru_cache(maxsize=256)
+def outer_plate(line: tuple[float, ...], sticks: bool, outline: float) -> OuterPlate:
+    """Return the plate on a line: a point in mm, then the normal."""
+    return OuterPlate.of(np.array(line[:3]), np.array(line[3:]), sticks, outline)
+
+
+class Load(NamedTuple):
+    """External loads: tip force and level weight in mN, outer plate, its stiffness in mN/mm."""
+
+    tip: Array
+    weight: Array | None
+    wall: OuterPlate | None
+    stiffness: float = WALL_STIFFNESS
+
+
+class PlateContact(NamedTuple):
+    """Contact of the top with an outer plate: depth in mm of its points (``deep``), and their
+    increase by a unit of each turn and move of ``level_motions``, ``lines`` (points, 6).
+
+    ``stiff`` and ``least`` (points) are their stiffness and least depth; ``forces`` (points) in mN.
+    """
+
+    deep: Array
+    lines: Array
+    stiff: Array
+    least: Array
+    forces: Array
+
+    @property
+    def push(self) -> float:
+        """Force in mN on the plate."""
+        return float(self.forces[:WALL_POINTS].sum())
+
+    def resists(self, deep: Array) -> Array:
+        """Return the forces in mN at points so deep (mm)."""
+        return self.stiff * np.maximum(deep, self.least)
+
+
+class _ExternalForces(NamedTuple):
+    """External forces on the plates: the sum of the forces f beyond each level (n, 3), that of x f
+    over their points x (n, 3, 3), and their energy; n is 1 where all levels carry the same.
+    """
+
+    forces: Array
+    arms: Array
+    energy: float
+    touch: PlateContact | None = None
+
+
+def _external_forces(plates: Chain, load: Load, forces: Array | None) -> _ExternalForces:
+    tip = plates.places[-1]
+    acting = _ExternalForces(
+        load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip)
+    )
+    if load.wall is not None:
+        acting = _with_contact(acting, plates, load.wall, load.stiffness, forces)
+    if load.weight is not None:
+        beyond, number = _beyond(len(plates.rises))
+        above = beyond @ plates.places
+        acting = _ExternalForces(
+            acting.forces + number * load.weight,
+            acting.arms + above[:, :, None] * load.weight,
+            acting.energy - float(above[0] @ load.weight),
+            acting.touch,
+        )
+    return acting
+
+
+def _with_contact(
+    acting: _ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
+) -> _ExternalForces:
+    """Return the forces with those of the outer plate: ``forces``, or by its stiffness."""
+    points = plates.places[-1] + wall.local @ plates.axes[-1].T
+    deep = ((points - wall.point) * wall.ways).sum(-1)
+    lines = np.concatenate([(points[:, None] @ wall.crosses)[:, 0], wall.ways], axis=1)
+    stiff = np.full(len(deep), stiffness)
+    stiff[:WALL_POINTS] /= WALL_POINTS
+    resists = stiff * np.maximum(deep, wall.least)
+    acts = resists if forces is None else forces
+    each = acts[:, None] * wall.ways
+    return _ExternalForces(
+        acting.forces - acts @ wall.ways,
+        acting.arms - points.T @ each,
+        acting.energy + float(resists @ deep) / 2,
+        PlateContact(deep, lines, stiff, wall.least, acts),
+    )
+
+
+@lru_cache(maxsize=16)
+def _beyond(count: int) -> tuple[Array, Array]:
+    """Return a mask of plates beyond each level (count, count + 1), and their number."""
+    mask = 1.0 - np.tri(count, count + 1)
+    return mask, mask.sum(axis=1, keepdims=True)
+
+
+class LoadedEnergy(NamedTuple):
+    """Energy of a stack under a load with its gradient (freedoms).
+
+    ``spring_gradient`` (levels, 3) and ``blocks`` (levels, 3, 3) are first and second derivatives
+    of the springs; ``motions`` (levels, 3, 6) of the plates beyond each level by its freedoms,
+    ``works`` (levels, 3, 6, 4) those with the forces on them; ``touch`` the contact with an outer
+    plate.
+    """
+
+    value: float
+    gradient: Array
+    spring_gradient: Array
+    blocks: Array
+    motions: Array
+    works: Array
+    touch: PlateContact | None
+
+    @property
+    def push(self) -> float:
+        """Force in mN on the outer plate."""
+        return 0.0 if self.touch is None else self.touch.push
+
+    def turned(self) -> Array:
+        """Return the geometric stiffness (freedoms, freedoms), by the forces alone.
+
+        A level nearer the base turns all motions beyond it. The mutual effect of the two tilts of
+        one level is taken at its mean: enough for a descent.
+        """
+        size = self.gradient.size
+        half = self.motions.reshape(size, 6)[:, :3] @ self.works[..., :3].reshape(size, 3).T
+        half *= _base_side(size // 3)
+        return -(half + half.T)
+
+    def deeper(self, touch: PlateContact) -> Array:
+        """Return a contact's depths in mm by a unit of each freedom: (points, freedoms)."""
+        return np.asarray(touch.lines @ self.motions.reshape(-1, 6).T)
+
+    def rest(self) -> Array:
+        """Return the tangent stiffness (freedoms, freedoms) without the springs."""
+        stiffness = self.turned()
+        if self.touch is not None:
+            lines = self.deeper(self.touch)
+            stiffness += (
+                lines.T * (self.touch.stiff * (self.touch.deep > self.touch.least))
+            ) @ lines
+        return stiffness
+
+
+def with_diagonal_blocks(rest: Array, blocks: Array) -> Array:
+    """Return a matrix (freedoms, freedoms) with blocks (levels, 3, 3) added on its diagonal."""
+    whole = rest.copy()
+    count = len(blocks)
+    diagonal = np.einsum("iaib->iab", whole.reshape(count, 3, count, 3))
+    diagonal += blocks
+    return whole
+
+
+def loaded_energy(
+    springs: Springs, pitch: float, load: Load, at: Array, forces: Array | None = None
+) -> LoadedEnergy:
+    """Return the energy of a stack under a load, with contact ``forces`` (mN) of an outer plate if
+    given: the gradient is then the residual against these.
+    """
+    value, spring_gradient, blocks = springs.energy(at)
+    plates = plate_chain(at, pitch)
+    acting = _external_forces(plates, load, forces)
+    motions = level_motions(plates)
+    works = motions @ force_motions(acting.arms, acting.forces)
+    gradient = (spring_gradient - works[..., 3]).ravel()
+    energy = float(value.sum()) + acting.energy
+    return LoadedEnergy(energy, gradient, spring_gradient, blocks, motions, works, acting.touch)
+
+
+@lru_cache(maxsize=16)
+def _base_side(count: int) -> Array:
+    """Return 1 where the row's level is nearer the base than the column's, 1/2 if equal."""
+    level = np.repeat(np.arange(count), 3)
+    return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

@@ -1,0 +1,445 @@
+"""The files of a design's folder: one table, a row a file or folder, and what writes each.
+
+Adding an output file takes one row of ``ARTEFACTS`` and the function that renders it, which imports
+pictures and pages itself: a run of some parts loads none of them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from sbafab.cutting.files import write_layer_files
+from sbafab.cutting.fixture import PATH as FIXTURE
+from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.lightburn import write_projects
+from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.second_cut import write_second_cut
+from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
+from sbafab.design.files import kit_names
+from sbafab.design.identity import design_sha256, kit_of
+from sbafab.design.kits import FILE as KIT_FILE
+from sbafab.design.records import Design, design_toml
+from sbafab.errors import DesignError, OutputError
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.files import MeshFile, write_meshes
+from sbafab.models.figures import Prediction
+from sbafab.nesting.nest import as_dict
+from sbafab.nesting.records import Nest
+from sbafab.output.checked import (
+    CHECKS_SCHEMA,
+    Checked,
+    DesignPlan,
+    RunPart,
+    checks,
+    hole_notes,
+    kerf_widths,
+    limits,
+    machine,
+)
+from sbafab.output.manifest import as_json
+from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
+from sbafab.pressing.cycles import batch_json, design_runs
+from sbafab.pressing.tables import PRESS_SCHEMA, press_csv, press_json
+from sbafab.process import Progress
+from sbafab.rules.finding import Finding
+from sbafab.simulators.simulator import NAMES as SIMULATORS
+from sbafab.simulators.simulator import Name, SimulationRequest, simulator
+from sbafab.version import GENERATOR
+
+if TYPE_CHECKING:
+    from sbafab.reports.traveller.job import Job
+
+TRAVELLER = "traveller.html"
+FINDINGS = "findings.html"
+PREDICT = "predict"
+"""Folder of a prediction's plots."""
+PLACES = f"{FOLDER}/nest.json"
+PICTURES_OF_A_DESIGN = 3
+
+
+@dataclass
+class DesignFolder:
+    """A design's folder while it is written from its plan.
+
+    ``sheets`` are the film sheets of its parts, ``has_pages``: whether findings and a traveller
+    belong into it. Writers add the ``meshes`` they wrote, and to ``left_out`` the simulators that
+    got no input, with the reason.
+    """
+
+    plan: DesignPlan
+    sheets: Sequence[SheetFile]
+    path: Path
+    tell: Progress
+    has_pages: bool = True
+    meshes: list[MeshFile] = field(default_factory=list)
+    left_out: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def checked(self) -> Checked:
+        return self.plan.checked
+
+    @property
+    def design(self) -> Design:
+        return self.plan.checked.design
+
+    @property
+    def laminate(self) -> Laminate:
+        return self.plan.checked.laminate
+
+    @cached_property
+    def marked(self) -> Laminate:
+        """The laminate with notes for its pictures: failed and waived rules, lowered limits."""
+        checked = self.checked
+        failed = dict.fromkeys(f.rule for f in checked.findings if f.verdict == "fail")
+        notes = [f"must not be built; failed: {', '.join(failed)}"] if failed else []
+        notes += [f"waived: {', '.join(checked.waived)}"] if checked.waived else []
+        notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
+        laminate = checked.laminate
+        return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
+
+    @cached_property
+    def solid_png(self) -> bytes:
+        """The picture of the solid, which the traveller shows as well."""
+        from sbafab.reports.solid_png import solid_png
+
+        return solid_png(self.marked)
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """A file or folder of a design's folder.
+
+    ``part`` of a run has it written, "" every run; ``needs``: further parts without which it is
+    left out. ``render`` returns the file's contents, or writes a folder itself and returns None;
+    without one it is written for all designs of a job together. ``schema``: the id of its format,
+    if programs may rely on it. ``is_page``: an assembly has one for all its designs.
+    """
+
+    path: str
+    part: RunPart | Literal[""]
+    about: str
+    render: Callable[[DesignFolder], str | bytes | None] | None = None
+    schema: str = ""
+    needs: frozenset[RunPart] = frozenset()
+    is_page: bool = False
+
+    @property
+    def top(self) -> str:
+        """The file or folder in the design's folder that it is or lies in."""
+        return self.path.partition("/")[0]
+
+    def belongs_in(self, folder: DesignFolder) -> bool:
+        """Return True if the folder's plan asks for it."""
+        parts = folder.plan.wanted
+        is_wanted = not self.part or (self.part in parts and self.needs <= parts)
+        return is_wanted and (folder.has_pages or not self.is_page)
+
+
+def write_artefacts(folder: DesignFolder, artefacts: Iterable[Artefact] | None = None) -> None:
+    """Write the artefacts (by default all of ``ARTEFACTS``) that the folder's plan asks for."""
+    for artefact in ARTEFACTS if artefacts is None else artefacts:
+        if artefact.render is None or not artefact.belongs_in(folder):
+            continue
+        contents = artefact.render(folder)
+        if contents is not None:
+            path = folder.path / artefact.path
+            path.parent.mkdir(exist_ok=True)
+            data = contents.encode() if isinstance(contents, str) else contents
+            path.write_bytes(data)
+
+
+def tops_of(*parts: RunPart) -> tuple[str, ...]:
+    """Return the files and folders that runs of these parts write, but for pictures."""
+    return tuple(dict.fromkeys(row.top for row in ARTEFACTS if row.part in parts))
+
+
+def write_text(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+# Cutting: layer files, base plate, panel, film sheets.
+
+
+def _write_layers(folder: DesignFolder) -> None:
+    # Without paths the layers' files are not written: they were read back, and are compared.
+    if folder.plan.paths:
+        write_cut_files(folder.plan, folder.path, folder.tell)
+
+
+def write_cut_files(plan: DesignPlan, folder: Path, tell: Progress) -> None:
+    """Write the layer files and the base plate of a design."""
+    laminate = plan.checked.laminate
+    write_layer_files(laminate, plan.paths, folder, plan.settings, partial(tell, "cut files"))
+    write_plates(plan.checked, plan.paths, folder, plan.settings)
+
+
+def write_plates(
+    checked: Checked, paths: Mapping[str, Region], folder: Path, settings: CutSettings
+) -> None:
+    """Write the base plate, and of registered sheets the second cut and LightBurn's projects."""
+    design, laminate = checked.design, checked.laminate
+    places = design_runs(design, laminate).places
+    write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
+    if laminate.panel is not None:
+        write_second_cut(laminate, folder, settings)
+        write_projects(laminate, paths, folder, settings)
+
+
+def write_nested_sheets(
+    nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
+) -> list[SheetFile]:
+    """Write the film sheets, and beside them the places for a later run; nothing for no nest."""
+    if not nests:
+        return []
+    label = design.sheets.label
+    progress = partial(tell, "sheets")
+    sheets = write_sheets(nests, folder, settings, machine(design), label, progress)
+    write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
+    return sheets
+
+
+# Pressing.
+
+
+def _press_json(folder: DesignFolder) -> str:
+    assert folder.plan.pressing is not None
+    schedule = folder.plan.pressing
+    copies = design_runs(folder.design, folder.laminate).copies
+    table = press_json(schedule)
+    if copies > 1:
+        table = {**table, "batch": batch_json(folder.design, folder.laminate, schedule)}
+    return as_json(table)
+
+
+def _press_csv(folder: DesignFolder) -> str:
+    assert folder.plan.pressing is not None
+    return press_csv(folder.plan.pressing)
+
+
+def _underlay(folder: DesignFolder) -> bytes | None:
+    from sbafab.reports.underlay import underlay_pdf
+
+    places = design_runs(folder.design, folder.laminate).places
+    press = folder.design.press
+    platen = press.platen_width, press.platen_length
+    return underlay_pdf(folder.laminate, design_sha256(folder.design), places, platen)
+
+
+# Meshes and pictures.
+
+
+def _write_meshes(folder: DesignFolder) -> None:
+    progress = partial(folder.tell, "meshes")
+    folder.meshes += write_meshes(folder.laminate, folder.path, progress=progress)
+    conforming = folder.plan.conforming
+    if conforming is not None:
+        from sbafab.meshing.conforming.meshes import write_conforming
+
+        progress = partial(folder.tell, "conforming meshes")
+        folder.meshes += write_conforming(conforming, folder.path, progress, folder.plan.formats)
+
+
+def _layers_svg(folder: DesignFolder) -> str:
+    from sbafab.reports.layers_svg import layers_svg
+
+    picture = layers_svg(folder.marked)
+    folder.tell("pictures", 1, PICTURES_OF_A_DESIGN)
+    return picture
+
+
+def _stack_svg(folder: DesignFolder) -> str:
+    from sbafab.reports.stack_svg import stack_svg
+
+    picture = stack_svg(folder.marked)
+    folder.tell("pictures", 2, PICTURES_OF_A_DESIGN)
+    return picture
+
+
+def _solid_png(folder: DesignFolder) -> bytes:
+    picture = folder.solid_png
+    folder.tell("pictures", PICTURES_OF_A_DESIGN, PICTURES_OF_A_DESIGN)
+    return picture
+
+
+# Predictions and simulations.
+
+
+def prediction_json(design: Design, prediction: Prediction) -> dict[str, Any]:
+    """Return the contents of ``predict.json``; ``plot`` of a relation is its file in the folder."""
+    table = prediction.as_dict()
+    for relation in table["relations"]:
+        relation["plot"] = f"{PREDICT}/{relation['name']}.svg"
+    return {
+        "schema": PREDICTION_SCHEMA,
+        "name": design.name,
+        "family": design.family,
+        "design_sha256": design_sha256(design),
+        "generator": GENERATOR,
+        **table,
+    }
+
+
+def _predict_json(folder: DesignFolder) -> str:
+    assert folder.plan.prediction is not None
+    return as_json(prediction_json(folder.design, folder.plan.prediction))
+
+
+def _write_plots(folder: DesignFolder) -> None:
+    from sbafab.reports.charts import relation_svg
+
+    assert folder.plan.prediction is not None
+    relations = folder.plan.prediction.relations
+    if relations:
+        (folder.path / PREDICT).mkdir()
+    for relation in relations:
+        plot = relation_svg(folder.design.name, relation)
+        write_text(folder.path / PREDICT / f"{relation.name}.svg", plot)
+
+
+def _write_simulation(name: Name, folder: DesignFolder) -> None:
+    """Copy a simulator's folder if it has run, else write what it reads."""
+    simulated = folder.plan.simulated
+    if simulated is not None:
+        shutil.copytree(simulated, folder.path / name)
+        return
+    reason = simulator(name).why_not(folder.laminate)
+    if reason is None:
+        try:
+            simulator(name).export(folder.laminate, SimulationRequest(), folder.path / name)
+        except (DesignError, OutputError) as error:
+            # The meshes of CalculiX take an extra, which may be missing.
+            reason = str(error)
+    if reason is not None:
+        folder.left_out.append((name, reason))
+
+
+# Pages, findings and the design.
+
+
+def _traveller(folder: DesignFolder) -> str:
+    from sbafab.reports.traveller.page import traveller_html
+
+    order, solid = folder.design.order, folder.solid_png
+    job = order_of(folder.checked)
+    job = replace(job, made_for=order.made_for, note=order.note, solid_png=solid)
+    assert folder.plan.pressing is not None
+    return traveller_html(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
+
+
+def order_of(checked: Checked, folder: str = "") -> Job:
+    """Return what a traveller says of the order of a design whose files lie in ``folder``."""
+    from sbafab.reports.traveller.job import Job
+    from sbafab.reports.underlay import NAME as UNDERLAY
+    from sbafab.reports.underlay import guides
+
+    design = checked.design
+    return Job(
+        design_sha256=design_sha256(design),
+        generator=GENERATOR,
+        waived=checked.waived,
+        lowered=checked.lowered,
+        findings=checked.findings,
+        fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
+        underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
+        kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
+        copies=design.order.quantity,
+    )
+
+
+def findings_page(
+    name: str, sha256: str, designs: Sequence[Checked], between: Sequence[Finding]
+) -> str:
+    """Return the designer's page: of every design, and of the checks ``between`` its parts."""
+    from sbafab.reports.traveller.findings import Inspected, findings_html
+
+    inspected = [
+        Inspected(checked.design.name, checked.findings, checked.laminate, limits(checked.design))
+        for checked in designs
+    ]
+    if between:
+        inspected.append(Inspected("Between the parts", between))
+    return findings_html(name, sha256, GENERATOR, inspected)
+
+
+def _findings(folder: DesignFolder) -> str:
+    return findings_page(folder.design.name, design_sha256(folder.design), [folder.checked], ())
+
+
+def _checks(folder: DesignFolder) -> str:
+    design = folder.design
+    return as_json(checks(folder.checked.findings, "design", design.name, [design]))
+
+
+def _design(folder: DesignFolder) -> str:
+    """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
+    design = folder.design
+    if design.drawing is not None:
+        name = f"outline{design.drawing.suffix.lower()}"
+        shutil.copyfile(design.drawing, folder.path / name)
+        chamber = design.chamber.model_copy(update={"outline": name})
+        design = design.model_copy(update={"chamber": chamber})
+    if design.kit not in kit_names():
+        (folder.path / KIT_FILE).write_bytes(kit_of(design).text)
+        design = design.model_copy(update={"kit": KIT_FILE})
+    return design_toml(design)
+
+
+ARTEFACTS: tuple[Artefact, ...] = (
+    Artefact("layers", "cut", "a DXF a layer, and the base plate", _write_layers),
+    Artefact("sheets", "cut", "film sheets with all parts, nested"),
+    Artefact(
+        "press.json",
+        "press",
+        "the press schedule; minutes and totals are `null` where nobody stated any for the film",
+        _press_json,
+        PRESS_SCHEMA,
+    ),
+    Artefact("press.csv", "press", "the press schedule as a table", _press_csv),
+    Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
+    Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),
+    Artefact("preview/layers.svg", "preview", "every pattern", _layers_svg),
+    Artefact("preview/stack.svg", "preview", "the layers in section", _stack_svg),
+    Artefact("preview/solid.png", "preview", "the actuator, flat", _solid_png),
+    Artefact(
+        "predict.json",
+        "predict",
+        "from `sbafab predict`: every figure with model and trust",
+        _predict_json,
+        PREDICTION_SCHEMA,
+    ),
+    Artefact("predict", "predict", "its plots", _write_plots),
+    *(
+        Artefact(
+            name,
+            name,
+            f"from `sbafab simulate --with {name}`: what it reads; `result.json` what it found",
+            partial(_write_simulation, name),
+            SIMULATE_SCHEMA,
+        )
+        for name in SIMULATORS
+    ),
+    Artefact(
+        TRAVELLER,
+        "cut",
+        "the page for the bench",
+        _traveller,
+        needs=frozenset(("press", "preview")),
+        is_page=True,
+    ),
+    Artefact(FINDINGS, "preview", "the page for the designer", _findings, is_page=True),
+    Artefact("checks.json", "", "what the rules found", _checks, CHECKS_SCHEMA),
+    Artefact(
+        "design.toml",
+        "",
+        "the design with every default written out; it makes the folder again",
+        _design,
+    ),
+)
+"""All that lies in a design's folder beside its index, in the order of writing."""

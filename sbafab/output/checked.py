@@ -1,0 +1,302 @@
+"""A design checked and planned: laminate, findings, settings, press schedule, beam paths."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from sbafab.actuators import build
+from sbafab.actuators.stacking import used_films
+from sbafab.cutting.files import compensated_paths
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
+from sbafab.cutting.sheets import Machine
+from sbafab.design.films import KerfWidth, Sheet, material
+from sbafab.design.identity import citation, design_sha256
+from sbafab.design.records import Design
+from sbafab.design.sections import NOT_MEASURED, named_film
+from sbafab.errors import DesignError, GeometryError
+from sbafab.geometry.offset import Kerf
+from sbafab.geometry.region import Region
+from sbafab.laminate.films import Material
+from sbafab.laminate.laminate import Laminate
+from sbafab.nesting.nest import refuse_unfit
+from sbafab.nesting.records import TURNS, NestPart, Stock, parts_of
+from sbafab.pressing import dowels
+from sbafab.pressing.build_up import Pad
+from sbafab.pressing.cycles import design_runs
+from sbafab.pressing.schedule import PressSettings, Schedule, plate_holes, schedule
+from sbafab.process import Progress
+from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.finding import Finding, summary
+from sbafab.rules.limits import CHECKED_AGAINST, Limits, Tolerances, lowered
+from sbafab.simulators.simulator import Name
+from sbafab.version import GENERATOR
+
+if TYPE_CHECKING:
+    from sbafab.meshing.conforming.meshes import ConformingMeshes
+    from sbafab.models.figures import Prediction
+
+CHECKS_SCHEMA = "sbafab/checks@1"
+
+
+# A design with its laminate and findings.
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A design, its laminate, and the findings of the rules."""
+
+    design: Design
+    laminate: Laminate
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule failed that the design does not waive."""
+        return has_failed(self.findings)
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """The rules that fail and that the design waives by name."""
+        return tuple(dict.fromkeys(finding.rule for finding in self.findings if finding.by_user))
+
+    @property
+    def lowered(self) -> tuple[str, ...]:
+        """The limits that the design sets below the usual ones."""
+        return lowered(limits(self.design))
+
+
+def check(design: Design, progress: Progress | None = None) -> Checked:
+    """Build the laminate of a design and run the rule deck on it. Raises DesignError."""
+    try:
+        laminate = build(design)
+        return Checked(design, laminate, run_deck(laminate, limits(design), progress))
+    except GeometryError as error:
+        raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
+
+
+def checks(
+    findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
+) -> dict[str, Any]:
+    """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
+
+    ``source`` is "design" or "as-built", ``designs`` are those that were checked.
+    """
+    return {
+        "schema": CHECKS_SCHEMA,
+        "design": name,
+        "source": source,
+        "summary": summary(findings),
+        "kits": [{"design": design.name, **citation(design)} for design in designs],
+        "findings": [finding.as_dict() for finding in findings],
+    }
+
+
+# A design's sections as the settings that rules, cutting and pressing take.
+
+
+def kerf_widths(design: Design) -> dict[Material, Kerf | None]:
+    """Return the full kerf width (or that along x and y) by material, None if not measured."""
+    widths = _kerfs(design).items()
+    return {name: None if isinstance(kerf, str) else kerf for name, kerf in widths}
+
+
+def _kerfs(design: Design) -> dict[Material, KerfWidth]:
+    further = {material(name): film.kerf for name, film in design.films.others.items()}
+    return {"TPE": design.laser.kerf_tpe, "PTFE": design.laser.kerf_ptfe, **further}
+
+
+def warnings(design: Design) -> dict[Material, str]:
+    """Return the warning that cut files of a film must carry, by material."""
+    return {name: film.warning for name, film in used_films(design).items() if film.warning}
+
+
+def limits(design: Design) -> Limits:
+    on_pins, on_one = design.pin_error, design.lone_pin_error
+    return Limits(
+        bond_width=design.rules.bond_width,
+        mask_overhang=design.rules.mask_overhang,
+        least_feature=design.laser.least_feature,
+        kerf={name: kerf for name, kerf in kerf_widths(design).items() if kerf is not None},
+        heated_width=design.press.platen_width,
+        heated_length=design.press.platen_length,
+        validated_balloons=design.rules.validated_balloons,
+        tolerances=Tolerances(
+            cutting=design.registration.cutting_error,
+            pin=on_pins,
+            lone_pin=on_one if on_one < on_pins else None,
+            placement=design.registration.hand_placement,
+            turn=design.registration.hand_turn,
+            sheet=design.panel.sheet_error,
+            second_cut=design.panel.second_cut_error,
+        ),
+        unknown_kerf=design.laser.unknown_kerf,
+        pin_stretch=design.registration.pin_stretch,
+        worst_bond_width=design.rules.worst_bond_width,
+        worst_mask_overhang=design.rules.worst_mask_overhang,
+        target_yield=design.rules.target_yield,
+        yield_builds=design.rules.yield_builds,
+        minutes_for=tuple(map(named_film, design.press.minutes_for)),
+        waive=frozenset(design.rules.waive),
+    )
+
+
+def cut_settings(
+    design: Design, waived: tuple[str, ...], curves: Curves = TRUE_ARCS
+) -> CutSettings:
+    return CutSettings(
+        design=design.name,
+        design_sha256=design_sha256(design),
+        kerf_widths=kerf_widths(design),
+        waived=waived,
+        lowered=lowered(limits(design)),
+        curves=curves,
+        generator=GENERATOR,
+        warnings=warnings(design),
+        platen=(design.press.platen_width, design.press.platen_length),
+    )
+
+
+def press_settings(design: Design) -> PressSettings:
+    press = design.press
+    return PressSettings(
+        temperature_c=press.temperature_c,
+        pressure_kpa=press.pressure_kpa,
+        platen=(press.platen_width, press.platen_length),
+        flash_bottom=press.flash_bottom_minutes,
+        bond_bottom=press.bond_bottom_minutes,
+        flash_middle=press.flash_middle_minutes,
+        bond_all=press.bond_all_minutes,
+        validated_balloons=design.rules.validated_balloons,
+        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
+        plate_material=press.plate_material,
+        plate_thickness=press.plate_thickness,
+        release_film=press.release_film,
+        release_thickness=press.release_thickness,
+        underlay_thickness=press.underlay_thickness,
+        pin_standard=design.registration.pin_standard,
+        pin_lengths=design.registration.pin_lengths,
+        plate_made_by=design.registration.plate_made_by,
+        tack=design.panel.tack_minutes,
+        minutes_for=tuple(map(named_film, press.minutes_for)),
+        time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
+        carrier_limit=design.panel.carrier_limit_c,
+    )
+
+
+def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
+    """Return notes for the shop on the base plate's holes, line by line; none without pins.
+
+    Raises DesignError where no standard pin or plate fits.
+    """
+    if not laminate.pins:
+        return ()
+    holes = plate_holes(laminate, press_settings(design))
+    return dowels.hole_notes(laminate.pins, holes, design.registration.plate_made_by)
+
+
+def machine(design: Design) -> Machine:
+    laser = design.laser
+    return Machine(
+        cut_speed=laser.cut_speed,
+        travel_speed=laser.travel_speed,
+        pierce_seconds=laser.pierce_seconds,
+        heat_distance=laser.heat_distance,
+    )
+
+
+def stocks(design: Design) -> dict[Material, Stock]:
+    """Return the film sheets by material."""
+    sheets = {"TPE": design.sheets.tpe, "PTFE": design.sheets.ptfe}
+    sheets |= {material(name): film.sheet for name, film in design.films.others.items()}
+    return {name: _stock(sheets[name], kerf) for name, kerf in _kerfs(design).items()}
+
+
+def _stock(sheet: Sheet, kerf: object) -> Stock:
+    return Stock(
+        width=sheet.width,
+        length=sheet.length,
+        border=sheet.border,
+        spacing=sheet.spacing,
+        pins=sheet.pins,
+        most=sheet.most,
+        roll=sheet.roll,
+        turns=(0, 2) if isinstance(kerf, tuple) else TURNS,
+    )
+
+
+# The plan of a design: computed before anything is written.
+
+
+RunPart = Literal["cut", "press", "mesh", "preview", "predict"] | Name
+"""What a run writes of a design: by rules and geometry, by models, or for a simulator."""
+EVERYTHING: tuple[RunPart, ...] = ("cut", "press", "mesh", "preview")
+PICTURES: tuple[RunPart, ...] = ("preview",)
+"""What is left, beside the findings, of a design that is not to be cut."""
+
+
+@dataclass(frozen=True)
+class DesignPlan:
+    """The parts ``wanted`` of a design, and all that is computed before its folder is begun.
+
+    ``paths``: the beam's path for every pattern, ``parts``: what goes on film sheets; both empty
+    where nothing is cut. ``conforming`` is written in the ``formats`` of these file endings;
+    ``simulated`` is the folder in which a simulator has run.
+    """
+
+    checked: Checked
+    wanted: frozenset[RunPart]
+    settings: CutSettings
+    pressing: Schedule | None = None
+    paths: Mapping[str, Region] = field(default_factory=dict)
+    parts: tuple[NestPart, ...] = ()
+    conforming: ConformingMeshes | None = None
+    formats: tuple[str, ...] = ()
+    prediction: Prediction | None = None
+    simulated: Path | None = None
+
+
+def plan_design(
+    checked: Checked, wanted: Collection[RunPart], curves: Curves = TRUE_ARCS
+) -> DesignPlan:
+    """Return the plan of a design. Raises DesignError where press or kerf cannot do it."""
+    design, laminate = checked.design, checked.laminate
+    settings = cut_settings(design, checked.waived, curves)
+    pressing = schedule_of(checked) if "press" in wanted else None
+    planned = DesignPlan(checked, frozenset(wanted), settings, pressing)
+    if "cut" not in wanted:
+        return planned
+    if laminate.panel is not None and curves.in_chords:
+        raise DesignError(
+            'registered sheets (registration.method = "sheet") are not drawn in chords; write '
+            "bulges or arcs"
+        )
+    paths = compensated_paths(laminate, settings)
+    parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
+    return replace(planned, paths=paths, parts=parts)
+
+
+def schedule_of(checked: Checked) -> Schedule:
+    """Return the press schedule; first step and warnings name waived rules and lowered limits."""
+    cycles = design_runs(checked.design, checked.laminate).cycles
+    plain = schedule(checked.laminate, press_settings(checked.design), cycles)
+    remarks = []
+    if checked.waived:
+        rules = ", ".join(checked.waived)
+        remarks.append(f"made although it breaks rules that the design waives: {rules}")
+    if checked.lowered:
+        remarks.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
+    if not remarks:
+        return plain
+    first, *later = plain.steps
+    words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
+    marked = replace(first, instructions=f"{words} {first.instructions}")
+    return replace(plain, steps=(marked, *later), warnings=(*remarks, *plain.warnings))
+
+
+def refuse_undoable(checked: Sequence[Checked]) -> None:
+    """Raises DesignError where press, kerf or film sheets cannot do designs that pass the rules."""
+    for design in checked:
+        refuse_unfit(plan_design(design, ("press", "cut")).parts, stocks(design.design))

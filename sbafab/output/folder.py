@@ -1,0 +1,206 @@
+"""A planned folder written: film sheets, each design's artefacts, the whole of an assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from sbafab.assemblies.build import Assembled, PlacedPart
+from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
+from sbafab.assemblies.shapes import colours, linear, placed_surface
+from sbafab.cutting.sheets import SheetFile
+from sbafab.meshing.formats.glb import Node, write_scene
+from sbafab.output.artefacts import (
+    FINDINGS,
+    TRAVELLER,
+    DesignFolder,
+    findings_page,
+    order_of,
+    write_artefacts,
+    write_nested_sheets,
+    write_text,
+)
+from sbafab.output.checked import checks
+from sbafab.output.job import CheckedJob, Plan
+from sbafab.output.manifest import AssemblyManifest, as_json, file_hashes, job_manifest, manifest
+from sbafab.output.swap import SCHEMA
+from sbafab.process import Progress
+from sbafab.version import GENERATOR
+
+SOLID = "mesh/assembled.glb"
+PICTURE = "preview/assembled.png"
+
+
+@dataclass(frozen=True)
+class WrittenFolder:
+    """The ``index`` (manifest) of a written folder without its files' hashes.
+
+    ``left_out``: names of simulators that got no input, with the reason.
+    """
+
+    index: dict[str, Any]
+    left_out: tuple[tuple[str, str], ...] = ()
+
+
+def write_folder(plan: Plan, path: Path, tell: Progress) -> WrittenFolder:
+    """Write film sheets and designs; several designs get a folder each, named after it."""
+    job = plan.job
+    first = plan.designs[0]
+    sheets: list[SheetFile] = []
+    if plan.is_cut:
+        design = first.checked.design
+        sheets = write_nested_sheets(plan.nests, design, path, plan.settings, tell)
+    if job.schema == SCHEMA:
+        folder = DesignFolder(first, sheets, path, tell)
+        return WrittenFolder(write_design(folder), tuple(folder.left_out))
+    from_below = _from_below(sheets)
+    for each in plan.designs:
+        subfolder = path / each.checked.design.name
+        subfolder.mkdir()
+        # An assembly has one page for all designs.
+        folder = DesignFolder(each, from_below, subfolder, tell, job.assembled is None)
+        # The folder above has the sheets; a design's own is one without.
+        close_folder(subfolder, {**write_design(folder), "sheets": []})
+    designs = [each.checked.design for each in plan.designs]
+    index = job_manifest(job.schema, job.name, plan.settings, designs, sheets)
+    if job.assembled is not None:
+        index = _write_assembly(plan, job.assembled, sheets, index, path, tell)
+    return WrittenFolder(index)
+
+
+def write_design(folder: DesignFolder) -> dict[str, Any]:
+    """Write a design's artefacts; return its manifest, without the files' hashes."""
+    write_artefacts(folder)
+    return manifest(folder.plan, folder.sheets, folder.meshes)
+
+
+def close_folder(folder: Path, index: dict[str, Any]) -> None:
+    """Write the manifest, with the hashes of all that lies in the folder."""
+    index.pop("files", None)
+    index["files"] = file_hashes(folder)
+    write_text(folder / "manifest.json", as_json(index))
+
+
+def _from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
+    """Return the shared sheets as a design's own folder names them."""
+    return [
+        replace(
+            sheet,
+            path=f"../{sheet.path}",
+            picture=f"../{sheet.picture}",
+            project=f"../{sheet.project}",
+        )
+        for sheet in sheets
+    ]
+
+
+# The whole of an assembly: picture, solid, pages, design.
+
+
+def _write_assembly(
+    plan: Plan,
+    assembled: Assembled,
+    sheets: Sequence[SheetFile],
+    index: dict[str, Any],
+    path: Path,
+    tell: Progress,
+) -> dict[str, Any]:
+    """Write what an assembly's folder holds beside its designs; return its manifest."""
+    from sbafab.reports.assembly_png import assembly_pngs
+
+    job = plan.job
+    tell("assembled", 0, 1)
+    (path / "preview").mkdir()
+    picture, bare = assembly_pngs(assembled, _note(job))
+    (path / PICTURE).write_bytes(picture)
+    meshes = []
+    if plan.is_cut:
+        (path / "mesh").mkdir()
+        meshes.append(_write_solid(assembled, path))
+        write_text(path / TRAVELLER, _traveller(plan, assembled, sheets, bare))
+    sha256 = assembly_sha256(assembled)
+    write_text(path / FINDINGS, findings_page(job.name, sha256, job.designs, job.between or ()))
+    designs = [checked.design for checked in job.designs]
+    write_text(path / "checks.json", as_json(checks(job.findings, "design", job.name, designs)))
+    write_text(path / DESIGN_FILE, assembly_toml(assembled))
+    index |= {**_claims(assembled), "meshes": meshes, "files": {}}
+    return AssemblyManifest.model_validate_json(as_json(index)).as_dict()
+
+
+def _note(job: CheckedJob) -> str:
+    failed = dict.fromkeys(f.rule for f in job.findings if f.verdict == "fail")
+    waived = dict.fromkeys(f.rule for f in job.findings if f.by_user)
+    note = f"; must not be built; failed: {', '.join(failed)}" if failed else ""
+    return note + (f"; waived: {', '.join(waived)}" if waived else "")
+
+
+def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
+    """``mesh/assembled.glb``, a node a part, as the manifest lists it."""
+    paints = colours(assembled)
+    nodes = [
+        Node(placed.name, placed_surface(placed), _material(placed), linear(paints[placed.name]))
+        for placed in assembled.parts
+    ]
+    write_scene(nodes, folder / SOLID)
+    return {
+        "file": SOLID,
+        "kind": "assembly",
+        "nodes": [
+            {
+                "name": node.name,
+                "volume_mm3": round(node.surface.volume, 6),
+                "elements": len(node.surface.faces),
+            }
+            for node in nodes
+        ],
+    }
+
+
+def _material(placed: PlacedPart) -> str:
+    if placed.made is not None:
+        return placed.made.laminate.bonded_materials
+    return str(getattr(placed.part, "material", placed.part.kind))
+
+
+def _claims(assembled: Assembled) -> dict[str, Any]:
+    """Return the keys of an assembly's manifest beyond those of a job."""
+    return {
+        "family": assembled.assembly.family,
+        "design_sha256": assembly_sha256(assembled),
+        "copies": assembled.assembly.order.copies,
+        "parts": [part_entry(placed) for placed in assembled.parts],
+    }
+
+
+def _traveller(
+    plan: Plan, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
+) -> str:
+    from sbafab.reports.traveller.assembly_page import AssemblyJob, DesignWork, assembly_html
+    from sbafab.reports.traveller.job import Work
+
+    works = []
+    for each in plan.designs:
+        design, laminate = each.checked.design, each.checked.laminate
+        assert each.pressing is not None
+        folder = f"{design.name}/"
+        work = Work(design, laminate, each.pressing, sheets, order_of(each.checked, folder))
+        works.append(DesignWork(work, folder))
+    order = assembled.assembly.order
+    return assembly_html(
+        AssemblyJob(
+            assembled=assembled,
+            sha256=assembly_sha256(assembled),
+            generator=GENERATOR,
+            works=works,
+            sheets=sheets,
+            findings=plan.job.between or (),
+            waived=plan.job.waived,
+            lowered=plan.settings.lowered,
+            picture=picture,
+            copies=order.copies,
+            made_for=order.made_for,
+            note=order.note,
+        )
+    )

@@ -1,0 +1,200 @@
+"""Alignment of what is laid by hand: along which edge, or at which place of its sheet."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sbafab.geometry.cache import cached
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers
+from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.reports.drawing import layer_numbers
+from sbafab.reports.traveller import units
+from sbafab.reports.traveller.shapes import Bed
+
+STATION = 0.25
+"""mm between the points at which two edges are compared."""
+
+
+EQUAL = 0.02
+"""mm by which a distance may differ and still be the same to a hand."""
+
+
+class Lip(NamedTuple):
+    """Distance in mm by which an edge lies outside another, below 0 inside; ``all_round`` without
+    breaks.
+    """
+
+    outside: float
+    all_round: bool
+
+
+@dataclass(frozen=True)
+class PiecePlace:
+    """The place of a piece: mm from the lower left corner of its sheet.
+
+    ``x`` and ``y`` are those of the balloon's middle, ``left`` and ``low`` of the piece's edges.
+    """
+
+    what: str
+    piece: int
+    x: float
+    y: float
+    left: float
+    low: float
+
+
+class Things:
+    """The things that a step lays, lowest first: single layers, and stacks of earlier steps as one
+    each.
+    """
+
+    def __init__(self, laminate: Laminate, lying: Sequence[Bed]) -> None:
+        self.laminate = laminate
+        self.things: list[tuple[int, ...]] = []
+        for bed in lying:
+            self.things += [(i,) for i in bed.layers] if bed.made_in is None else [bed.layers]
+
+    def is_lowest(self, index: int) -> bool:
+        """Return True if nothing lies under this layer in the step."""
+        return self.things[0][0] == index
+
+    def line_up(self, index: int, numbered: bool = True) -> str:
+        """Return along what the edge of a layer, or of the stack that it begins, is laid; empty for
+        none.
+
+        It is what lies below, or above the lowest; a sheet's edges are too far off.
+        """
+        place = next(i for i, thing in enumerate(self.things) if thing[0] == index)
+        if len(self.things) < 2:
+            return ""
+        side, beside = ("below", place - 1) if place else ("above", 1)
+        layer = _widest(self.laminate, self.things[place], highest=False)
+        neighbour = _widest(self.laminate, self.things[beside], highest=place > 0)
+        each = "each" if len(layer.profile.pieces) > 1 else "its"
+        edge_lip = lip(layer.profile, neighbour.profile)
+        if edge_lip is None:
+            return f"{each} piece at its place in the table" if neighbour.role == "sheet" else ""
+        alone = len(self.things[place]) == 1
+        words = [f"{each} edge" + ("" if alone else f" (layer {layer.index})")]
+        upper = self._top_film(self.things[beside]) if place else neighbour
+        if upper is not neighbour and lip(layer.profile, upper.profile) == (0.0, True):
+            words.append(f"on that of {_neighbour_words(upper, side, numbered)},")
+        if abs(edge_lip.outside) < EQUAL:
+            words.append("on")
+        else:
+            way = "outside" if edge_lip.outside > 0 else "inside"
+            words.append(f"{units.millimetres(abs(edge_lip.outside))} {way}")
+        words.append(f"that of {_neighbour_words(neighbour, side, numbered)},")
+        words.append("all round" if edge_lip.all_round else "all round but for the tabs")
+        return " ".join(words)
+
+    def _top_film(self, thing: Sequence[int]) -> Layer:
+        films = [self.laminate.layer(i) for i in thing if not self.laminate.layer(i).is_mask]
+        return films[-1] if films else self.laminate.layer(thing[-1])
+
+
+def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
+    """Return the lowest separator mask among layers round one axis that reaches out to one side.
+
+    It does so over the inlet tab, under a balloon larger than those between. None without one.
+    """
+    if len(laminate.chambers) > 1 or len(laminate.chambers[0].centres) > 1:
+        return None
+    (x, y), (dx, dy) = laminate.chambers[0].centres[0], laminate.inlets[0].direction
+    turn = -math.degrees(math.atan2(dy, dx))
+    masks = [layer for layer in map(laminate.layer, layers) if layer.role == "separator-mask"]
+    for mask in masks:
+        low_x, _, high_x, _ = mask.profile.moved(-x, -y).turned(turn).bounds
+        if high_x + low_x > EQUAL:
+            return mask
+    return None
+
+
+@cached
+def lip(region: Region, reference: Region) -> Lip | None:
+    """Return the distance between the outlines of two regions; None where it mostly varies."""
+    outline = Region(reference.outers)
+    distances = []
+    for contour in region.outers:
+        for edge in contour.edges:
+            count = math.ceil(edge.length / STATION)
+            for i in range(count):
+                p = edge.at((i + 0.5) / count)
+                distance = outline.distance_to_edge(p)
+                distances.append(-distance if outline.contains(p) else distance)
+    distances.sort()
+    usual = distances[len(distances) // 2]
+    near = sum(abs(distance - usual) < EQUAL for distance in distances)
+    if 2 * near < len(distances):
+        return None
+    return Lip(round(usual, 2) + 0.0, near == len(distances))
+
+
+def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
+    """Return the places of all that is laid on a sheet by hand; empty for steps without a sheet."""
+    sheet = laminate.layers[0]
+    if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
+        return ()
+    things = Things(laminate, lying).things
+    return tuple(place for thing in things[1:] for place in _piece_places(laminate, sheet, thing))
+
+
+def pitch(piece_places: Sequence[PiecePlace]) -> float | None:
+    """Return the distance from one piece to the next along x; None for a single piece."""
+    first, second = (
+        next((p for p in piece_places if p.piece == number), None) for number in (1, 2)
+    )
+    return second.x - first.x if first and second else None
+
+
+def _piece_places(laminate: Laminate, sheet: Layer, thing: Sequence[int]) -> Iterator[PiecePlace]:
+    layer = _widest(laminate, thing, highest=False)
+    sheet_left, sheet_low = sheet.profile.bounds[:2]
+    single = f"layer {layer.index}, {_name(layer)}"
+    words = single if len(thing) == 1 else f"stack of layers {layer_numbers(thing)}"
+    centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
+    pieces = sorted(layer.profile.pieces, key=lambda piece: piece.bounds)
+    for number, piece in enumerate(pieces, 1):
+        outline = Region(piece.outers)
+        inside = [centre for centre in centres if outline.contains(centre)] or [
+            _middle(piece.bounds)
+        ]
+        x, y = (sum(values) / len(inside) for values in zip(*inside, strict=True))
+        yield PiecePlace(
+            words,
+            number,
+            x - sheet_left,
+            y - sheet_low,
+            piece.bounds[0] - sheet_left,
+            piece.bounds[1] - sheet_low,
+        )
+
+
+def _middle(bounds: Bounds) -> Point:
+    return (bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2
+
+
+def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
+    """Return the layer whose outline is seen round all others, of several the highest or the
+    lowest.
+    """
+    reach = {
+        layer.pattern: round(sum(contour.area for contour in layer.profile.outers), 6)
+        for layer in distinct_layers(laminate, layers)
+    }
+    most = max(reach.values())
+    wide = [i for i in layers if reach[laminate.layer(i).pattern] == most]
+    return laminate.layer(wide[-1] if highest else wide[0])
+
+
+def _neighbour_words(layer: Layer, side: str, numbered: bool) -> str:
+    return f"the {_name(layer)} {side}" + (f" (layer {layer.index})" if numbered else "")
+
+
+def _name(layer: Layer) -> str:
+    return f"{layer.film.material} {layer.role.replace('-', ' ')}"

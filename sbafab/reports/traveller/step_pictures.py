@@ -1,0 +1,675 @@
+"""The pictures of a press step: from above, taken apart, and as a section from platen to platen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from sbafab.cutting.fixture import shown
+from sbafab.geometry.cache import cached
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import coord, section
+from sbafab.laminate.assembly import AssemblyStep, distinct_layers, stack_count
+from sbafab.laminate.laminate import Inlet, Laminate, Layer, Pin
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY, BuildUpPart
+from sbafab.pressing.dowels import PinSetting, push_out
+from sbafab.pressing.schedule import Step, joined_words
+from sbafab.reports import drawing as draw
+from sbafab.reports.drawing import layer_numbers
+from sbafab.reports.traveller import units
+from sbafab.reports.traveller.shapes import (
+    Bed,
+    Picture,
+    Round,
+    flat,
+    inlets_in,
+    label,
+    pattern_id,
+    rounds,
+)
+
+DIRECTIONS = 16
+STEPS = (0.0, 2.0, 4.0, 6.5, 9.0)
+"""mm from where a name would touch its place, in the order in which they are tried."""
+LED = 1.5
+"""mm from which on a thin line leads from the name to its place."""
+ASIDE, FAR = 0.4, 0.25
+"""What a name out of its direction costs, and a mm of distance, in mm2 of covering."""
+ROUNDED = 1e-6
+"""mm2, far more than sums of costs are off."""
+
+
+# Names beside the places of a picture, where they cover neither each other nor what they name.
+
+
+class PlanName(NamedTuple):
+    """A name to be put beside ``at``, a place ``clear`` mm round, best in the direction ``out``."""
+
+    words: str
+    at: Point
+    clear: float
+    out: Point
+
+
+def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
+    """Return the names as SVG, each where it covers least of ``taken`` and of those before it."""
+    taken, drawn = list(taken), []
+    for name in names:
+        half = draw.text_width(name.words, size) / 2, size / 2
+        middle, away = _best(name, half, room, taken)
+        taken.append(_box(middle, half))
+        if away >= LED:
+            drawn.append(draw.line([name.at, middle], width=0.12))
+        drawn.append(label((middle[0], middle[1] + 0.35 * size), name.words, size))
+    return drawn
+
+
+def _best(
+    name: PlanName, half: Point, room: Bounds, taken: Sequence[Bounds]
+) -> tuple[Point, float]:
+    """Return the middle of the cheapest place and its distance; the first of several.
+
+    ``half`` of the name's width and height.
+    """
+    least, best = math.inf, (name.at, 0.0)
+    for away in STEPS:
+        # Nothing costs less than the distance alone, but for rounding.
+        if FAR * away > least + ROUNDED:
+            break
+        for middle in _places(name, half, away):
+            cost = _cost(name, middle, half, room, taken) + FAR * away
+            if cost < least:
+                least, best = cost, (middle, away)
+    return best
+
+
+def _places(name: PlanName, half: Point, away: float) -> Iterator[Point]:
+    """Yield middles of the name at a distance, from its preferred direction round."""
+    reach = name.clear + away
+    for step in range(DIRECTIONS):
+        turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
+        u, v = math.cos(turn), math.sin(turn)
+        yield name.at[0] + (reach + half[0]) * u, name.at[1] + (reach + half[1]) * v
+
+
+def _box(middle: Point, half: Point) -> Bounds:
+    x, y = middle
+    return x - half[0], y - half[1], x + half[0], y + half[1]
+
+
+def _cost(
+    name: PlanName, middle: Point, half: Point, room: Bounds, taken: Sequence[Bounds]
+) -> float:
+    """Return the cost of a place without that of its distance, mm2."""
+    box = _box(middle, half)
+    covered = sum([_shared(box, neighbour) for neighbour in taken])
+    outside = _area(box) - _shared(box, room)
+    u, v = middle[0] - name.at[0], middle[1] - name.at[1]
+    along = (u * name.out[0] + v * name.out[1]) / (math.hypot(u, v) or 1.0)
+    return covered + 4 * outside + ASIDE * (1 - along)
+
+
+def _area(box: Bounds) -> float:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+def _shared(a: Bounds, b: Bounds) -> float:
+    width = min(a[2], b[2]) - max(a[0], b[0])
+    height = min(a[3], b[3]) - max(a[1], b[1])
+    return width * height if width > 0 and height > 0 else 0.0
+
+
+# The step seen from above: plate, layers, pins in or out, inlet tabs.
+
+
+WIDEST, TALLEST = 64.0, 36.0
+NARROWEST = 66.0
+"""mm: room for the words under the picture."""
+EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
+NAMES = 2.0
+"""Height of the names of pins and chambers, mm."""
+FREE = 6.0
+"""mm of air round a laminate that has no base plate."""
+
+AT_DATUM = 1e-3
+"""mm from the datum within which a pin hides it."""
+
+
+_section = cached(section)
+"""Every step of a laminate asks for the same."""
+
+
+class _View(NamedTuple):
+    """The scale and the bounds (mm of the laminate) of a step seen from above."""
+
+    bounds: Bounds
+    scale: float
+
+    @property
+    def width(self) -> float:
+        return max((self.bounds[2] - self.bounds[0]) * self.scale + 2 * EDGE, NARROWEST)
+
+    @property
+    def height(self) -> float:
+        return (self.bounds[3] - self.bounds[1]) * self.scale + HEAD + FOOT
+
+    @property
+    def origin(self) -> Point:
+        return EDGE - self.bounds[0] * self.scale, HEAD + self.bounds[3] * self.scale
+
+    def at(self, p: Point) -> Point:
+        x, y = self.origin
+        return x + p[0] * self.scale, y - p[1] * self.scale
+
+
+def _view(bounds: Bounds) -> _View:
+    low_x, low_y, high_x, high_y = bounds
+    return _View(bounds, min(WIDEST / (high_x - low_x), TALLEST / (high_y - low_y)))
+
+
+def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
+    """Return the step from above; earlier stacks grey, what joins in its film's colour."""
+    plate = shown(laminate)
+    view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
+    state = "pins in" if step.pins else "no pins"
+    words = f"step {step.number} from above, {state}; the text beside it says the same"
+    picture = Picture(name, view.width, view.height, words)
+    if plate is not None:
+        picture.plate(plate, flat(view.scale, view.origin), bool(step.pins))
+    for bed in lying:
+        for layer in distinct_layers(laminate, bed.layers):
+            look = "made" if bed.made_in else "clear"
+            picture.part(
+                pattern_id(layer.pattern),
+                layer.film,
+                flat(view.scale, view.origin),
+                look,
+            )
+    inlets = inlets_in(laminate, step.layers)
+    # An arrow at its tab names the pin of a chamber, too.
+    arrow_names = {inlet.chamber for inlet in inlets}
+    names, taken = [], []
+    for pin in laminate.pins:
+        at, r = view.at(pin.centre), _radius(pin, view)
+        picture.add(_pin(at, r, pin in step.pins))
+        taken.append((at[0] - r, at[1] - r, at[0] + r, at[1] + r))
+        if pin in step.pins and pin.name not in arrow_names:
+            names.append(PlanName(pin.name, at, r + 0.6, _outward(pin)))
+    arrows = []
+    for inlet in inlets:
+        start, tip = _arrow(inlet, _reach(laminate, inlet), view)
+        (u, v), xs, ys = inlet.direction, (start[0], tip[0]), (start[1], tip[1])
+        picture.add(draw.line([start, tip], width=0.35), draw.arrow(tip, (u, -v)))
+        taken.append((min(xs) - 0.7, min(ys) - 0.7, max(xs) + 0.7, max(ys) + 0.7))
+        arrows.append(PlanName(inlet.chamber, tip, 0.9, (u, -v)))
+    room = 0.5, HEAD + 0.3, view.width - 0.5, view.height - FOOT + 1.0
+    picture.add(*named([*arrows, *names], NAMES, room, taken))
+    at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
+    if at_datum is None:
+        picture.add(*_datum(view))
+    datum = "+ datum" if at_datum is None else f"the datum is the middle of pin {at_datum}"
+    picture.add(*_captions(view, plate is not None, bool(step.pins), datum))
+    return picture.svg()
+
+
+def _widened(bounds: Bounds) -> Bounds:
+    low_x, low_y, high_x, high_y = bounds
+    return low_x - FREE, low_y - FREE, high_x + FREE, high_y + FREE
+
+
+def _radius(pin: Pin, view: _View) -> float:
+    return max(pin.diameter * view.scale / 2, 0.7)
+
+
+def _outward(pin: Pin) -> Point:
+    """Return the direction on the page from the datum to a pin; upward for the pin that stands
+    there.
+    """
+    far = math.hypot(*pin.centre)
+    return (pin.centre[0] / far, -pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
+
+
+def _pin(at: Point, r: float, is_in: bool) -> str:
+    """Return a pin that is in as a filled circle, one that is out as a hollow one."""
+    x, y = at
+    fill = draw.DARK if is_in else "#ffffff"
+    return (
+        f'<circle cx="{coord(x)}" cy="{coord(y)}" r="{coord(r)}" fill="{fill}" '
+        f'stroke="{draw.DARK}" stroke-width="0.3"/>'
+    )
+
+
+def _reach(laminate: Laminate, inlet: Inlet) -> float:
+    """Return the distance in mm by which an inlet's strip passes its mouth at most."""
+    shapes = (layers[0].profile for layers in laminate.patterns.values())
+    spans = [span for shape in shapes for span in _section(shape, inlet.mouth, inlet.direction)]
+    return max((end for _, end in spans), default=0.0)
+
+
+def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
+    """Return start and tip of an arrow outward from the end of the tab and its strip."""
+    u, v = inlet.direction
+    (x, y), v = view.at((inlet.mouth[0] + reach * u, inlet.mouth[1] + reach * v)), -v
+    return (x + 0.8 * u, y + 0.8 * v), (x + 4.0 * u, y + 4.0 * v)
+
+
+def _datum(view: _View) -> list[str]:
+    """Return the cross that every cut file carries at the actuator's axis."""
+    x, y = view.origin
+    return [
+        draw.line([(x - 1.6, y), (x + 1.6, y)], width=0.2),
+        draw.line([(x, y - 1.6), (x, y + 1.6)], width=0.2),
+    ]
+
+
+def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
+    """Return the key of the marks under the picture, and the words on the plate above it."""
+    y = view.height - 4.6
+    parts = [draw.text((EDGE, view.height - 1.2), f"seen from above; {datum}", size=2.2)]
+    if not plate:
+        return parts
+    mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'
+    parts += [
+        mark.format(coord(EDGE + 0.8), coord(y - 0.8), draw.DARK),
+        draw.text((EDGE + 2.4, y), "pin in", size=2.2),
+        mark.format(coord(EDGE + 13.0), coord(y - 0.8), "#ffffff"),
+        draw.text((EDGE + 14.6, y), "no pin", size=2.2),
+    ]
+    words = "on the base plate, cut corner back right" if pinned else "no pins in"
+    parts.append(draw.text((EDGE, HEAD - 1.2), words, size=2.2))
+    return parts
+
+
+# The step taken apart: every layer or finished stack in its place over the plate.
+
+
+WIDE = 58.0
+TILT = 0.34
+"""How much of its depth a layer keeps, seen from the front and above."""
+LABELS = 50.0
+TALLEST_STACK = 64.0
+NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
+COLUMN, BRACKET = 4.0, 13.0
+"""mm from the layers to their labels, and for a bracket with its count."""
+BOLD = 1.25
+"""How much wider bold letters are, at most."""
+PAGE = 1.1
+"""mm on the page between the layers of a finished stack."""
+MOST = 20
+TOP, STACK_FOOT = 5.0, 2.0
+DEEP = 50.0
+STANDS_OUT = 4.0
+"""mm on the page of a pin above the highest level."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """The layers at one height, drawn on each other, and their label.
+
+    ``made`` says that an earlier step has bonded them, ``round`` that they are laid repeatedly.
+    """
+
+    layers: tuple[Layer, ...]
+    words: str
+    detail: str
+    made: bool
+    round: Round | None = None
+
+
+@dataclass(frozen=True)
+class _Tilted:
+    """The view of a step taken apart: the laminate's origin lands at ``middle`` and ``ground``."""
+
+    scale: float
+    middle: float
+    ground: float
+    gap: float
+    height: float
+    plate: bool
+
+    def matrix(self, height: float) -> tuple[float, ...]:
+        """Return the matrix from a layer's plan to the page, its origin at a page height."""
+        return self.scale, 0.0, 0.0, -self.scale * TILT, self.middle, height
+
+    def level(self, place: int) -> float:
+        """Return the page height of a level, counted from the lowest; the plate lies under them
+        all.
+        """
+        return self.ground - self.gap * (place + self.plate)
+
+
+def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name: str) -> str:
+    """Return the step's layers one over another, lowest first, with numbers and patterns beside
+    them.
+
+    They are drawn from the front and above, so that outlines and tabs show which way round each
+    goes.
+    """
+    levels = _shortened([level for bed in lying for level in _levels(laminate, bed)])
+    plate = shown(laminate) if step.pins else None
+    view = _tilted(plate.bounds if plate is not None else laminate.bounds, len(levels), bool(plate))
+    words = "; ".join(f"{level.words} {level.detail}" for level in levels)
+    width = WIDE + _labels(levels, view.gap)
+    picture = Picture(name, width, view.height, f"step {step.number} taken apart: {words}")
+    if plate is not None:
+        picture.plate(plate, view.matrix(view.ground))
+        edge = view.middle + plate.bounds[2] * view.scale, view.ground
+        picture.add(*_beside(edge, "base plate", "cut corner: back right", view.gap))
+    under = view.ground
+    for place, level in enumerate(levels):
+        here = view.level(place)
+        picture.add(*_pin_stretches(step.pins, view, under, here))
+        look = "made" if level.made else "fresh"
+        for lift, layer in enumerate(level.layers):
+            matrix = view.matrix(here - PAGE * lift)
+            picture.part(pattern_id(layer.pattern), layer.film, matrix, look)
+        reach = max(layer.profile.bounds[2] for layer in level.layers)
+        edge = view.middle + reach * view.scale, here
+        picture.add(*_beside(edge, level.words, level.detail, view.gap))
+        under = here - PAGE * (len(level.layers) - 1)
+    picture.add(*_pin_stretches(step.pins, view, under, under - STANDS_OUT))
+    picture.add(*_brackets(levels, view, width))
+    return picture.svg()
+
+
+def _tilted(bounds: Bounds, levels: int, plate: bool) -> _Tilted:
+    low_x, low_y, high_x, high_y = bounds
+    scale = min(WIDE / (high_x - low_x), DEEP / ((high_y - low_y) * TILT))
+    depth = (high_y - low_y) * scale * TILT
+    between = max(levels - (not plate), 1)
+    gap = min(max((TALLEST_STACK - depth) / between, NEAREST), FARTHEST)
+    height = TOP + depth + gap * between + STACK_FOOT
+    middle = WIDE / 2 - (low_x + high_x) / 2 * scale
+    return _Tilted(scale, middle, height - STACK_FOOT + low_y * scale * TILT, gap, height, plate)
+
+
+def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
+    if bed.made_in is not None:
+        shown = distinct_layers(laminate, bed.layers)[:4]
+        words = f"layers {layer_numbers(bed.layers)}"
+        many = stack_count(laminate, bed.layers)
+        yield Level(shown, words, f"the {units.stacks(many)} from step {bed.made_in}", True)
+        return
+    for turn in rounds([laminate.layer(index) for index in bed.layers]):
+        for place in turn.places:
+            first = place[0]
+            numbers = layer_numbers([layer.index for layer in place])
+            detail = f"{first.film.material} {first.role.replace('-', ' ')} {first.pattern}"
+            yield Level((first,), numbers, detail, False, turn if turn.count > 1 else None)
+
+
+def _shortened(levels: list[Level]) -> list[Level]:
+    """Return few enough levels to draw; the lay-up table has them all."""
+    if len(levels) <= MOST:
+        return levels
+    hidden = levels[MOST - 5 : -4]
+    middle = hidden[len(hidden) // 2]
+    gap = Level(middle.layers, f"{len(hidden)} more layers", "see the list", middle.made)
+    return [*levels[: MOST - 5], gap, *levels[-4:]]
+
+
+def _labels(levels: Sequence[Level], gap: float) -> float:
+    """Return the room beside the layers for the longest label and the bracket behind it, mm."""
+    if gap >= TWO_LINES:
+        return LABELS
+    longest = max((_one_line(level.words, level.detail) for level in levels), default=0.0)
+    return max(LABELS, COLUMN + longest + 2.0 + BRACKET)
+
+
+def _one_line(words: str, detail: str) -> float:
+    """Return the length of a label with its detail on the same line, mm."""
+    return BOLD * draw.text_width(words, 2.5) + 1.2 + draw.text_width(detail, 2.2)
+
+
+def _beside(edge: Point, words: str, detail: str, gap: float) -> list[str]:
+    """Return words with a leader to what they name; on one line where the next are near."""
+    x, y = edge
+    column = WIDE + COLUMN
+    leader = draw.line([(min(x, WIDE) + 0.4, y), (column - 0.8, y)], colour=draw.GREY, width=0.12)
+    if gap < TWO_LINES:
+        after = column + BOLD * draw.text_width(words, 2.5) + 1.2
+        return [
+            leader,
+            draw.text((column, y + 0.9), words, size=2.5, bold=True),
+            draw.text((after, y + 0.9), detail, size=2.2),
+        ]
+    return [
+        leader,
+        draw.text((column, y + 0.1), words, size=2.7, bold=True),
+        draw.text((column, y + 3.0), detail, size=2.3),
+    ]
+
+
+def _pin_stretches(pins: Sequence[Pin], view: _Tilted, under: float, over: float) -> list[str]:
+    """Return the stretch of every pin between two levels, rear pins first."""
+    parts = []
+    for pin in sorted(pins, key=lambda pin: (-pin.centre[1], pin.centre[0])):
+        x = view.middle + pin.centre[0] * view.scale
+        back = pin.centre[1] * view.scale * TILT
+        width = max(pin.diameter * view.scale * 0.8, 0.6)
+        parts.append(
+            f'<path d="M{coord(x)} {coord(under - back)}V{coord(over - back)}" fill="none" '
+            f'stroke="#6b7178" stroke-width="{coord(width)}" stroke-linecap="round"/>'
+        )
+    return parts
+
+
+def _brackets(levels: Sequence[Level], view: _Tilted, width: float) -> list[str]:
+    """Return a bracket beside the levels of a round, with their count."""
+    parts: list[str] = []
+    marked = [(i, level.round) for i, level in enumerate(levels) if level.round is not None]
+    for turn in {id(turn): turn for _, turn in marked}.values():
+        places = [i for i, level_turn in marked if level_turn is turn]
+        low, high = view.level(places[0]) + 3.2, view.level(places[-1]) - 2.4
+        x = width - BRACKET
+        parts.append(draw.line([(x - 1.2, low), (x, low), (x, high), (x - 1.2, high)], width=0.3))
+        words = f"{draw.TIMES} {turn.count}"
+        parts.append(draw.text((x + 1.2, (low + high) / 2 + 1.0), words, size=3.4, bold=True))
+    return parts
+
+
+# The section between the platens, to scale in two classes of thickness.
+
+
+SECTION_WIDE, SECTION_LABELS, SECTION_EDGE = 26.0, 43.0, 1.0
+THICK = 0.5
+"""mm on the page for one of the base plate and the pad."""
+PLATEN = 3.0
+FACTORS = (50, 20, 10, 5, 2, 1)
+TALLEST_LAMINATE = 10.0
+"""mm on the page of a laminate at most, where a factor allows it."""
+PIN_REACH = 0.7
+"""Share of the pad that a pin may reach into on the page."""
+STACK = 8.0, 19.0
+"""Where the laminate lies along x."""
+GAP = 3.0
+LEAST = 24.0
+"""mm on the page: room for the words beside the section."""
+INKS = {
+    "platen": "#c9ccd1",
+    BASE_PLATE: "#e3e5e8",
+    "film": "#e0872f",
+    LAMINATE: "#bcd3ea",
+    PAD: "#f3ddd6",
+    UNDERLAY: "#ffffff",
+}
+
+
+def factor(step: Step) -> int:
+    """Return the enlargement of films: pins that stand over the stack must end inside the pad."""
+    pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
+    over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
+    paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
+    films = step.stack_mm + paper
+    fits = (by for by in FACTORS if films * by <= TALLEST_LAMINATE and over * by <= PIN_REACH * pad)
+    return next(fits, FACTORS[-1])
+
+
+def build_up_svg(step: Step, name: str) -> str:
+    """Return the section of one step, platen to platen, each part with its thickness beside it.
+
+    Base plate and press pad stand 1:2; films, laminate and what of the pins stands over the plate
+    are enlarged by a factor that the picture names. Widths are not to scale.
+    """
+    thick = {item.part: item for item in step.build_up}
+    by = factor(step)
+    plate, pad = thick[BASE_PLATE].thickness_mm * THICK, thick[PAD].thickness_mm * THICK
+    release = thick["release film"].thickness_mm * by
+    stack = step.stack_mm * by
+    drawn = pad + 2 * release + stack + plate + 2 * PLATEN
+    start = SECTION_EDGE + max(0.0, LEAST - drawn) / 2
+    top = start + PLATEN
+    over = top + pad
+    upper = over + release
+    lower = upper + stack
+    paper = thick[UNDERLAY].thickness_mm * by if UNDERLAY in thick else 0.0
+    bed = lower + release
+    face = bed + paper
+    bottom = face + plate
+    end = max(bottom + PLATEN, SECTION_EDGE + LEAST)
+    low, high = STACK
+    words = "; ".join(f"{item.part} {item.thickness_mm:g} mm" for item in reversed(step.build_up))
+    picture = Picture(
+        name, SECTION_WIDE + SECTION_LABELS, end + 5.0, f"build-up of step {step.step}: {words}"
+    )
+    for y in (start, bottom):
+        picture.add(
+            draw.box(
+                (SECTION_EDGE, y), (SECTION_WIDE, y + PLATEN), fill=INKS["platen"], stroke=draw.DARK
+            )
+        )
+    picture.add(
+        draw.box(
+            (SECTION_EDGE, face), (SECTION_WIDE, bottom), fill=INKS[BASE_PLATE], stroke=draw.DARK
+        ),
+        *_underlay(bed, face),
+        _pad(top, over, bed - 2 * release, low, high),
+        *_release(upper, bed, release, low, high),
+        draw.box((low, upper), (high, lower), fill=INKS[LAMINATE], stroke=draw.DARK),
+        *_section_pins(step.pin_settings, face, bottom, by, low, high),
+    )
+    labels = [
+        (start + PLATEN / 2, f"upper platen, {units.temperature(step.temperature_c)}"),
+        (
+            top + pad / 2,
+            f"press pad {units.millimetres(thick[PAD].thickness_mm)}",
+        ),
+        (upper - release / 2, _release_words(step)),
+        (
+            upper + stack / 2,
+            f"laminate {units.millimetres(step.stack_mm)}, ~{step.film_kpa:.0f} kPa",
+        ),
+        (bed - release / 2, "release film"),
+        *_underlay_words(thick, (bed + face) / 2),
+        (face + plate / 2, _plate_words(step, thick[BASE_PLATE].thickness_mm)),
+        (bottom + PLATEN / 2, f"lower platen, {units.temperature(step.temperature_c)}"),
+    ]
+    rows = draw.spread([y for y, _ in labels], GAP, SECTION_EDGE + 2.0, end)
+    for (y, text), row in zip(labels, rows, strict=True):
+        x = high - 1.5 if "laminate" in text else SECTION_WIDE - 1.5
+        picture.add(*draw.leader((x, y), (SECTION_WIDE + 2.0, row), (SECTION_WIDE + 3.5, row)))
+        picture.add(draw.text((SECTION_WIDE + 4.2, row + 0.8), text, size=2.3))
+    scale = f"plate and pad 1:2; what lies between {by}:1; widths not to scale"
+    picture.add(draw.text((SECTION_EDGE, end + 3.6), scale, size=2.2))
+    return picture.svg()
+
+
+def _underlay(top: float, bottom: float) -> list[str]:
+    """Return the printed paper between plate and release film; empty where there is none."""
+    if top == bottom:
+        return []
+    return [
+        draw.box(
+            (SECTION_EDGE, top),
+            (SECTION_WIDE, bottom),
+            fill=INKS[UNDERLAY],
+            stroke=draw.DARK,
+            width=0.1,
+        )
+    ]
+
+
+def _underlay_words(thick: Mapping[str, BuildUpPart], y: float) -> list[tuple[float, str]]:
+    if UNDERLAY not in thick:
+        return []
+    return [(y, f"underlay {units.millimetres(thick[UNDERLAY].thickness_mm)}, paper")]
+
+
+def _release_words(step: Step) -> str:
+    film = next(item for item in step.build_up if item.part == "release film")
+    return f"release film {units.millimetres(film.thickness_mm)}"
+
+
+def _plate_words(step: Step, plate: float) -> str:
+    return f"base plate {units.millimetres(plate)}, {'pins in' if step.pin_settings else 'no pins'}"
+
+
+def _pad(top: float, over: float, beside: float, low: float, high: float) -> str:
+    """Return the pad, pressed together over the laminate; beside it, it comes down on the plate."""
+    slope = min(4.0, beside - over)
+    path = (
+        f"M{SECTION_EDGE} {top}H{SECTION_WIDE}V{beside:.3f}H{high + slope:.3f}L{high} {over:.3f}"
+        f"H{low}L{low - slope:.3f} {beside:.3f}H{SECTION_EDGE}Z"
+    )
+    return f'<path d="{path}" fill="{INKS[PAD]}" stroke="{draw.DARK}" stroke-width="{draw.THIN}"/>'
+
+
+def _release(upper: float, bed: float, release: float, low: float, high: float) -> list[str]:
+    """Return the flat lower film and the upper one, which goes up over the laminate."""
+    slope = min(4.0, bed - 2 * release - (upper - release))
+    beside, over = bed - 1.5 * release, upper - release / 2
+    ends = [(SECTION_EDGE, beside), (low - slope, beside), (low, over), (high, over)]
+    ends += [(high + slope, beside), (SECTION_WIDE, beside)]
+    flat = bed - release / 2
+    return [
+        draw.line([(SECTION_EDGE, flat), (SECTION_WIDE, flat)], colour=INKS["film"], width=release),
+        draw.line(ends, colour=INKS["film"], width=release),
+    ]
+
+
+def _section_pins(
+    settings: tuple[PinSetting, ...],
+    face: float,
+    bottom: float,
+    by: int,
+    low: float,
+    high: float,
+) -> list[str]:
+    """The pins on the shoulders of their holes, seat 1:2, what stands over the plate enlarged.
+
+    Below each is its push-out hole; the tips press into the pad.
+    """
+    parts = []
+    for place, pin in enumerate(settings[:4]):
+        x = low + (high - low) * (place + 1) / (min(len(settings), 4) + 1)
+        half = pin.diameter_mm / 2
+        tip, shoulder = face - pin.stands_mm * by, face + pin.seat_mm * THICK
+        narrow = push_out(pin.diameter_mm) / 2
+        parts += [
+            draw.box(
+                (x - narrow, shoulder), (x + narrow, bottom), fill="#ffffff", stroke=draw.DARK
+            ),
+            draw.box((x - half, tip), (x + half, shoulder), fill="#6d737c", stroke=draw.DARK),
+        ]
+    return parts
+
+
+def pin_lines(step: Step) -> str:
+    """Return names, size, depth of hole and heights over plate and stack, equal pins together."""
+    return "; ".join(
+        f"{joined_words(names)}: ⌀{pin.diameter_mm:g} {draw.TIMES} {pin.length_mm:g} mm, "
+        f"{pin.seat_mm:.2f} mm in the plate, {pin.stands_mm - pin.tolerance_mm:.2f} to "
+        f"{pin.stands_mm + pin.tolerance_mm:.2f} mm over it, "
+        f"{pin.stands_mm - pin.tolerance_mm - step.top_mm:.2f} mm or more over the stack"
+        for names, pin in _equal_pins(step)
+    )
+
+
+def _equal_pins(step: Step) -> list[tuple[list[str], PinSetting]]:
+    """Return the names of equal pins, and one pin of each kind."""
+    groups: dict[PinSetting, list[str]] = {}
+    for pin in sorted(step.pin_settings, key=lambda pin: (pin.diameter_mm, pin.length_mm)):
+        groups.setdefault(replace(pin, pin=""), []).append(pin.pin)
+    return [(names, pin) for pin, names in groups.items()]

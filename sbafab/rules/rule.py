@@ -1,0 +1,34 @@
+"""A rule of the deck: its name, its check, the sense of its limit, and its explanation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from sbafab.rules.finding import Finding
+    from sbafab.rules.measures import Measures
+
+
+class Explanation(NamedTuple):
+    """The condition that ``holds`` where a rule passes, ``why`` it matters, how to ``mend`` it.
+
+    ``keys`` of a design file set the limit or the measured value.
+    """
+
+    holds: str
+    why: str
+    mend: str
+    keys: tuple[str, ...] = ()
+
+
+class Rule(NamedTuple):
+    """A rule: its stable name, the function that checks it, and its explanation.
+
+    ``at_most``: its limit is the largest value allowed; of all others it is the least.
+    """
+
+    name: str
+    check: Callable[[Measures], list[Finding]]
+    explanation: Explanation
+    at_most: bool = False

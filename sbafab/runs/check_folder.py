@@ -1,0 +1,753 @@
+"""An output folder read back, made again from its design and compared: texts, tables, meshes.
+
+The design is that of ``design.toml``; the places of parts on film sheets are those of
+``nest.json``.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import math
+import re
+import struct
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
+from zipfile import BadZipFile, ZipFile
+
+from pydantic import BaseModel
+
+from sbafab.as_built.check import FolderReadBack, as_designed, read_back
+from sbafab.as_built.claims import CUT_ENDINGS, could_be_cut
+from sbafab.as_built.cut_files import sound_digest
+from sbafab.as_built.expected import drawn_settings
+from sbafab.as_built.records import DESIGNED, Problem, is_assembly, is_job
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.files import DESIGN_FILE, load_assembly
+from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.properties import FOLDER as LAYERS
+from sbafab.cutting.properties import curves_of
+from sbafab.cutting.sheets import SheetFile
+from sbafab.cutting.verify import TOLERANCE, check_contours
+from sbafab.errors import DesignError, GeometryError, OutputError
+from sbafab.geometry.region import Region
+from sbafab.meshing.surface import Surface, open_edges
+from sbafab.models.figures import Factors, PredictionRequest
+from sbafab.models.prediction import predict
+from sbafab.nesting.records import NestPart, parts_of
+from sbafab.output.artefacts import (
+    ARTEFACTS,
+    FINDINGS,
+    TRAVELLER,
+    DesignFolder,
+    write_artefacts,
+    write_nested_sheets,
+    write_plates,
+)
+from sbafab.output.carry_over import MESH, PREDICTION, PRESS
+from sbafab.output.checked import (
+    EVERYTHING,
+    PICTURES,
+    Checked,
+    DesignPlan,
+    RunPart,
+    plan_design,
+    schedule_of,
+)
+from sbafab.output.folder import write_design, write_folder
+from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
+from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
+from sbafab.process import ignore_progress
+from sbafab.rules.finding import Finding
+from sbafab.simulators.simulator import NAMES as SIMULATORS
+from sbafab.version import GENERATOR
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+INDEX = "manifest.json"
+DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
+"""Errors of a doctored design."""
+BY_OTHER_COMMANDS = (*MESH, *PREDICTION, *SIMULATORS)
+"""Folders and files of other commands, which are not made again."""
+NOT_COMPARED = ("files", "mesh_statistics", "meshes")
+"""Keys of a manifest that hold hashes, or meshes of several commands."""
+
+
+def check_folder(folder: Path) -> tuple[Finding, ...]:
+    """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
+    whether all that lies in it is what its design makes.
+
+    Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
+    with one sentence for a folder that holds no sound manifest or no cut files.
+    """
+    read = read_back(folder)
+    return read.against_design(design_problems_of(folder, read))
+
+
+def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:
+    """Layers, and all that lies beside them, that are not what the folder's designs make."""
+    checked = [as_designed(built) for built in read.designs]
+    whole = [design for design in checked if design is not None]
+    if len(whole) < len(checked):
+        return [*read.problems]
+    if read.job is not None:
+        return [*read.problems, *_job_problems(folder, read.job, whole, read.designs[0].claims)]
+    (built,) = read.designs
+    assert built.expected is not None
+    return [*read.problems, *_problems(folder, built.claims, whole[0], built.expected.paths)]
+
+
+def _problems(
+    folder: Path, claims: Manifest, checked: Checked, paths: Mapping[str, Region]
+) -> list[Problem]:
+    """Return the files of a design that differ from those made again; no sheets of a job's design.
+
+    ``paths`` holds the beam's path for every pattern of the laminate.
+    """
+    of_job = is_job(folder.absolute().parent)
+    with _temporary_folder(folder) as (fresh, problems):
+        order = checked.design.order
+        parts = parts_of(checked.laminate, paths, order.quantity, order.spare_parts)
+        index = _regenerate(folder, fresh, claims, checked, paths, None if of_job else parts)
+        regenerated = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
+        # The pages of a job's design show the sheets of the job, and are compared there.
+        excluded = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
+        problems.extend(_foreign_problems(claims, regenerated, excluded))
+        problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
+        problems.extend(_index_problems(folder, index, of_job))
+        problems.extend(_prediction_problems(folder, fresh, claims, checked))
+    return problems
+
+
+def _job_problems(
+    folder: Path, job: JobManifest, checked: Sequence[Checked], claims: Manifest
+) -> list[Problem]:
+    """Return the files of a job and of its designs' folders that differ from those made again.
+
+    ``claims`` are those of one of the designs, which say how chords were drawn.
+    """
+    curves = curves_of(claims.curves)
+    with _temporary_folder(folder) as (fresh, problems):
+        whole = CheckedJob(job.schema_name, job.name, tuple(checked))
+        if is_assembly(job):
+            whole = of_assembly(assemble(load_assembly(folder / DESIGN_FILE)), checked)
+        parts = PICTURES if is_assembly(job) and whole.failed else EVERYTHING
+        designs = [plan_design(design, parts, curves) for design in checked]
+        write_folder(plan_job(whole, designs, folder, ignore_progress), fresh, ignore_progress)
+        problems.extend(_foreign_problems(job, file_names(fresh)))
+        problems.extend(_file_problems(folder, fresh, job.files, job.generator))
+    return problems
+
+
+def _foreign_problems(
+    claims: Manifest | JobManifest, regenerated: Collection[str], excluded: Collection[str] = ()
+) -> list[Problem]:
+    """Return the files that a manifest lists and its design does not make.
+
+    ``excluded``: folders and files of other commands, except files that could be cut.
+    """
+    return [
+        _problem(
+            f"{path} is listed and is no file of this design",
+            claims.generator,
+            is_done=path.lower().endswith(CUT_ENDINGS),
+        )
+        for path in claims.files
+        if path not in regenerated
+        and (could_be_cut(path) or path.partition("/")[0] not in excluded)
+    ]
+
+
+@contextmanager
+def _temporary_folder(folder: Path) -> Iterator[tuple[Path, list[Problem]]]:
+    """Yield an empty folder and a list of problems; an error of the design is added to it."""
+    problems: list[Problem] = []
+    with TemporaryDirectory() as name:
+        try:
+            yield Path(name), problems
+        except DESIGN_ERRORS as error:
+            message = f"{folder.name} could not be made again to be compared: {error}"
+            problems.append(Problem(DESIGNED, message))
+
+
+def _regenerate(
+    folder: Path,
+    fresh: Path,
+    claims: Manifest,
+    checked: Checked,
+    paths: Mapping[str, Region],
+    parts: Sequence[NestPart] | None,
+) -> dict[str, Any]:
+    """Write the files of a run beside the layers to ``fresh``; return its manifest without hashes.
+
+    ``parts`` are placed on film sheets; None for a design of a job.
+    """
+    design = checked.design
+    settings = drawn_settings(design, checked.waived, claims.curves)
+    parts_of_run = _parts(claims.files)
+    # Pictures come with a run that makes everything: then there is a page as well.
+    has_page = parts is not None and (
+        TRAVELLER in claims.files or {"press", "preview"} <= parts_of_run
+    )
+    parts_of_run |= {"press", "preview"} if has_page else set()
+    sheets: list[SheetFile] = []
+    if parts is not None:
+        nests = find_nests(parts, design, folder, ignore_progress)
+        sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
+    write_plates(checked, paths, fresh, settings)
+    pressing = schedule_of(checked) if "press" in parts_of_run else None
+    plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
+    return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, parts is not None))
+
+
+def _parts(files: Collection[str]) -> set[RunPart]:
+    """Return the parts of a run that wrote these files."""
+    parts: set[RunPart] = {"cut"}
+    if any(path in files for path in PRESS):
+        parts.add("press")
+    if any(path.startswith("preview/") for path in files):
+        parts.add("preview")
+    if any(path.startswith(("mesh/solid.", "mesh/cavity_")) for path in files):
+        parts.add("mesh")
+    return parts
+
+
+def _file_problems(
+    folder: Path, fresh: Path, listed: Collection[str], generator: str
+) -> list[Problem]:
+    """Return the files that differ from those made again.
+
+    A difference of a file of another version is a warning, unless it is cut or pressed.
+    """
+    problems = []
+    for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
+        name = path.relative_to(fresh).as_posix()
+        if name == INDEX or (path.parent.name == LAYERS and path.suffix == ".dxf"):
+            continue
+        if name not in listed or not (folder / name).is_file():
+            difference = f"{name} is missing"
+        elif name.endswith(f"/{INDEX}"):
+            difference = index_difference(_read_index(folder / name), _read_index(path), ("files",))
+            difference = f"{name}: {difference}" if difference else ""
+        else:
+            difference = file_difference(folder / name, path, name)
+        if difference:
+            is_done = name.endswith((*PRESS, *CUT_ENDINGS))
+            problems.append(_problem(difference, generator, is_done))
+    return problems
+
+
+def _problem(message: str, generator: str, is_done: bool) -> Problem:
+    if generator == GENERATOR or is_done:
+        return Problem(DESIGNED, f"{message}; regenerate the folder")
+    message = (
+        f"{message}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
+    )
+    return Problem(DESIGNED, message, verdict="warn")
+
+
+def _read_index(path: Path) -> dict[str, Any]:
+    index: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return index
+
+
+def _index_problems(folder: Path, index: dict[str, Any], of_job: bool) -> list[Problem]:
+    """Return the differences of the manifest from the design's, without sheets of a job."""
+    left_out = (*NOT_COMPARED, "sheets", "films") if of_job else NOT_COMPARED
+    actual, expected = _read_index(folder / INDEX), json.loads(as_json(index))
+    difference = index_difference(actual, expected, left_out) or _mesh_difference(
+        folder, actual, expected
+    )
+    return (
+        [Problem(DESIGNED, f"manifest.json: {difference}; regenerate the folder")]
+        if difference
+        else []
+    )
+
+
+def _mesh_difference(folder: Path, actual: dict[str, Any], expected: dict[str, Any]) -> str:
+    """Return a difference of the listed surfaces; numbers of triangles may depend on libraries."""
+    meshes = [entry for entry in actual.get("meshes", []) if isinstance(entry, dict)]
+    listed = [entry for entry in meshes if entry.get("kind") in ("solid", "cavity")]
+    if len(listed) != len(expected["meshes"]):
+        return f"it lists {len(listed)} surfaces, not {len(expected['meshes'])}"
+    for mesh in expected["meshes"]:
+        listed_mesh: dict[str, Any] = next((m for m in listed if m.get("file") == mesh["file"]), {})
+        count = mesh["elements"]
+        if listed_mesh.get("elements") != count:
+            count = sum(len(body.surface.faces) for body in bodies(folder / mesh["file"]))
+        difference = index_difference(listed_mesh, {**mesh, "elements": count}, ())
+        if difference:
+            return f"{mesh['file']}: {difference}"
+    return ""
+
+
+class _PredictionRequest(BaseModel):
+    pressures_kpa: tuple[float, ...]
+    flow_ml_min: float
+    volumes_ul: tuple[float, ...]
+    press_factor: float
+    contact_factor: float
+    pocket_loss: float
+    modulus_mpa: float | None
+
+
+class _PredictionFile(BaseModel):
+    """The request in ``predict.json``."""
+
+    asked: _PredictionRequest
+
+
+def _prediction_problems(
+    folder: Path, fresh: Path, claims: Manifest, checked: Checked
+) -> list[Problem]:
+    """Return differences of the prediction from one for the same request."""
+    if "predict.json" not in claims.files:
+        return []
+    try:
+        request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
+        measured = request.pocket_loss, request.modulus_mpa
+        factors = Factors(request.press_factor, request.contact_factor, *measured)
+        wish = PredictionRequest(
+            request.pressures_kpa, request.flow_ml_min, request.volumes_ul, factors
+        )
+        written = fresh / "prediction"
+        written.mkdir()
+        settings = drawn_settings(checked.design, checked.waived, claims.curves)
+        prediction = predict(checked.design, wish)
+        plan = DesignPlan(checked, frozenset(("predict",)), settings, prediction=prediction)
+        rows = [row for row in ARTEFACTS if row.part == "predict"]
+        write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
+    except (ValueError, OSError) as error:
+        message = f"predict.json does not say what was asked for ({error})"
+        return [_problem(message, claims.generator, is_done=False)]
+    return _file_problems(folder, written, claims.files, claims.generator)
+
+
+# Comparison of two files: bytes first, then contents, since another program or another version of a
+# library may write the same contents in other bytes.
+
+
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-6, 1e-6
+"""Tolerances of numbers, since libraries round differently."""
+GREY = 1.0
+"""Mean difference of two pictures by antialiasing, of 255 levels."""
+VISIBLE, VISIBLE_SHARE = 48, 2e-4
+"""Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
+UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
+LONGEST_SHOWN = 40
+
+
+def file_difference(actual: Path, expected: Path, name: str) -> str:
+    """Return the difference of a file from the expected one in a sentence; "" if none.
+
+    ``name``: the file's name in the sentence.
+    """
+    data, expected_data = actual.read_bytes(), expected.read_bytes()
+    if data == expected_data:
+        return ""
+    try:
+        difference = _readers()[expected.suffix](actual, expected)
+    except (OutputError, *UNREADABLE) as error:
+        difference = f"it cannot be read ({error})"
+    return f"{name} is not what design.toml makes: {difference}" if difference else ""
+
+
+def index_difference(actual: Any, expected: Any, left_out: Collection[str]) -> str:
+    """Return the first difference of two manifests, except the keys ``left_out``; "" if none."""
+    if not isinstance(actual, dict):
+        return "it is no index"
+    actual_index, expected_index = (
+        {key: value for key, value in index.items() if key not in left_out}
+        for index in (actual, expected)
+    )
+    return _value_difference(actual_index, expected_index, "")
+
+
+def _readers() -> dict[str, Callable[[Path, Path], str]]:
+    return {
+        ".json": _json_difference,
+        ".dxf": _drawing_difference,
+        ".png": lambda path, expected: _picture_difference(
+            path.read_bytes(), expected.read_bytes()
+        ),
+        ".csv": _table_difference,
+        ".pdf": lambda path, expected: "it shows something else",
+        **dict.fromkeys((".svg", ".toml", ".html", ENDING), _text_difference),
+        **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
+    }
+
+
+def _text(path: Path) -> str:
+    with path.open(encoding="utf-8", newline="") as file:
+        return file.read()
+
+
+def _json_difference(actual: Path, expected: Path) -> str:
+    actual_json, expected_json = (json.loads(_text(path)) for path in (actual, expected))
+    return _value_difference(actual_json, expected_json, "")
+
+
+def _table_difference(actual: Path, expected: Path) -> str:
+    """Return the first difference of two tables by row and column; row 1 is below the names."""
+    rows, expected_rows = (
+        [*csv.reader(_text(path).splitlines(True))] for path in (actual, expected)
+    )
+    if rows[:1] != expected_rows[:1]:
+        names, expected_names = (
+            ", ".join(row) for table in (rows, expected_rows) for row in table[:1] or [[]]
+        )
+        return f"its columns are {_shown(names)}, not {_shown(expected_names)}"
+    if len(rows) != len(expected_rows):
+        return f"it has {_rows(len(rows) - 1)}, not {len(expected_rows) - 1}"
+    for number, (row, expected_row) in enumerate(
+        zip(rows[1:], expected_rows[1:], strict=True), start=1
+    ):
+        if len(row) != len(expected_row):
+            return f"row {number} has {len(row)} cells, not {len(expected_row)}"
+        for name, cell, expected_cell in zip(expected_rows[0], row, expected_row, strict=True):
+            difference = _value_difference(cell, expected_cell, f"row {number}, column {name}")
+            if difference:
+                return difference
+    return ""
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'' if count == 1 else 's'}"
+
+
+def _value_difference(actual: Any, expected: Any, where: str) -> str:
+    if isinstance(expected, dict) and isinstance(actual, dict):
+        for key in expected | actual:
+            if key not in actual or key not in expected:
+                return f"{where}{key} is {'missing' if key not in actual else 'one too many'}"
+            difference = _value_difference(actual[key], expected[key], f"{where}{key}.")
+            if difference:
+                return difference
+        return ""
+    if isinstance(expected, list) and isinstance(actual, list):
+        if len(expected) != len(actual):
+            return f"{where.rstrip('.')} has {len(actual)} entries, not {len(expected)}"
+        pairs = zip(actual, expected, strict=True)
+        differences = (
+            _value_difference(*pair, f"{where}{n}.") for n, pair in enumerate(pairs, start=1)
+        )
+        return next(filter(None, differences), "")
+    if _is_number(expected) and _is_number(actual):
+        same = _is_close(float(actual), float(expected))
+    elif isinstance(expected, str) and isinstance(actual, str):
+        same = not _words_difference(actual, expected)
+    else:
+        same = type(actual) is type(expected) and actual == expected
+    return "" if same else f"{where.rstrip('.')} is {_shown(actual)}, not {_shown(expected)}"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_close(a: float, b: float) -> bool:
+    return math.isclose(a, b, rel_tol=RELATIVE_TOLERANCE, abs_tol=ABSOLUTE_TOLERANCE)
+
+
+def _shown(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def _text_difference(actual: Path, expected: Path) -> str:
+    text, expected_text = _text(actual), _text(expected)
+    pictures, expected_pictures = PICTURE.findall(text), PICTURE.findall(expected_text)
+    if len(pictures) != len(expected_pictures):
+        return f"it has {len(pictures)} pictures, not {len(expected_pictures)}"
+    for number, (picture, expected_picture) in enumerate(
+        zip(pictures, expected_pictures, strict=True), start=1
+    ):
+        difference = _picture_difference(
+            base64.b64decode(picture), base64.b64decode(expected_picture)
+        )
+        if difference:
+            return f"picture {number}: {difference}"
+    return _words_difference(PICTURE.sub("", text), PICTURE.sub("", expected_text))
+
+
+def _words_difference(actual: str, expected: str) -> str:
+    """Return the first different word or number; line breaks do not count."""
+    words, expected_words = [*_tokens(actual)], [*_tokens(expected)]
+    for word, expected_word in zip(words, expected_words, strict=False):
+        if word != expected_word and not (
+            NUMBER.fullmatch(word)
+            and NUMBER.fullmatch(expected_word)
+            and _is_close(float(word), float(expected_word))
+        ):
+            return f"{_shown(word)} stands where {_shown(expected_word)} should"
+    if len(words) != len(expected_words):
+        return f"it has {len(words)} words and numbers, not {len(expected_words)}"
+    return ""
+
+
+def _tokens(text: str) -> Iterator[str]:
+    last = 0
+    for match in NUMBER.finditer(text):
+        yield from text[last : match.start()].split()
+        yield match[0]
+        last = match.end()
+    yield from text[last:].split()
+
+
+def _picture_difference(actual: bytes, expected: bytes) -> str:
+    """Compare the pixels of two pictures, since compression depends on the library."""
+    import numpy as np
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        pixels, expected_pixels = (
+            np.asarray(Image.open(BytesIO(data)).convert("RGBA"), dtype=np.int16)
+            for data in (actual, expected)
+        )
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        return f"it is no sound picture ({error})"
+    if pixels.shape != expected_pixels.shape:
+        return f"it measures {pixels.shape[1]} x {pixels.shape[0]} pixels"
+    difference = np.abs(pixels - expected_pixels).max(axis=2)
+    visible = np.argwhere(difference >= VISIBLE)
+    if difference.mean() > GREY or len(visible) > VISIBLE_SHARE * difference.size:
+        y, x = (
+            visible[0]
+            if len(visible)
+            else np.unravel_index(int(difference.argmax()), difference.shape)
+        )
+        return f"pixels differ, as at {x}, {y}"
+    return ""
+
+
+def _drawing_difference(actual: Path, expected: Path) -> str:
+    """Return a difference of contours, strokes or properties of two drawings; "" if none."""
+    sound_digest(actual)
+    drawing, expected_drawing = read_profile(actual), read_profile(expected)
+    try:
+        check_contours(drawing.region, expected_drawing.region, TOLERANCE)
+    except OutputError as error:
+        return str(error).rstrip(".")
+    # A version of DXF that knows no properties drops all of them, which is told once elsewhere.
+    for name, value in expected_drawing.properties.items() if drawing.properties else ():
+        if drawing.properties.get(name) != value:
+            return f"custom property {name} is {drawing.properties.get(name)!r}, not {value!r}"
+    return _stroke_difference(drawing, expected_drawing)
+
+
+def _stroke_difference(drawing: ReadBack, expected: ReadBack) -> str:
+    """Return a stroke (engraving, cut, frame or datum) that only one drawing has; "" if none."""
+    missing = [*expected.strokes]
+    for layer, edges in drawing.strokes:
+        points = [edges[0].start, *(edge.end for edge in edges)]
+        match = next(
+            (
+                stroke
+                for stroke in missing
+                if stroke[0] == layer and _same_points(points, stroke[1])
+            ),
+            None,
+        )
+        if match is None:
+            x, y = points[0]
+            return f"the stroke on {layer} at x {x:.3f}, y {y:.3f} should not be there"
+        missing.remove(match)
+    if missing:
+        (x, y) = missing[0][1][0].start
+        return f"the stroke on {missing[0][0]} at x {x:.3f}, y {y:.3f} is missing"
+    return ""
+
+
+def _same_points(points: list[tuple[float, float]], edges: Any) -> bool:
+    expected = [edges[0].start, *(edge.end for edge in edges)]
+    return len(expected) == len(points) and any(
+        all(math.dist(p, q) <= TOLERANCE for p, q in zip(points, run, strict=True))
+        for run in (expected, expected[::-1])
+    )
+
+
+# Surfaces read back from STL, 3MF and GLB files, and compared.
+
+
+POINT_TOLERANCE = 2e-5
+"""Rounding error of points in single precision or with 6 decimals, mm."""
+MESH_SHARE = 1e-5
+"""Relative difference of volume between triangulations of one solid."""
+MAX_MESH_BYTES = 500_000_000
+MAX_COORDINATE = 1e5
+"""Largest coordinate, mm."""
+MODEL = "3D/3dmodel.model"
+VERTEX = re.compile(r'<vertex x="([^"]*)" y="([^"]*)" z="([^"]*)" */>')
+TRIANGLE = re.compile(r'<triangle v1="([^"]*)" v2="([^"]*)" v3="([^"]*)" */>')
+
+
+class MeshBody(NamedTuple):
+    """A surface, and the other data of its body in the file as text."""
+
+    surface: Surface
+    metadata: str
+
+
+def mesh_difference(actual: Path, expected: Path) -> str:
+    """Return a difference of two mesh files of one format; "" if they hold the same bodies.
+
+    Points, enclosed volume, area and watertightness are compared; triangles may differ.
+    """
+    mesh_bodies, expected_bodies = bodies(actual), bodies(expected)
+    if len(mesh_bodies) != len(expected_bodies):
+        return f"it holds {len(mesh_bodies)} bodies, not {len(expected_bodies)}"
+    pairs = zip(mesh_bodies, expected_bodies, strict=True)
+    return next(
+        filter(None, (_body_difference(body, expected_body) for body, expected_body in pairs)), ""
+    )
+
+
+def bodies(path: Path) -> list[MeshBody]:
+    """Read the bodies of a mesh file, mm. Raises OutputError for an unsound file."""
+    if path.stat().st_size > MAX_MESH_BYTES:
+        raise OutputError(f"larger than {MAX_MESH_BYTES:,} bytes")
+    readers = {".stl": _stl, ".3mf": _3mf, ".glb": _glb}
+    try:
+        return readers[path.suffix](path)
+    except (ValueError, LookupError, TypeError, struct.error, BadZipFile) as error:
+        raise OutputError(f"no sound mesh: {error}") from error
+
+
+def _body_difference(body: MeshBody, expected: MeshBody) -> str:
+    if body.metadata != expected.metadata:
+        return "names, materials or scales of its bodies are others"
+    surface, expected_surface = body.surface, expected.surface
+    defect = _unsound(surface)
+    if defect:
+        return defect
+    for present, compared, fault in (
+        (surface, expected_surface, "too many"),
+        (expected_surface, surface, "missing"),
+    ):
+        point = _unmatched_point(present.points, compared.points)
+        if point is not None:
+            x, y, z = point
+            return f"the point at x {x:.3f}, y {y:.3f}, z {z:.3f} is {fault}"
+    if abs(surface.volume - expected_surface.volume) > MESH_SHARE * abs(expected_surface.volume):
+        return f"it encloses {surface.volume:.4f} mm3, not {expected_surface.volume:.4f}"
+    if abs(_area(surface) - _area(expected_surface)) > MESH_SHARE * _area(expected_surface):
+        return f"its surface is {_area(surface):.3f} mm2, not {_area(expected_surface):.3f}"
+    return ""
+
+
+def _unsound(surface: Surface) -> str:
+    import numpy as np
+
+    points, faces = surface.points, surface.faces
+    if not len(points) or not len(faces):
+        return "it is empty"
+    if not np.isfinite(points).all() or float(np.abs(points).max()) > MAX_COORDINATE:
+        return "it has a point that is nowhere"
+    if int(faces.min()) < 0 or int(faces.max()) >= len(points):
+        return "it has a face of a point that is not there"
+    return "it is not watertight" if len(open_edges(surface)) else ""
+
+
+def _area(surface: Surface) -> float:
+    import numpy as np
+
+    a, b, c = (surface.points[surface.faces[:, corner]] for corner in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def _unmatched_point(
+    points: NDArray[np.float64], reference: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return a point farther than POINT_TOLERANCE from all reference points, or None."""
+    import numpy as np
+
+    def cells(of: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.int64]:
+        return np.floor(of / (4 * POINT_TOLERANCE) + shift).astype(np.int64)
+
+    # A point and its like share a cell of one grid or of another one shifted by half a cell.
+    unmatched = np.unique(points, axis=0)
+    for shift in np.ndindex(2, 2, 2):
+        if not len(unmatched):
+            return None
+        by = np.array(shift) / 2
+        reference_cells = {row.tobytes() for row in cells(reference, by)}
+        point_cells = cells(unmatched, by)
+        unmatched = unmatched[[row.tobytes() not in reference_cells for row in point_cells]]
+    stray: NDArray[np.float64] | None = unmatched[0] if len(unmatched) else None
+    return stray
+
+
+def _stl(path: Path) -> list[MeshBody]:
+    import numpy as np
+
+    data = path.read_bytes()
+    (count,) = struct.unpack_from("<I", data, 80)
+    if len(data) != 84 + 50 * count or not count:
+        raise OutputError("its length is not that of its triangles")
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    rows = np.frombuffer(data, kind, offset=84)
+    points, faces = np.unique(rows["corners"].reshape(-1, 3), axis=0, return_inverse=True)
+    surface = Surface(points.astype(np.float64), faces.reshape(-1, 3).astype(np.int64))
+    edges = surface.points[surface.faces]
+    normal = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
+    against = np.einsum("ij,ij->i", normal, rows["normal"].astype(np.float64))
+    if (against < 0).any():
+        raise OutputError("a triangle's normal points inward")
+    return [MeshBody(surface, "")]
+
+
+def _3mf(path: Path) -> list[MeshBody]:
+    import numpy as np
+
+    with ZipFile(path) as archive:
+        if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
+            raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
+        parts = {name: archive.read(name).decode() for name in sorted(archive.namelist())}
+    model = parts.pop(MODEL)
+    points = np.array(VERTEX.findall(model), dtype=np.float64).reshape(-1, 3)
+    faces = np.array(TRIANGLE.findall(model), dtype=np.int64).reshape(-1, 3)
+    frame = TRIANGLE.sub("", VERTEX.sub("", model)).split()
+    return [MeshBody(Surface(points, faces), json.dumps([parts, frame]))]
+
+
+def _glb(path: Path) -> list[MeshBody]:
+    import numpy as np
+
+    data = path.read_bytes()
+    magic, _, total, size, kind = struct.unpack_from("<4sII I4s", data)
+    if magic != b"glTF" or kind != b"JSON" or total != len(data):
+        raise OutputError("no binary glTF")
+    document: dict[str, Any] = json.loads(data[20 : 20 + size])
+    start = 28 + size
+    mesh_bodies = []
+    for node in document["nodes"]:
+        (primitive,) = document["meshes"][node["mesh"]]["primitives"]
+        arrays = []
+        for number, kind in (
+            (primitive["attributes"]["POSITION"], "<f4"),
+            (primitive["indices"], "<u4"),
+        ):
+            accessor = document["accessors"][number]
+            view = document["bufferViews"][accessor["bufferView"]]
+            begin = start + view.get("byteOffset", 0)
+            arrays.append(
+                np.frombuffer(data[begin : begin + view["byteLength"]], kind).reshape(-1, 3)
+            )
+        material = document["materials"][primitive["material"]]
+        surface = Surface(arrays[0].astype(np.float64), arrays[1].astype(np.int64))
+        attributes = {key: value for key, value in node.items() if key != "mesh"}
+        mesh_bodies.append(
+            MeshBody(surface, json.dumps([attributes, material, document["scenes"]]))
+        )
+    return mesh_bodies

@@ -1,0 +1,354 @@
+"""One run: a request becomes a folder, written beside the old one, verified, and swapped in whole.
+
+Request -> design -> laminate -> checked -> plan -> artefacts -> folder. Command line, Python
+interface and studio all come through ``generate``.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sbafab.as_built.check import read_back
+from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, refuse_coarse
+from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
+from sbafab.assemblies.records import Assembly
+from sbafab.cutting.properties import TRUE_ARCS, Curves
+from sbafab.design.records import Design
+from sbafab.errors import DefectError, OutputError
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import Prediction
+from sbafab.notebook import table_html
+from sbafab.output.artefacts import tops_of
+from sbafab.output.carry_over import carry_over, refuse_to_replace, removed_files, would_replace
+from sbafab.output.checked import (
+    EVERYTHING,
+    PICTURES,
+    Checked,
+    DesignPlan,
+    RunPart,
+    check,
+    limits,
+    plan_design,
+)
+from sbafab.output.folder import close_folder, write_folder
+from sbafab.output.job import CheckedJob, Plan, check_job, plan_job
+from sbafab.output.manifest import as_json, identity
+from sbafab.output.schema_ids import SIMULATE_SCHEMA
+from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, replaced_folder
+from sbafab.pressing.schedule import Schedule
+from sbafab.process import Progress, ignore_progress
+from sbafab.rules.finding import Finding, Findings
+from sbafab.simulators.simulator import Name, Result, SimulationRequest, simulator
+
+if TYPE_CHECKING:
+    from sbafab.meshing.conforming.layup import MeshSettings
+    from sbafab.meshing.conforming.meshes import ConformingMeshes
+
+MOST_NAMED = 3
+"""Rules that the sentence on a folder which does not hold names."""
+
+
+@dataclass(frozen=True)
+class Conforming:
+    """Volume and shell meshes, in the formats of these file endings; they take the extra "mesh"."""
+
+    settings: MeshSettings
+    formats: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """A folder to be written: ``out/<name>/`` of a design, an assembly or several designs.
+
+    ``name`` is for several designs, a design or assembly has its own; ``parts`` and what follows
+    are for a design. ``conforming`` comes with the part "mesh", ``prediction`` with "predict";
+    of a part named after a simulator, ``simulated`` is the folder in which it has run, without it
+    what the simulator reads is written.
+    """
+
+    source: Design | Assembly | Sequence[Design]
+    out: Path = Path("out")
+    parts: Sequence[RunPart] = EVERYTHING
+    curves: Curves = TRUE_ARCS
+    name: str = "job"
+    conforming: Conforming | None = None
+    prediction: Prediction | None = None
+    simulated: Path | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Run:
+    """The outcome of a run on one design or several; nothing to cut where it ``failed``.
+
+    ``manifest`` is empty and ``plan`` None where nothing was written.
+    """
+
+    job: CheckedJob
+    folder: Path
+    manifest: dict[str, Any] = field(default_factory=dict)
+    plan: Plan | None = None
+    dropped: tuple[str, ...] = ()
+    """Files of an older run of another design or version that this one removed."""
+    kept: bool = False
+    """True if it failed and ``folder`` was left as it was."""
+    left_out: tuple[tuple[str, str], ...] = ()
+    """Simulators that got no input, with the reason."""
+
+    @property
+    def checked(self) -> tuple[Checked, ...]:
+        """The designs with the findings in each."""
+        return self.job.designs
+
+    @property
+    def between(self) -> tuple[Finding, ...] | None:
+        """The findings between the parts of an assembly."""
+        return self.job.between
+
+    @property
+    def design(self) -> Design:
+        """The design, the first one of several."""
+        return self.checked[0].design
+
+    @property
+    def laminate(self) -> Laminate:
+        """The laminate, that of the first design of several."""
+        return self.checked[0].laminate
+
+    @property
+    def schedule(self) -> Schedule | None:
+        """The press schedule, of the first design of several; None where nothing was written."""
+        return self.plan.designs[0].pressing if self.plan is not None else None
+
+    @property
+    def conforming(self) -> ConformingMeshes | None:
+        """The volume and shell meshes, where they were asked for."""
+        return self.plan.designs[0].conforming if self.plan is not None else None
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """The findings of the rules; of several designs, each with its design's name."""
+        return self.job.findings
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule failed that the design does not waive; no cut file was written then."""
+        return self.job.failed
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.folder)!r}, {'failed' if self.failed else 'holds'})"
+
+    def _repr_html_(self) -> str:
+        files = [(str(self.folder / name),) for name in self.manifest.get("files", ())]
+        table = table_html(("files written",), files)
+        pictures = "".join(checked.laminate._repr_html_() for checked in self.checked)
+        return pictures + Findings(self.findings)._repr_html_() + table
+
+
+def generate(request: RunRequest, progress: Progress | None = None) -> Run:
+    """Write the folder of a request and return the outcome.
+
+    A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
+    meshes; a folder that holds another design's is then left untouched (``Run.kept``). Of several
+    designs nothing is written if one fails. With some of the ``parts`` only, the others stay if
+    they are of the same design. Raises DesignError or OutputError, also where other parts are
+    another design's, and DefectError where the cut files read back are not what was checked; the
+    old folder is then whole.
+    """
+    tell = progress or ignore_progress
+    job = check_job(request.source, request.name, tell)
+    target = request.out / job.name
+    parts = _parts_to_write(request, job, target)
+    if parts is None:
+        return Run(job, target, kept=True)
+    plan = _plan(request, job, parts, target, tell)
+    listed = listed_files(target)
+    with replaced_folder(target) as folder:
+        written = write_folder(plan, folder, tell)
+        if job.schema == SCHEMA and not job.failed:
+            carry_over(target, folder, written.index)
+        close_folder(folder, written.index)
+        if plan.is_cut:
+            verify_written(plan, folder, tell)
+    removed = removed_files(listed, written.index)
+    return Run(job, target, written.index, plan, removed, left_out=written.left_out)
+
+
+def _parts_to_write(request: RunRequest, job: CheckedJob, target: Path) -> set[RunPart] | None:
+    """Return the parts to be written, of a job that failed only pictures; None to leave all as is.
+
+    Raises OutputError where some parts alone would take the place of another design's files.
+    """
+    parts = set(request.parts) if job.schema == SCHEMA else set(EVERYTHING)
+    checked = job.designs[0]
+    if job.failed:
+        mine = identity(checked.design, checked.waived) if job.schema == SCHEMA else None
+        if job.schema == JOB_SCHEMA or would_replace(target, mine):
+            return None
+        return parts & set(PICTURES)
+    if not parts >= set(EVERYTHING):
+        written = tops_of(*(parts - set(PICTURES)))
+        refuse_to_replace(target, checked.design, checked.waived, written)
+    return parts
+
+
+def _plan(
+    request: RunRequest, job: CheckedJob, parts: set[RunPart], target: Path, tell: Progress
+) -> Plan:
+    """Compute schedule, nest and meshes before anything is written: they may refuse the design."""
+    designs = [plan_design(checked, parts, request.curves) for checked in job.designs]
+    for each in designs:
+        if each.paths and request.curves.in_chords:
+            checked = each.checked
+            refuse_coarse(checked.laminate, each.paths, each.settings, limits(checked.design))
+    plan = plan_job(job, designs, target, tell)
+    if job.schema != SCHEMA:
+        return plan
+    (design,) = designs
+    design = replace(design, prediction=request.prediction, simulated=request.simulated)
+    if request.conforming is not None and "mesh" in parts:
+        # Takes the extra "mesh".
+        from sbafab.meshing.conforming.meshes import conforming_meshes
+
+        tell("meshing", 0, 1)
+        meshes = conforming_meshes(design.checked.laminate, request.conforming.settings)
+        design = replace(design, conforming=meshes, formats=request.conforming.formats)
+    return replace(plan, designs=(design,))
+
+
+# A written folder read back, as ``sbafab check`` would, before it is swapped in.
+
+
+def verify_written(plan: Plan, folder: Path, tell: Progress) -> None:
+    """Raises DefectError where the files of a folder are not what its designs were checked to be.
+
+    The folder is then not swapped in, for either the files or the check of them are wrong, and no
+    user can tell which. Raises OutputError where the chords that were asked for are too coarse.
+    """
+    tell("reading back", 0, 1)
+    curves = plan.settings.curves
+    works = {each.checked.design.name: _work(each) for each in plan.designs}
+    read = read_back(folder, works)
+    findings = read.against_design(read.problems)
+    failed = [finding for finding in findings if finding.verdict == "fail"]
+    if not failed:
+        return
+    reasons = _first_failures(failed)
+    if curves.in_chords:
+        raise OutputError(
+            f"drawn with chords, the cut files do not hold: {reasons}; nothing was written: ask "
+            f"for a smaller --chord-error than {curves.chord_error:g}, or for arcs or bulges"
+        )
+    raise DefectError(
+        f"the design holds and its cut files do not: {reasons}; this is a defect of sbafab and "
+        "nothing was written: please report this sentence with the design file"
+    )
+
+
+def _work(plan: DesignPlan) -> WrittenDesign:
+    """Return what is expected of a design's files: its laminate, the beam's paths, the findings."""
+    return WrittenDesign(ExpectedLaminate(plan.checked.laminate, plan.paths), plan.checked.findings)
+
+
+def _first_failures(failed: Iterable[Finding]) -> str:
+    """Return the first finding of each rule; what is cut first, what is claimed of it last."""
+    first: dict[str, Finding] = {}
+    for finding in failed:
+        first.setdefault(finding.rule, finding)
+    order = {DESIGNED: 0, INTEGRITY: 1, CLAIMS: 3}
+    messages = [
+        f"{finding.rule}: {finding.message.rstrip('.')}"
+        for finding in sorted(first.values(), key=lambda finding: order.get(finding.rule, 2))
+    ]
+    rest = len(messages) - MOST_NAMED
+    more = "" if rest <= 0 else "; 1 more rule fails" if rest == 1 else f"; {rest} more rules fail"
+    return "; ".join(messages[:MOST_NAMED]) + more
+
+
+# A simulator run on a design, its results in the design's folder.
+
+
+UNITS = {
+    "length": "mm",
+    "pressure": "kPa",
+    "volume": "ul",
+    "stress": "MPa",
+    "work": "uJ",
+    "angle": "degrees",
+    "time": "s",
+    "rate": "steps/s",
+}
+"""Of the values in ``result.json``."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """The outcome of a simulation; no result and no folder where a rule ``failed`` before."""
+
+    findings: Sequence[Finding]
+    folder: Path | None
+    result: Result
+
+    @property
+    def failed(self) -> bool:
+        """True if a rule failed that the design does not waive; no simulator ran then."""
+        return self.folder is None
+
+
+def result_json(result: Result) -> dict[str, Any]:
+    """Return the contents of ``result.json``."""
+    head = {"schema": SIMULATE_SCHEMA, "units": UNITS}
+    return {**head, **result.figures, "stopped": result.stopped}
+
+
+def simulate(
+    design: Design,
+    name: Name,
+    wish: SimulationRequest,
+    out: Path = Path("out"),
+    progress: Progress | None = None,
+    export: bool = False,
+) -> Simulated:
+    """Run the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
+
+    Raises DesignError or OutputError for what it cannot do, if possible before it starts.
+    """
+    tell = progress or ignore_progress
+    result = Result((), {})
+    with tempfile.TemporaryDirectory() as temporary:
+        checked = check(design, tell)
+        if checked.failed:
+            return Simulated(checked.findings, None, result)
+        # Said before a run of hours, not after it.
+        refuse_to_replace(out / design.name, design, checked.waived, (name,))
+        # A folder in the temporary one has the usual rights, the temporary one itself has not.
+        folder = Path(temporary) / name
+        if export:
+            simulator(name).export(checked.laminate, wish, folder)
+        else:
+            try:
+                result = simulator(name).run(checked.laminate, wish, folder, tell)
+            except OutputError as error:
+                raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
+            text = as_json(result_json(result))
+            (folder / "result.json").write_text(text, encoding="utf-8", newline="\n")
+        run = generate(RunRequest(design, out, (name,), simulated=folder), tell)
+    return Simulated(checked.findings, run.folder / name, result)
+
+
+def _with_log(error: OutputError, folder: Path, copy: Path) -> OutputError:
+    """Return the error with its log copied to a place that stays and named there."""
+    for log in sorted(folder.glob("*.log")):
+        message = str(error)
+        if str(log) in message:
+            try:
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(log, copy)
+            except OSError:
+                return OutputError(message.replace(f" (see {log})", ""))
+            return OutputError(message.replace(str(log), str(copy)))
+    return error

@@ -1,0 +1,6 @@
+"""The version of the program, and the name by which written files know their generator."""
+
+from __future__ import annotations
+
+__version__ = "0.1.0"
+GENERATOR = f"sbafab {__version__}"
