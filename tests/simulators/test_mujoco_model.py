@@ -7,7 +7,6 @@ import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -15,6 +14,8 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.simulators.coarse.shell import actuator
 from sbafab.simulators.mujoco.model import model_text, why_no_model, write_model
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
 BALLOON = ("1dof-5mm", "stack.balloons=1")
 LOBED = ("3dof-15mm", "stack.balloons=2")

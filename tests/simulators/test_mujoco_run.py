@@ -9,7 +9,6 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import mujoco
 import pytest
 
 import sbafab
@@ -17,6 +16,8 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.simulators.mujoco.model import write_model
 from sbafab.simulators.mujoco.run import USES, MujocoRun, export, run, run_model, simulate, why_not
 from sbafab.simulators.simulator import SimulationRequest
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
 BALLOON = ("1dof-5mm", "stack.balloons=1")
 CALCULIX = {0.95: 0.866, 6.0: 1.557}
