@@ -190,10 +190,14 @@ def test_a_file_too_long_for_a_design_is_not_read(link: str, folder: Path) -> No
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_end_of_the_studio_speaks_of_nothing_else(tmp_path: Path, number: int) -> None:
-    command = [sys.executable, "-c", "from sbafab.entry import main; main()", "studio"]
+    # What starts the tests may ignore signals (nohup), and a child would inherit that.
+    program = (
+        f"import signal; signal.signal({int(number)}, signal.SIG_DFL); "
+        "from sbafab.entry import main; main()"
+    )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(
-        [*command, "--no-browser"],
+        [sys.executable, "-c", program, "studio", "--no-browser"],
         cwd=tmp_path,
         env=environment,
         stdout=subprocess.PIPE,
