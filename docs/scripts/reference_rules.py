@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from docs.scripts.rule_pictures import PICTURED, pair
+from docs.scripts.rule_pictures import pair
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, DECK, Explanation
 
 HEAD = """# Rules in pictures
@@ -23,8 +23,6 @@ def write(folder: Path) -> None:
     parts = [HEAD, "\n## On a design\n"]
     for name, one in DECK.items():
         parts += [f"\n### {name}\n", _words(one)]
-        if name not in PICTURED:
-            continue
         drawn = pair(name)
         for which, text in (("right", drawn.right), ("wrong", drawn.wrong)):
             (pictures / f"{name}-{which}.svg").write_text(text, encoding="utf-8")
