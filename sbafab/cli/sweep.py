@@ -132,7 +132,10 @@ def _print(request: SweepRequest, designs: SweptDesigns) -> None:
         )
     if "sweep.parquet" not in designs.files:
         click.echo('for Parquet as well: pip install "sbafab[parquet]"')
-    outcomes = ", ".join(f"{count} {outcome}" for outcome, count in designs.outcomes.items())
+    words = {"passes": "passed", "fails": "failed"}
+    outcomes = ", ".join(
+        f"{count} {words.get(outcome, outcome)}" for outcome, count in designs.outcomes.items()
+    )
     resumed = designs.designs - designs.measured
     earlier = f"; {resumed} from an earlier run" if resumed else ""
     count = "1 design" if designs.designs == 1 else f"{designs.designs} designs"
