@@ -305,6 +305,3 @@ def waiver_properties(claims: Manifest) -> dict[str, str | None]:
         "WAIVED": ", ".join(claims.waived) or "none",
         LIMITS: limit_properties(claims.lowered_limits).get(LIMITS),
     }
-
-
-# What ``manifest.json`` claims, read with its types checked, and problems as data.

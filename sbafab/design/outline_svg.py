@@ -605,7 +605,7 @@ def _edges(segment: Any, point: ToUserUnits) -> tuple[Edge, ...]:
     return (Line(start, end),) if math.dist(start, end) > EPSILON else ()
 
 
-# What styles and attributes of an SVG do to an element's shape: hidden or not, or refused.
+# Styles and attributes that hide an element or change its shape, or are refused.
 
 
 LONGEST_STYLE = 10_000

@@ -61,8 +61,6 @@ from sbafab.errors import DesignError
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
-# How many are made: of actuators, for so many good ones, and of parts, with spares.
-
 
 class Design(Section):
     """The sections that all families share; a family adds its own, sets ``family`` and ``form``."""

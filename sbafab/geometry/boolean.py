@@ -369,9 +369,3 @@ def _keeps_clear(contour: Contour) -> bool:
         if not set(meeting_points(a, b)) <= shared:
             return False
     return True
-
-
-# Contours as booleans hand them out: edges of one support joined, dust left out.
-
-
-# Coordinates in whole nanometres: shapes that differ by a hair come in one order.

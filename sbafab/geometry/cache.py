@@ -53,7 +53,10 @@ def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Val
 
 
 class Exact:
-    """A record that equals others within a tolerance, but is a key by its exact numbers."""
+    """A record that equals others within a tolerance, but is a key by its exact numbers.
+
+    No abstract base class: every key of the cache is tested against this one, which would be slow.
+    """
 
     def exact_hash(self) -> int:
         """Return a hash of the exact numbers."""

@@ -72,14 +72,14 @@ class Advice:
         }
 
 
-def advise(design: Design, target: float, tell: Progress = ignore_progress) -> Advice:
+def advise(design: Design, target: float, progress: Progress = ignore_progress) -> Advice:
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``.
 
     First both grow by the same amount above the rules' limits until the target is reached; then
     the overhang, and after it the bond, is taken back as far as the target allows. Neither can
     then be smaller by itself. Where the other seed falls short, both grow by one step more.
     """
-    trial = _Trial(design, target, tell)
+    trial = _Trial(design, target, progress)
     both = _least(lambda steps: trial.verdict(steps, steps))
     if both is None:
         return Advice(target, design.registration.method)
@@ -102,10 +102,10 @@ Outcome = Literal["short", "reached", "impossible"]
 class _Trial:
     """Builds the design with steps more of bond and overhang than the rules ask for."""
 
-    def __init__(self, design: Design, target: float, tell: Progress) -> None:
+    def __init__(self, design: Design, target: float, progress: Progress) -> None:
         self.design = design
         self.target = target
-        self.tell = tell
+        self.progress = progress
         self.verdicts: dict[tuple[int, int], Outcome] = {}
 
     def lengths(self, bond: int, overhang: int) -> tuple[float, float]:
@@ -140,7 +140,7 @@ class _Trial:
         key = bond, overhang
         if key not in self.verdicts:
             # How many it takes nobody knows.
-            self.tell(
+            self.progress(
                 f"bond and overhang that reach the yield, trial {len(self.verdicts) + 1}", 0, 0
             )
             share = self.share(bond, overhang, SEED)

@@ -76,7 +76,7 @@ class DesignFolder:
     plan: DesignPlan
     sheets: Sequence[SheetFile]
     path: Path
-    tell: Progress
+    progress: Progress
     has_pages: bool = True
     meshes: list[MeshFile] = field(default_factory=list)
     left_out: list[tuple[str, str]] = field(default_factory=list)
@@ -170,13 +170,13 @@ def write_text(path: Path, text: str) -> None:
 def _write_layers(folder: DesignFolder) -> None:
     # Without paths the layers' files are not written: they were read back, and are compared.
     if folder.plan.paths:
-        write_cut_files(folder.plan, folder.path, folder.tell)
+        write_cut_files(folder.plan, folder.path, folder.progress)
 
 
-def write_cut_files(plan: DesignPlan, folder: Path, tell: Progress) -> None:
+def write_cut_files(plan: DesignPlan, folder: Path, progress: Progress) -> None:
     """Write the layer files and the base plate of a design."""
     laminate = plan.checked.laminate
-    write_layer_files(laminate, plan.paths, folder, plan.settings, partial(tell, "cut files"))
+    write_layer_files(laminate, plan.paths, folder, plan.settings, partial(progress, "cut files"))
     write_plates(plan.checked, plan.paths, folder, plan.settings)
 
 
@@ -193,14 +193,14 @@ def write_plates(
 
 
 def write_nested_sheets(
-    nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, tell: Progress
+    nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, progress: Progress
 ) -> list[SheetFile]:
     """Write the film sheets, and beside them the places for a later run; nothing for no nest."""
     if not nests:
         return []
     label = design.sheets.label
-    progress = partial(tell, "sheets")
-    sheets = write_sheets(nests, folder, settings, machine(design), label, progress)
+    sheet_progress = partial(progress, "sheets")
+    sheets = write_sheets(nests, folder, settings, machine(design), label, sheet_progress)
     write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
     return sheets
 
@@ -236,13 +236,13 @@ def _underlay(folder: DesignFolder) -> bytes | None:
 
 
 def _write_meshes(folder: DesignFolder) -> None:
-    progress = partial(folder.tell, "meshes")
+    progress = partial(folder.progress, "meshes")
     folder.meshes += write_meshes(folder.laminate, folder.path, progress=progress)
     conforming = folder.plan.conforming
     if conforming is not None:
         from sbafab.meshing.conforming.meshes import write_conforming
 
-        progress = partial(folder.tell, "conforming meshes")
+        progress = partial(folder.progress, "conforming meshes")
         folder.meshes += write_conforming(conforming, folder.path, progress, folder.plan.formats)
 
 
@@ -250,7 +250,7 @@ def _layers_svg(folder: DesignFolder) -> str:
     from sbafab.reports.layers_svg import layers_svg
 
     picture = layers_svg(folder.marked)
-    folder.tell("pictures", 1, PICTURES_OF_A_DESIGN)
+    folder.progress("pictures", 1, PICTURES_OF_A_DESIGN)
     return picture
 
 
@@ -258,13 +258,13 @@ def _stack_svg(folder: DesignFolder) -> str:
     from sbafab.reports.stack_svg import stack_svg
 
     picture = stack_svg(folder.marked)
-    folder.tell("pictures", 2, PICTURES_OF_A_DESIGN)
+    folder.progress("pictures", 2, PICTURES_OF_A_DESIGN)
     return picture
 
 
 def _solid_png(folder: DesignFolder) -> bytes:
     picture = folder.solid_png
-    folder.tell("pictures", PICTURES_OF_A_DESIGN, PICTURES_OF_A_DESIGN)
+    folder.progress("pictures", PICTURES_OF_A_DESIGN, PICTURES_OF_A_DESIGN)
     return picture
 
 

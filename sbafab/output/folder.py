@@ -44,29 +44,29 @@ class WrittenFolder:
     left_out: tuple[tuple[str, str], ...] = ()
 
 
-def write_folder(plan: Plan, path: Path, tell: Progress) -> WrittenFolder:
+def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
     """Write film sheets and designs; several designs get a folder each, named after it."""
     job = plan.job
     first = plan.designs[0]
     sheets: list[SheetFile] = []
     if plan.is_cut:
         design = first.checked.design
-        sheets = write_nested_sheets(plan.nests, design, path, plan.settings, tell)
+        sheets = write_nested_sheets(plan.nests, design, path, plan.settings, progress)
     if job.schema == SCHEMA:
-        folder = DesignFolder(first, sheets, path, tell)
+        folder = DesignFolder(first, sheets, path, progress)
         return WrittenFolder(write_design(folder), tuple(folder.left_out))
     from_below = _from_below(sheets)
     for each in plan.designs:
         subfolder = path / each.checked.design.name
         subfolder.mkdir()
         # An assembly has one page for all designs.
-        folder = DesignFolder(each, from_below, subfolder, tell, job.assembled is None)
+        folder = DesignFolder(each, from_below, subfolder, progress, job.assembled is None)
         # The folder above has the sheets; a design's own is one without.
         close_folder(subfolder, {**write_design(folder), "sheets": []})
     designs = [each.checked.design for each in plan.designs]
     index = job_manifest(job.schema, job.name, plan.settings, designs, sheets)
     if job.assembled is not None:
-        index = _write_assembly(plan, job.assembled, sheets, index, path, tell)
+        index = _write_assembly(plan, job.assembled, sheets, index, path, progress)
     return WrittenFolder(index)
 
 
@@ -105,13 +105,13 @@ def _write_assembly(
     sheets: Sequence[SheetFile],
     index: dict[str, Any],
     path: Path,
-    tell: Progress,
+    progress: Progress,
 ) -> dict[str, Any]:
     """Write what an assembly's folder holds beside its designs; return its manifest."""
     from sbafab.reports.assembly_png import assembly_pngs
 
     job = plan.job
-    tell("assembled", 0, 1)
+    progress("assembled", 0, 1)
     (path / "preview").mkdir()
     picture, bare = assembly_pngs(assembled, _note(job))
     (path / PICTURE).write_bytes(picture)

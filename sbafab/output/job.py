@@ -99,18 +99,20 @@ def check_job(
     return CheckedJob(JOB_SCHEMA, name, tuple(check(design, progress) for design in source))
 
 
-def _check_assembly(assembly: Assembly, tell: Progress) -> CheckedJob:
+def _check_assembly(assembly: Assembly, progress: Progress) -> CheckedJob:
     assembled = assemble(assembly)
     designs = [part.design for part in assembled.designs]
     refuse_other_film(designs)
     try:
         checked = tuple(
-            Checked(part.design, part.laminate, run_deck(part.laminate, limits(part.design), tell))
+            Checked(
+                part.design, part.laminate, run_deck(part.laminate, limits(part.design), progress)
+            )
             for part in assembled.designs
         )
     except GeometryError as error:
         raise DesignError(f"assembly {assembly.name} cannot be resolved: {error}") from None
-    tell("checks between parts", 0, 1)
+    progress("checks between parts", 0, 1)
     return of_assembly(assembled, checked)
 
 
@@ -186,14 +188,14 @@ class Plan:
 
 
 def plan_job(
-    job: CheckedJob, designs: Sequence[DesignPlan], old_folder: Path, tell: Progress
+    job: CheckedJob, designs: Sequence[DesignPlan], old_folder: Path, progress: Progress
 ) -> Plan:
     """Place the parts of planned designs on the film sheets of the first.
 
     ``old_folder`` may hold the places of an earlier run. Raises DesignError where parts do not fit.
     """
     parts = [part for plan in designs for part in plan.parts]
-    nests = find_nests(parts, designs[0].checked.design, old_folder, tell)
+    nests = find_nests(parts, designs[0].checked.design, old_folder, progress)
     settings = designs[0].settings if job.schema == SCHEMA else _shared_settings(job, designs)
     return Plan(job, tuple(designs), settings, nests)
 
@@ -215,7 +217,7 @@ def _shared_settings(job: CheckedJob, designs: Sequence[DesignPlan]) -> CutSetti
 
 
 def find_nests(
-    parts: Sequence[NestPart], design: Design, old_folder: Path, tell: Progress
+    parts: Sequence[NestPart], design: Design, old_folder: Path, progress: Progress
 ) -> tuple[Nest, ...]:
     """Return places for the parts on the design's film sheets; none for no parts.
 
@@ -224,7 +226,7 @@ def find_nests(
     """
     if not parts:
         return ()
-    tell("nesting", 0, 1)
+    progress("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
     return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
 

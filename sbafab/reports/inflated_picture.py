@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from sbafab.models.stack import Pose, Stack
 
 Movement = Literal["inflate", "circle"]
-MOTIONS: tuple[Movement, ...] = get_args(Movement)
 ENDINGS = (".png", ".gif", ".webp", ".glb")
 MOVING = (".gif", ".webp")
 FRAMES = 30

@@ -159,21 +159,21 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     another design's, and DefectError where the cut files read back are not what was checked; the
     old folder is then whole.
     """
-    tell = progress or ignore_progress
-    job = check_job(request.source, request.name, tell)
+    progress = progress or ignore_progress
+    job = check_job(request.source, request.name, progress)
     target = request.out / job.name
     parts = _parts_to_write(request, job, target)
     if parts is None:
         return Run(job, target, kept=True)
-    plan = _plan(request, job, parts, target, tell)
+    plan = _plan(request, job, parts, target, progress)
     listed = listed_files(target)
     with replaced_folder(target) as folder:
-        written = write_folder(plan, folder, tell)
+        written = write_folder(plan, folder, progress)
         if job.schema == SCHEMA and not job.failed:
             carry_over(target, folder, written.index)
         close_folder(folder, written.index)
         if plan.is_cut:
-            verify_written(plan, folder, tell)
+            verify_written(plan, folder, progress)
     removed = removed_files(listed, written.index)
     return Run(job, target, written.index, plan, removed, left_out=written.left_out)
 
@@ -197,7 +197,7 @@ def _parts_to_write(request: RunRequest, job: CheckedJob, target: Path) -> set[R
 
 
 def _plan(
-    request: RunRequest, job: CheckedJob, parts: set[RunPart], target: Path, tell: Progress
+    request: RunRequest, job: CheckedJob, parts: set[RunPart], target: Path, progress: Progress
 ) -> Plan:
     """Compute schedule, nest and meshes before anything is written: they may refuse the design."""
     designs = [plan_design(checked, parts, request.curves) for checked in job.designs]
@@ -205,7 +205,7 @@ def _plan(
         if each.paths and request.curves.in_chords:
             checked = each.checked
             refuse_coarse(checked.laminate, each.paths, each.settings, limits(checked.design))
-    plan = plan_job(job, designs, target, tell)
+    plan = plan_job(job, designs, target, progress)
     if job.schema != SCHEMA:
         return plan
     (design,) = designs
@@ -214,7 +214,7 @@ def _plan(
         # Takes the extra "mesh".
         from sbafab.meshing.conforming.meshes import conforming_meshes
 
-        tell("meshing", 0, 1)
+        progress("meshing", 0, 1)
         meshes = conforming_meshes(design.checked.laminate, request.conforming.settings)
         design = replace(design, conforming=meshes, formats=request.conforming.formats)
     return replace(plan, designs=(design,))
@@ -223,13 +223,13 @@ def _plan(
 # A written folder read back, as ``sbafab check`` would, before it is swapped in.
 
 
-def verify_written(plan: Plan, folder: Path, tell: Progress) -> None:
+def verify_written(plan: Plan, folder: Path, progress: Progress) -> None:
     """Raises DefectError where the files of a folder are not what its designs were checked to be.
 
     The folder is then not swapped in, for either the files or the check of them are wrong, and no
     user can tell which. Raises OutputError where the chords that were asked for are too coarse.
     """
-    tell("reading back", 0, 1)
+    progress("reading back", 0, 1)
     curves = plan.settings.curves
     works = {each.checked.design.name: _work(each) for each in plan.designs}
     read = read_back(folder, works)
@@ -317,10 +317,10 @@ def simulate(
 
     Raises DesignError or OutputError for what it cannot do, if possible before it starts.
     """
-    tell = progress or ignore_progress
+    progress = progress or ignore_progress
     result = Result((), {})
     with tempfile.TemporaryDirectory() as temporary:
-        checked = check(design, tell)
+        checked = check(design, progress)
         if checked.failed:
             return Simulated(checked.findings, None, result)
         # Said before a run of hours, not after it.
@@ -331,12 +331,12 @@ def simulate(
             simulator(name).export(checked.laminate, wish, folder)
         else:
             try:
-                result = simulator(name).run(checked.laminate, wish, folder, tell)
+                result = simulator(name).run(checked.laminate, wish, folder, progress)
             except OutputError as error:
                 raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
             text = as_json(result_json(result))
             (folder / "result.json").write_text(text, encoding="utf-8", newline="\n")
-        run = generate(RunRequest(design, out, (name,), simulated=folder), tell)
+        run = generate(RunRequest(design, out, (name,), simulated=folder), progress)
     return Simulated(checked.findings, run.folder / name, result)
 
 

@@ -201,14 +201,14 @@ def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
     return free
 
 
-def find(request: FindRequest, tell: Progress = ignore_progress) -> FoundDesign:
+def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDesign:
     """Return the best design, or the nearest miss. Raises DesignError for an impossible request."""
     if request.tries < LEAST_TRIES:
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
     if request.storage is not None and not request.optuna:
         raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
     problem = SearchProblem(request.design, request.requirements, request.goal)
-    space = SearchSpace(problem, free_keys(request), request.tries, tell)
+    space = SearchSpace(problem, free_keys(request), request.tries, progress)
     if request.optuna:
         with_optuna(space, request.storage)
     elif space.size <= request.tries:

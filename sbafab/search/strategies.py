@@ -212,7 +212,7 @@ def _widen_ends(space: SearchSpace, point: GridPoint) -> bool:
     return has_widened
 
 
-# The same search by Optuna, whose storage keeps it, resumes it and shares it between machines.
+# Search by Optuna, whose storage resumes it and shares it between machines.
 
 
 EXTRA = 'Optuna is not installed: pip install "sbafab[optuna]"'

@@ -92,7 +92,7 @@ def designs_of(request: SweepRequest) -> list[Values]:
     return list(latin_hypercube(varied, request.samples, request.seed))
 
 
-def sweep(request: SweepRequest, out: Path, tell: Progress = ignore_progress) -> SweptDesigns:
+def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress) -> SweptDesigns:
     """Measures all designs into ``out/<name>-sweep/`` and returns what came of them.
 
     What an earlier run measured there counts, as long as design, values and program are the same.
@@ -106,13 +106,13 @@ def sweep(request: SweepRequest, out: Path, tell: Progress = ignore_progress) ->
         try:
             keys = _keys(request, values)
             missing = [number for number, key in enumerate(keys) if key not in journal]
-            _measure(request, values, keys, missing, journal, tell)
+            _measure(request, values, keys, missing, journal, progress)
         except KeyboardInterrupt as stop:
             measured = sum(key in journal for key in keys)
             raise SweepStopped(measured, len(keys), *stop.args) from stop
         finally:
             journal.close()
-        tell("writing tables", 0, 1)
+        progress("writing tables", 0, 1)
         table = Table(
             lambda: journal.rows(iter(keys)), values, request.pressures_kpa, request.all_columns
         )
@@ -128,7 +128,7 @@ def _measure(
     keys: Sequence[str],
     missing: Sequence[int],
     journal: Journal,
-    tell: Progress,
+    progress: Progress,
 ) -> None:
     if not missing:
         return
@@ -147,7 +147,7 @@ def _measure(
         still()
 
     def still() -> None:
-        tell(MEASURED, done, len(missing))
+        progress(MEASURED, done, len(missing))
 
     still()
     pool = local_pool(request.workers) if request.dask is None else dask_pool(request.dask)

@@ -284,7 +284,7 @@ class SearchSpace:
     """
 
     def __init__(
-        self, problem: SearchProblem, free: tuple[Free, ...], tries: int, tell: Progress
+        self, problem: SearchProblem, free: tuple[Free, ...], tries: int, progress: Progress
     ) -> None:
         self.problem = problem
         self.free = free
@@ -292,7 +292,7 @@ class SearchSpace:
         self.lows = [0] * len(free)
         self.highs = [int(round((axis.high - axis.low) / axis.step, 6)) for axis in free]
         self.trials: dict[GridPoint, Trial] = {}
-        self._tell = tell
+        self._tell = progress
         self._keys: dict[str, Any] = {key: value for key, value, _ in keys_of(problem.design)}
 
     @property

@@ -77,7 +77,7 @@ class Simulator(Protocol):
         """Write the simulator's input, with all that it loads."""
 
     def run(
-        self, laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress
+        self, laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress
     ) -> Result:
         """Write the input, run it, and read the results back."""
 

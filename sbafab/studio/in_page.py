@@ -35,20 +35,22 @@ _RUNS: dict[str, RunFolder] = {}
 
 
 def answers(
-    path: str, body: str = "{}", tell: Callable[[str], None] | None = None
+    path: str, body: str = "{}", progress: Callable[[str], None] | None = None
 ) -> Iterator[str]:
     """The answer to a request, line by line as JSON; what refuses it is a line too.
 
     ``tell`` gets what is known between two lines, such as progress.
     """
     try:
-        for answer in _answered(path, body, tell):
+        for answer in _answered(path, body, progress):
             yield json.dumps(answer, separators=(",", ":"))
     except SbafabError as error:
         yield json.dumps(jobs.refusal(str(error)))
 
 
-def _answered(path: str, body: str, tell: Callable[[str], None] | None) -> Iterator[dict[str, Any]]:
+def _answered(
+    path: str, body: str, progress: Callable[[str], None] | None
+) -> Iterator[dict[str, Any]]:
     if path == "/api/start":
         lacks = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
         yield {**forms.started(None), "lacks": lacks}
@@ -57,8 +59,8 @@ def _answered(path: str, body: str, tell: Callable[[str], None] | None) -> Itera
     elif path in JOBS:
         FOLDER.mkdir(exist_ok=True)
         job = {**forms.job(FOLDER, forms.table(body)), "do": JOBS[path]}
-        if tell is not None:
-            job["tell"] = lambda answer: tell(json.dumps(answer))
+        if progress is not None:
+            job["tell"] = lambda answer: progress(json.dumps(answer))
         yield from _cut(job) if path == "/api/generate" else jobs.answers(job, _never)
     else:
         raise SbafabError(f"a page without a server does not answer {path}")

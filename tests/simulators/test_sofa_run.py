@@ -67,7 +67,9 @@ def run(tmp_path: Path, job: SofaJob = BRIEF) -> SofaRun:
 def test_a_good_run_is_read_back(tmp_path: Path, fake: Fake) -> None:
     fake(writing(RECORD))
     told: list[tuple[str, int, int]] = []
-    done = simulate(laminate(), tmp_path / "sofa", job=BRIEF, tell=lambda *news: told.append(news))
+    done = simulate(
+        laminate(), tmp_path / "sofa", job=BRIEF, progress=lambda *news: told.append(news)
+    )
     assert [tip.time for tip in done.tips] == [0, 0.1, 0.2]
     assert done.tips[1].place == pytest.approx((0, 0, 4.5))
     assert done.tips[1].tilt == pytest.approx(0)
@@ -184,7 +186,9 @@ def test_a_run_that_takes_too_long_is_ended(tmp_path: Path, fake: Fake) -> None:
 def test_progress_is_told_while_it_runs(tmp_path: Path, fake: Fake) -> None:
     fake(f"printf 'T= 0.1\\n  X= 1 0 4 0 1 4 -1 -1 4\\n' > tip.state\nsleep 0.4\n{writing(RECORD)}")
     told: list[int] = []
-    simulate(laminate(), tmp_path / "sofa", job=BRIEF, tell=lambda _, done, of: told.append(done))
+    simulate(
+        laminate(), tmp_path / "sofa", job=BRIEF, progress=lambda _, done, of: told.append(done)
+    )
     assert told[0] == 5
     assert told[-1] == 11
 

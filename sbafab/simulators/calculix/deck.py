@@ -122,7 +122,7 @@ def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
     return moved
 
 
-# What holds the actuator: its base, or a lone balloon's ring, and planes of symmetry.
+# Supports: the base, or a lone balloon's ring, and planes of symmetry.
 
 
 BASE = "base"

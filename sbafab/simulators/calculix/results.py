@@ -130,7 +130,7 @@ def read_sta(path: Path) -> list[float]:
     return times
 
 
-# What a run found: stroke, air and wall stress against pressure.
+# History of a run: stroke, air and wall stress against pressure.
 
 
 NEAR = 0.5

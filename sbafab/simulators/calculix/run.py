@@ -63,7 +63,7 @@ def find_ccx() -> str:
 
 
 def run_ccx(
-    folder: Path, job: str, end: float, timeout: float, tell: Progress | None = None
+    folder: Path, job: str, end: float, timeout: float, progress: Progress | None = None
 ) -> Ending:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
@@ -72,8 +72,8 @@ def run_ccx(
     sta = folder / f"{job}.sta"
 
     def look() -> None:
-        if tell is not None:
-            tell("ccx, percent of the load", int(100 * _reached(sta) / end), 100)
+        if progress is not None:
+            progress("ccx, percent of the load", int(100 * _reached(sta) / end), 100)
 
     code, stopped = run_program([find_ccx(), "-i", job], folder / LOG, timeout, look)
     reached = _reached(sta)
@@ -131,7 +131,7 @@ def simulate(
     settings: DeckSettings,
     folder: Path,
     timeout: float,
-    tell: Progress,
+    progress: Progress,
 ) -> History:
     """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
 
@@ -139,11 +139,11 @@ def simulate(
     Raises OutputError where ccx is not installed or reaches nothing.
     """
     find_ccx()
-    tell("mesh", 0, 1)
+    progress("mesh", 0, 1)
     mesh = deck_mesh(laminate, mesh_settings)
     write_deck(mesh, settings, folder)
-    ending = run_ccx(folder, JOB, settings.ramp, timeout, tell)
-    tell("results", 0, 1)
+    ending = run_ccx(folder, JOB, settings.ramp, timeout, progress)
+    progress("results", 0, 1)
     run_mesh = started(mesh, settings)
     frames = converged_frames(folder / f"{JOB}.frd", run_mesh, ending)
     if not frames:
@@ -240,10 +240,10 @@ def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None
     write_deck(deck_mesh(laminate, mesh), settings, folder)
 
 
-def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress) -> Result:
     """Run the deck; the folder holds deck, results, table and pictures."""
     mesh, settings = _settings(laminate, request)
-    history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, tell)
+    history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, progress)
     last = history.states[-1]
     rows = [(name, value, "kPa") for name, value in last.pressures.items()]
     rows += [("stroke", last.stroke, "mm")]

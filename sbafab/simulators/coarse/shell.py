@@ -521,7 +521,7 @@ def reverse(triangle: Triangle) -> Triangle:
     return b, a, c
 
 
-# What all models of one actuator share: its stack, its film, what each chamber is told.
+# Shared by all models of an actuator: its stack, its film, the pressure of each chamber.
 
 
 PRESSURE = 5.0

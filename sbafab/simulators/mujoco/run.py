@@ -69,7 +69,7 @@ def simulate(
     folder: Path,
     pressures: Mapping[str, float] | None = None,
     seconds: float = SECONDS,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
     sectors: int = SECTORS,
     limit: float | None = None,
 ) -> MujocoRun:
@@ -82,7 +82,7 @@ def simulate(
     refuse_time(seconds, LEAST_TIME)
     find_mujoco()
     write_model(laminate, folder, pressures, sectors)
-    return run_model(folder, seconds, tell, limit)
+    return run_model(folder, seconds, progress, limit)
 
 
 def find_mujoco() -> Any:
@@ -101,7 +101,7 @@ def find_mujoco() -> Any:
 
 
 def run_model(
-    folder: Path, seconds: float, tell: Progress | None = None, limit: float | None = None
+    folder: Path, seconds: float, progress: Progress | None = None, limit: float | None = None
 ) -> MujocoRun:
     """Inflates the model in a folder, for at most ``limit`` s of real time or until Ctrl-C.
 
@@ -138,8 +138,8 @@ def run_model(
                 stopped = f"it was stopped after {limit / 60:g} minutes"
             if step % every == 0 or step == steps or stopped is not None:
                 tips.append(inflation.tip())
-                if tell is not None:
-                    tell("mujoco", step, steps)
+                if progress is not None:
+                    progress("mujoco", step, steps)
     rate = step / max(time.monotonic() - started, 1e-9)
     note = None
     if stopped is not None:
@@ -242,11 +242,11 @@ def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None
     write_model(laminate, folder, _pressures(laminate, request))
 
 
-def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress) -> Result:
     """Write the model and inflate it to the end."""
     pressures = _pressures(laminate, request)
     seconds = SECONDS if request.seconds is None else request.seconds
-    result = simulate(laminate, folder, pressures, seconds, tell, limit=60 * request.minutes)
+    result = simulate(laminate, folder, pressures, seconds, progress, limit=60 * request.minutes)
     x, y, z = result.last.place
     share = min(1.0, result.last.time / RAMP)
     rows = [(name, share * value, "kPa") for name, value in pressures.items()]

@@ -101,7 +101,7 @@ def simulate(
     folder: Path,
     pressures: Mapping[str, float] | None = None,
     job: SofaJob = USUAL,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
 ) -> SofaRun:
     """Writes the scenes of a laminate into a folder and runs one of them.
 
@@ -117,7 +117,7 @@ def simulate(
     requested = job.volumes if job.scene == "volume" else pressures
     names = tuple(chamber.name for chamber in laminate.chambers)
     limit = limits(laminate, checked(names, requested, PRESSURE, "pressure", "kPa").values())
-    return run_scene(program, folder / name, job.seconds, dt, job.limit, tell, limit)
+    return run_scene(program, folder / name, job.seconds, dt, job.limit, progress, limit)
 
 
 def _no_such_scene(laminate: Laminate, scene: Scene) -> str:
@@ -145,7 +145,7 @@ def run_scene(
     seconds: float,
     dt: float,
     limit: float | None = None,
-    tell: Progress | None = None,
+    progress: Progress | None = None,
     can_be: TipLimits | None = None,
 ) -> SofaRun:
     """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
@@ -161,7 +161,7 @@ def run_scene(
     steps = round(seconds / dt) + 1
     log_path = folder / LOG_FILE
     command = [program, "-g", "batch", "-n", str(steps), scene.name]
-    ended = run_program(command, log_path, limit, lambda: _report(state, dt, steps, tell))
+    ended = run_program(command, log_path, limit, lambda: _report(state, dt, steps, progress))
     needed = plugins_needed(scene)
     log = read_log(log_path.read_text(encoding="utf-8", errors="replace"), needed)
     tips = read_tips(state)
@@ -179,16 +179,16 @@ def run_scene(
         raise OutputError(f"{scene.name} did not run to its end: {why}; {reached} (see {log_path})")
     if can_be is not None and (wrong := impossible(tips, can_be)) is not None:
         raise OutputError(f"{scene.name} ran to its end, but its result cannot be: {wrong}")
-    if tell is not None:
-        tell("runSofa", steps, steps)
+    if progress is not None:
+        progress("runSofa", steps, steps)
     return SofaRun(scene, tuple(tips), log.steps or steps, log.seconds, log.rate)
 
 
-def _report(state: Path, dt: float, steps: int, tell: Progress | None) -> None:
-    if tell is not None:
+def _report(state: Path, dt: float, steps: int, progress: Progress | None) -> None:
+    if progress is not None:
         tips = read_tips(state)
         if tips:
-            tell("runSofa", min(steps, round(tips[-1].time / dt)), steps)
+            progress("runSofa", min(steps, round(tips[-1].time / dt)), steps)
 
 
 def _trouble(ended: Ended, log: Log, tips: list[Tip], seconds: float) -> str | None:
@@ -354,7 +354,7 @@ def export(laminate: Laminate, request: SimulationRequest, folder: Path) -> None
     write_scenes(laminate, folder, _pressures(laminate, request), request.volumes or None)
 
 
-def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Progress) -> Result:
+def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress) -> Result:
     """Write all the scenes and run one of them with runSofa."""
     if request.volumes and request.scene != "volume":
         raise DesignError("--volume is for --scene volume; the other scenes are told pressures")
@@ -362,7 +362,7 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, tell: Prog
     seconds = USUAL.seconds if request.seconds is None else request.seconds
     scene = cast(Scene, request.scene or USUAL.scene)
     job = SofaJob(scene, seconds, 60 * request.minutes, request.volumes or None)
-    result = simulate(laminate, folder, pressures, job, tell)
+    result = simulate(laminate, folder, pressures, job, progress)
     rows = [] if scene == "volume" else [(name, p, "kPa") for name, p in pressures.items()]
     rows += _reached(laminate, result)
     rows += [] if result.rate is None else [("rate", result.rate, "steps/s")]

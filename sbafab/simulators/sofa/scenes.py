@@ -133,6 +133,13 @@ def scaled_mass(shell: Shell, dt: float, highest: float | None = None) -> float:
     return nodal_stiffness(most, shell.size) * len(shell.rest) * dt**2
 
 
+def _film(node: ET.Element, group: FilmGroup) -> ET.Element:
+    """Return a child node of the scene with the triangles of a group of films."""
+    film = child(node, group.name)
+    add(film, "TriangleSetTopologyContainer", name="t", triangles=group.triangles)
+    return film
+
+
 def add_films(
     node: ET.Element,
     membranes: Iterable[FilmGroup],
@@ -141,10 +148,8 @@ def add_films(
 ) -> None:
     """The films' elasticity, of ``share`` of the true modulus, a child node a group."""
     for group in membranes:
-        film = child(node, group.name)
-        add(film, "TriangleSetTopologyContainer", name="t", triangles=group.triangles)
         add(
-            film,
+            _film(node, group),
             "TriangularFEMForceFieldOptim",
             template="Vec3",
             topology="@t",
@@ -152,10 +157,8 @@ def add_films(
             poissonRatio=group.poisson,
         )
     for group in bending:
-        film = child(node, group.name)
-        add(film, "TriangleSetTopologyContainer", name="t", triangles=group.triangles)
         add(
-            film,
+            _film(node, group),
             "FastTriangularBendingSprings",
             template="Vec3",
             topology="@t",
