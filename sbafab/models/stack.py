@@ -167,18 +167,18 @@ class Stack:
         return self.pitch * len(self.levels)
 
     @cached_property
-    def _centres(self) -> Array:
+    def centres(self) -> Array:
         """Gap at each chamber's middle, by rise and tilt: (3, chambers)."""
         x, y = self.axes.T
         return np.stack([np.ones_like(x), y, -x])
 
     @cached_property
-    def _planes(self) -> Array:
+    def planes(self) -> Array:
         """Rise and tilt of the plane nearest to gaps at the chambers' middles: (chambers, 3)."""
-        return np.asarray(np.linalg.pinv(self._centres))
+        return np.asarray(np.linalg.pinv(self.centres))
 
     @cached_property
-    def _ring_gaps(self) -> Array:
+    def ring_gaps(self) -> Array:
         """Gap at each point of each balloon's ring, by rise and tilt: (chambers x points, 3)."""
         turn = np.arange(RING_POINTS) * math.tau / RING_POINTS
         ring = np.stack([np.cos(turn), np.sin(turn)], -1)
@@ -210,14 +210,14 @@ class Stack:
         return np.stack(rows)
 
     @cached_property
-    def _places(self) -> GapPlaces:
+    def places(self) -> GapPlaces:
         """Gaps of each kind of balloon."""
-        return GapPlaces.of(self.maps, self._ring_gaps, self.rims)
+        return GapPlaces.of(self.maps, self.ring_gaps, self.rims)
 
     @cached_property
-    def _level_places(self) -> GapPlaces:
+    def level_places(self) -> GapPlaces:
         """Gaps of each level."""
-        return self._places.at(self.levels)
+        return self.places.at(self.levels)
 
     def springs(self, pressures: Sequence[float], sucked: bool = False) -> Springs:
         """Return the springs of each kind of balloon at pressures, one a chamber. Raises
@@ -234,11 +234,11 @@ class Stack:
                 f"{values.size} pressures are given for {self.chambers} chambers; give one a "
                 "chamber"
             )
-        return Springs.pressed(self.maps, values, self._places, sucked)
+        return Springs.pressed(self.maps, values, self.places, sucked)
 
     def each(self, springs: Springs) -> Springs:
         """Return the springs of each level."""
-        return Springs(springs.table, self._level_places)
+        return Springs(springs.table, self.level_places)
 
     def pose(
         self,
@@ -258,28 +258,31 @@ class Stack:
         DesignError for pressures outside the maps, and where Newton's method finds no equilibrium.
         """
         springs = self.springs(pressures, sucked)
-        load = self._load(tip_load, gravity, plate)
+        load = self.load(tip_load, gravity, plate)
         if load is None:
-            start = self._risen(pressures) if near is None else near.freedoms[self._first_levels]
+            if near is None:
+                start = self.start_freedoms(pressures)
+            else:
+                start = near.freedoms[self.first_levels]
             kinds = free_equilibrium(springs, start)
-            return self._pose(pressures, springs, kinds[self.levels], kinds)
+            return self.pose_at(pressures, springs, kinds[self.levels], kinds)
         if near is not None:
             start = near.freedoms
         else:
-            start = self._risen(pressures)
+            start = self.start_freedoms(pressures)
             if load.wall is not None and not (load.wall.is_level and load.wall.sticks):
                 start = free_equilibrium(springs, start)
             start = start[self.levels]
         freedoms, push, stable = loaded_equilibrium(
             self.each(springs), self.pitch, load, start, near is not None
         )
-        return self._pose(pressures, springs, freedoms, None, push / 1000, stable)
+        return self.pose_at(pressures, springs, freedoms, None, push / 1000, stable)
 
-    def _risen(self, pressures: Sequence[float]) -> Array:
+    def start_freedoms(self, pressures: Sequence[float]) -> Array:
         """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the
         free heights of the balloons.
         """
-        return np.stack([kind.rises(pressures) for kind in self.maps]) @ self._planes
+        return np.stack([kind.rises(pressures) for kind in self.maps]) @ self.planes
 
     def motion(
         self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
@@ -301,12 +304,12 @@ class Stack:
         return np.array([self.maps[kind].most_height for kind in self.levels])[:, None]
 
     @cached_property
-    def _first_levels(self) -> NDArray[np.int_]:
+    def first_levels(self) -> NDArray[np.int_]:
         """First level of each kind of balloon."""
         return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
 
     @property
-    def _level_weight(self) -> float:
+    def level_weight(self) -> float:
         """Weight of a level in mN. Raises DesignError where it is not known."""
         if self.weight is None:
             raise DesignError(
@@ -314,17 +317,20 @@ class Stack:
             )
         return self.weight
 
-    def _load(
+    def load(
         self,
         tip_load: Sequence[float],
         gravity: bool | Sequence[float],
         plate: float | Plate | None,
     ) -> Load | None:
+        """Return the external loads of ``pose``'s arguments, or None without any. Raises
+        DesignError.
+        """
         force, weight = 1000 * vector_of(tip_load, "tip_load in N"), None
         if not isinstance(gravity, (bool, np.bool_)):
-            weight = self._level_weight * direction_of(gravity, "the direction of gravity")
+            weight = self.level_weight * direction_of(gravity, "the direction of gravity")
         elif gravity:
-            weight = np.array([0.0, 0.0, -self._level_weight])
+            weight = np.array([0.0, 0.0, -self.level_weight])
         if not force.any() and weight is None and plate is None:
             return None
         if plate is None:
@@ -340,7 +346,7 @@ class Stack:
             )
         return Load(force, weight, wall)
 
-    def _pose(
+    def pose_at(
         self,
         pressures: Sequence[float],
         springs: Springs,
@@ -350,7 +356,7 @@ class Stack:
         stable: bool = True,
     ) -> Pose:
         """Return a pose; ``kinds`` are its freedoms by kind of balloon where levels are equal."""
-        gaps = freedoms @ self._centres
+        gaps = freedoms @ self.centres
         highest = float((gaps - self._top).max())
         if highest > 0:
             raise DesignError(

@@ -53,7 +53,7 @@ FORCE_MOTION = _force_motion_matrix()
 
 
 def _rotation_matrix() -> Array:
-    """Return the matrix (12, 13) of ``_rotations``: by 1, x, y, xx, xy, yx, yy, 1, xx .. yy."""
+    """Return the matrix (12, 13) of ``rotations``: by 1, x, y, xx, xy, yx, yy, 1, xx .. yy."""
     matrix = np.zeros((12, 13))
     turn, rate = matrix[:, :9].reshape(12, 3, 3), matrix[:, 9:].reshape(12, 2, 2)
     turn[0] = BASE
@@ -86,7 +86,7 @@ class Chain(NamedTuple):
 def plate_chain(freedoms: Array, pitch: float) -> Chain:
     """Return the plates of levels with freedoms (n, 3), each ``pitch`` mm high when flat."""
     count = len(freedoms)
-    turned, rates = _rotations(freedoms[:, 1:] / 2)
+    turned, rates = rotations(freedoms[:, 1:] / 2)
     axes = np.empty((count + 1, 3, 3))
     axes[0] = BASE
     np.matmul(turned, turned, out=axes[1:])
@@ -111,7 +111,7 @@ def _sums(count: int) -> Array:
     return np.tri(count + 1, count, -1)
 
 
-def _rotations(vectors: Array) -> tuple[Array, Array]:
+def rotations(vectors: Array) -> tuple[Array, Array]:
     """Return rotations (n, 3, 3) by vectors (n, 2) in the xy plane, and the rotation by a unit of
     each component, half before and half after, in the xy plane between (n, 2, 2): Rodrigues'
     formula, and the mean of the left and the right Jacobian.
@@ -395,7 +395,7 @@ class PlateContact(NamedTuple):
         return self.stiff * np.maximum(deep, self.least)
 
 
-class _ExternalForces(NamedTuple):
+class ExternalForces(NamedTuple):
     """External forces on the plates: the sum of the forces f beyond each level (n, 3), that of x f
     over their points x (n, 3, 3), and their energy; n is 1 where all levels carry the same.
     """
@@ -406,17 +406,17 @@ class _ExternalForces(NamedTuple):
     touch: PlateContact | None = None
 
 
-def _external_forces(plates: Chain, load: Load, forces: Array | None) -> _ExternalForces:
+def external_forces(plates: Chain, load: Load, forces: Array | None) -> ExternalForces:
     tip = plates.places[-1]
-    acting = _ExternalForces(
+    acting = ExternalForces(
         load.tip[None], np.multiply.outer(tip, load.tip)[None], -float(load.tip @ tip)
     )
     if load.wall is not None:
         acting = _with_contact(acting, plates, load.wall, load.stiffness, forces)
     if load.weight is not None:
-        beyond, number = _beyond(len(plates.rises))
+        beyond, number = plates_beyond(len(plates.rises))
         above = beyond @ plates.places
-        acting = _ExternalForces(
+        acting = ExternalForces(
             acting.forces + number * load.weight,
             acting.arms + above[:, :, None] * load.weight,
             acting.energy - float(above[0] @ load.weight),
@@ -426,8 +426,8 @@ def _external_forces(plates: Chain, load: Load, forces: Array | None) -> _Extern
 
 
 def _with_contact(
-    acting: _ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
-) -> _ExternalForces:
+    acting: ExternalForces, plates: Chain, wall: OuterPlate, stiffness: float, forces: Array | None
+) -> ExternalForces:
     """Return the forces with those of the outer plate: ``forces``, or by its stiffness."""
     points = plates.places[-1] + wall.local @ plates.axes[-1].T
     deep = ((points - wall.point) * wall.ways).sum(-1)
@@ -437,7 +437,7 @@ def _with_contact(
     resists = stiff * np.maximum(deep, wall.least)
     acts = resists if forces is None else forces
     each = acts[:, None] * wall.ways
-    return _ExternalForces(
+    return ExternalForces(
         acting.forces - acts @ wall.ways,
         acting.arms - points.T @ each,
         acting.energy + float(resists @ deep) / 2,
@@ -446,7 +446,7 @@ def _with_contact(
 
 
 @lru_cache(maxsize=16)
-def _beyond(count: int) -> tuple[Array, Array]:
+def plates_beyond(count: int) -> tuple[Array, Array]:
     """Return a mask of plates beyond each level (count, count + 1), and their number."""
     mask = 1.0 - np.tri(count, count + 1)
     return mask, mask.sum(axis=1, keepdims=True)
@@ -517,7 +517,7 @@ def loaded_energy(
     """
     value, spring_gradient, blocks = springs.energy(at)
     plates = plate_chain(at, pitch)
-    acting = _external_forces(plates, load, forces)
+    acting = external_forces(plates, load, forces)
     motions = level_motions(plates)
     works = motions @ force_motions(acting.arms, acting.forces)
     gradient = (spring_gradient - works[..., 3]).ravel()

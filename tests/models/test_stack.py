@@ -163,7 +163,7 @@ def test_without_a_load_all_levels_are_alike_in_the_full_solve_too(three: Stack)
 def test_gradients_of_a_loaded_stack_are_those_of_its_energy(three: Stack) -> None:
     springs = three.each(three.springs((20, 8, 3)))
     plate = Plate((0.3, 0.0, 9.0), (0.1, 0.0, 1.0))
-    load = three._load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
+    load = three.load((0.1, 0.2, -0.3), (0.0, 0.3, -1.0), plate)
     assert load is not None
     at = np.full((15, 3), 0.02) + np.linspace(0, 0.01, 45).reshape(15, 3)
     at[:, 0] += 0.6
@@ -315,12 +315,12 @@ def test_any_start_ends_in_the_same_balance(three: Stack, load: str) -> None:
     digits.
     """
     loads = LOADS[load]
-    acting = three._load(**{**NO_LOAD, **loads})
+    acting = three.load(**{**NO_LOAD, **loads})
     for pressures in ((4.26, 0.56, 8.7), (0.21, 0.18, 1.46), (0.5, 8.0, 0.2), (6.0, 3.0, 1.0)):
         pose = three.pose(pressures, **loads)
         assert acting is not None
         springs = three.springs(pressures)
-        start = free_equilibrium(springs, three._risen(pressures))[three.levels]
+        start = free_equilibrium(springs, three.start_freedoms(pressures))[three.levels]
         each, wall = three.each(springs), acting.wall
         if wall is None:
             slow = _energy_descent(each, three.pitch, acting, start, MOST_STEPS)
