@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -16,6 +17,8 @@ CHECKS = {
     "mypy": ["-m", "mypy"],
     "import contracts": ["-c", LINT_IMPORTS],
 }
+# Neighbours share what their module made once.
+PYTEST = ["-m", "pytest", "-q", "-n", str(os.cpu_count() or 1), "--dist", "worksteal"]
 
 
 def passes(name: str, arguments: list[str]) -> bool:
@@ -32,14 +35,29 @@ def passes(name: str, arguments: list[str]) -> bool:
     return ok
 
 
+def terminal() -> tuple[list[str], dict[str, str]]:
+    """Arguments and settings that let pytest write through a pipe as it would write here."""
+    if not sys.stdout.isatty():
+        return [], {}
+    return ["--color=yes"], {"COLUMNS": str(shutil.get_terminal_size().columns)}
+
+
 def main() -> int:
-    """Every check runs; pytest comes last, so that its counts close the output."""
-    failed = [name for name, arguments in CHECKS.items() if not passes(name, arguments)]
-    # Neighbours share what their module made once.
-    workers = ["-n", str(os.cpu_count() or 1), "--dist", "worksteal"]
-    tests = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", *workers, *sys.argv[1:]], cwd=ROOT, check=False
-    )
+    """Every check runs beside pytest; its output comes last, so that its counts close all."""
+    colour, width = terminal()
+    with subprocess.Popen(
+        [sys.executable, *PYTEST, *colour, *sys.argv[1:]],
+        cwd=ROOT,
+        env={**os.environ, **width},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    ) as tests:
+        # Until every check has its row, what pytest writes waits in the pipe.
+        failed = [name for name, arguments in CHECKS.items() if not passes(name, arguments)]
+        assert tests.stdout is not None
+        while text := os.read(tests.stdout.fileno(), 65536):
+            sys.stdout.buffer.write(text)
+            sys.stdout.buffer.flush()
     if failed:
         print(f"failed: {', '.join(failed)}")
     return 1 if failed or tests.returncode else 0
