@@ -9,47 +9,49 @@ from importlib.util import find_spec
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from sbafab import __version__
 from sbafab.cli.exit import BAD_INPUT, exit_plainly, prepared_streams, print_error
 from sbafab.cli.progress import add_verbosity
 from sbafab.process import prepare
 
-NAMES = (
-    "templates",
-    "new",
-    "generate",
-    "check",
-    "explain",
-    "cut",
-    "press",
-    "mesh",
-    "nest",
-    "kerf",
-    "predict",
-    "map",
-    "picture",
-    "simulate",
-    "sweep",
-    "find",
-    "record",
-    "reproduce",
-    "studio",
-    "schema",
-)
-"""In the order a newcomer needs them. A module has the name of its command."""
+SUMMARIES = {
+    "templates": "List the templates, a line each.",
+    "new": "Write a commented design file to start from.",
+    "generate": "Write everything: cut files, schedule, traveller, meshes.",
+    "check": "Run the rules on a design or on an output folder.",
+    "explain": "Explain a rule: criterion, reason, remedy.",
+    "cut": "Write the cut files: a DXF for each layer, and film sheets.",
+    "press": "Write the heat-press schedule.",
+    "mesh": "Write meshes: solid, cavities, volume and shell.",
+    "nest": "Cut several designs from the same film sheets.",
+    "kerf": "Compute the kerf from a filled coupon.csv.",
+    "predict": "Predict size, stroke, force, time and bending.",
+    "map": "Map force and volume of the balloons.",
+    "picture": "Draw the inflated actuator as picture, animation or scene.",
+    "simulate": "Inflate a design in an installed simulator.",
+    "sweep": "Check and predict variants of a design.",
+    "find": "Find the best design that meets requirements.",
+    "record": "Record the results of builds, and report on them.",
+    "reproduce": "Compare predictions with the paper's measurements.",
+    "studio": "Edit a design in the browser.",
+    "schema": "Print a JSON schema, by default that of design files.",
+}
+"""The commands in the order a newcomer needs them, with the first line of their help.
+
+A module has the name of its command. The summaries stand here so that ``sbafab --help`` and the
+completion of a command's name load no command.
+"""
 BUILTIN = {"map": "map_"}
 """Functions that cannot have the name of their command."""
 
 
 class CommandTable(MutableMapping[str, click.Command]):
-    """Commands by name; a command's module is imported when the command is first looked up.
-
-    Commands import geometry, models and writers inside their functions, so that --help loads none.
-    """
+    """Commands by name; a command's module is imported when the command is first looked up."""
 
     def __init__(self) -> None:
-        self._loaded: dict[str, click.Command | None] = dict.fromkeys(NAMES)
+        self._loaded: dict[str, click.Command | None] = dict.fromkeys(SUMMARIES)
 
     def __getitem__(self, name: str) -> click.Command:
         command = self._loaded[name]
@@ -91,10 +93,22 @@ EXTRAS = {
 
 
 class CommandGroup(click.Group):
-    """A group that lists its commands in the order of NAMES and suggests the nearest name."""
+    """A group that lists its commands in the order of SUMMARIES and suggests the nearest name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(SUMMARIES.items()))
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        names = [
+            CompletionItem(name, help=summary)
+            for name, summary in SUMMARIES.items()
+            if name.startswith(incomplete)
+        ]
+        return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         missing = [
@@ -125,12 +139,12 @@ class CommandGroup(click.Group):
 def similar_commands(name: str) -> list[str]:
     """Return the commands that begin with ``name``; if none does, the most similar one, if any."""
     typed = name.lower()
-    beginning = [command for command in NAMES if typed and command.startswith(typed)]
+    beginning = [command for command in SUMMARIES if typed and command.startswith(typed)]
     if beginning:
         return beginning
     from difflib import get_close_matches
 
-    return get_close_matches(typed, NAMES, 1)
+    return get_close_matches(typed, SUMMARIES, 1)
 
 
 @click.group(

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from sbafab.actuators import load_design
+from sbafab.assemblies.files import load
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import designs_or_folders, json_option, set_option, waive_option
 from sbafab.cli.printing import (
@@ -27,15 +29,19 @@ from sbafab.cli.printing import (
     print_wrapped,
 )
 from sbafab.cli.progress import shown_progress
+from sbafab.design.files import template_names
+from sbafab.design.identity import cited
+from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
+from sbafab.models.formulas import size_phrases, sizes
+from sbafab.output.advice import Advice, advise
+from sbafab.output.checked import checks, refuse_undoable
+from sbafab.output.job import CheckedJob, check_job
+from sbafab.rules.deck import has_failed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sbafab.cli.printing import Group
-    from sbafab.design.records import Design
-    from sbafab.output.advice import Advice
-    from sbafab.output.job import CheckedJob
     from sbafab.rules.finding import Finding
 
 YIELD_RULE = "registration-yield"
@@ -55,8 +61,6 @@ class CheckRequest(NamedTuple):
 
     @property
     def is_folder(self) -> bool:
-        from sbafab.design.files import template_names
-
         return self.source not in template_names() and Path(self.source).is_dir()
 
 
@@ -116,9 +120,6 @@ def check(
 
 def _run_check(request: CheckRequest) -> bool:
     """Check and print the outcome; return True if a rule failed."""
-    from sbafab.output.checked import checks
-    from sbafab.rules.deck import has_failed
-
     outcome = _check_folder(request) if request.is_folder else _check_source(request)
     advice = None if request.target is None else _advice(request, request.target)
     if request.as_json:
@@ -136,8 +137,6 @@ def _run_check(request: CheckRequest) -> bool:
 
 def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
     """Print sizes, kit, notes and findings, and last the verdict."""
-    from sbafab.design.identity import cited
-
     if outcome.kind == "as-built":
         print_line(f"as built: {outcome.name}")
     for name, phrases in outcome.size_descriptions.items():
@@ -166,11 +165,6 @@ def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
 
 def _check_source(request: CheckRequest) -> CheckOutcome:
     """Check a design or an assembly."""
-    from sbafab.actuators import load_design
-    from sbafab.assemblies.files import load
-    from sbafab.design.records import Design
-    from sbafab.output.job import check_job
-
     source = load(request.source, request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
         if not isinstance(source, Design):
@@ -189,9 +183,6 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
 
 def _outcome(job: CheckedJob) -> CheckOutcome:
     """Return the outcome; raises DesignError for a design that press or sheets cannot make."""
-    from sbafab.models.formulas import size_phrases, sizes
-    from sbafab.output.checked import refuse_undoable
-
     if not job.failed:
         refuse_undoable(job.designs)
     return CheckOutcome(
@@ -208,9 +199,6 @@ def _outcome(job: CheckedJob) -> CheckOutcome:
 
 def _advice(request: CheckRequest, target: float) -> Advice:
     """Return the advice on bond and overhang for a target yield."""
-    from sbafab.actuators import load_design
-    from sbafab.output.advice import advise
-
     with shown_progress(request.as_json) as progress:
         return advise(load_design(request.source, _with_target(request, target)), target, progress)
 
@@ -223,7 +211,7 @@ def _check_folder(request: CheckRequest) -> CheckOutcome:
     """Check the files of an output folder."""
     import logging
 
-    from sbafab.cli.printing import Group
+    # Reading a folder back takes as long to load as all that checks a design.
     from sbafab.runs.check_folder import check_folder
 
     if request.assignments or request.waivers or request.target is not None:

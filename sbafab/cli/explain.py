@@ -7,6 +7,8 @@ import click
 from sbafab.cli.options import json_option
 from sbafab.cli.options import rules as rule_names
 from sbafab.cli.printing import print_facts, print_json
+from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
+from sbafab.rules.explained import EXPLAINED
 
 
 @click.command()
@@ -17,9 +19,6 @@ def explain(rule: str | None, as_json: bool) -> None:
 
     Without RULE: list all rules and checks, a line each.
     """
-    from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
-    from sbafab.rules.explained import EXPLAINED
-
     if rule is None:
         if as_json:
             rules = {name: explanation._asdict() for name, explanation in EXPLAINED.items()}
@@ -42,8 +41,6 @@ def explain(rule: str | None, as_json: bool) -> None:
 
 
 def _print(rule: str) -> None:
-    from sbafab.rules.explained import EXPLAINED
-
     explanation = EXPLAINED[rule]
     print_facts(
         (

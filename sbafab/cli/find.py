@@ -8,20 +8,32 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
+from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
+from sbafab.output.schema_ids import FIND_SCHEMA
+from sbafab.search.find import (
+    FindRequest,
+    FoundDesign,
+    found_file,
+    found_toml,
+    free_keys,
+    write_found,
+)
+from sbafab.search.find import find as search
+from sbafab.search.quantities import RequestedQuantity, shown_value
 from sbafab.search.quantity_names import quantity_lines
+from sbafab.search.trial import Goal, Requirement, Trial, keys_said, read_all, value_said
+from sbafab.search.vary import read_free
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from sbafab.process import Progress
-    from sbafab.search.find import FindRequest, FoundDesign
-    from sbafab.search.quantities import RequestedQuantity
-    from sbafab.search.trial import Goal, Requirement, Trial
 
 HELP = """Find the best design that meets requirements.
 
@@ -106,9 +118,6 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
 @json_option
 @_with_quantities
 def find(source: str | None, **options: Any) -> None:
-    from sbafab.design.files import name_of
-    from sbafab.search.find import found_file, found_toml, write_found
-
     if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
     requests = _requests(source, options)
@@ -147,8 +156,6 @@ def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequ
 
     Families without the requested quantities are left out. Raises DesignError if none remains.
     """
-    from sbafab.search.trial import read_all
-
     requirements, goal = read_all(options["least"], options["most"], options["best"])
     requests: dict[str, FindRequest] = {}
     problems: list[str] = []
@@ -165,11 +172,6 @@ def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequ
 def _request(
     name: str, requirements: tuple[Requirement, ...], goal: Goal, options: dict[str, Any]
 ) -> FindRequest:
-    from sbafab.actuators import load_design
-    from sbafab.design.files import changed_keys
-    from sbafab.search.find import FindRequest, free_keys
-    from sbafab.search.vary import read_free
-
     assignments = options["assignments"]
     design = load_design(name, assignments)
     free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assignments)))
@@ -182,8 +184,6 @@ def _request(
 
 def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[str, FoundDesign]:
     """Run the searches; return the best result and the design that it started from."""
-    from sbafab.search.find import find as search
-
     results: list[tuple[str, FoundDesign]] = []
     problems = []
     for number, (name, request) in enumerate(requests.items()):
@@ -202,9 +202,6 @@ def _best_result(requests: dict[str, FindRequest], progress: Progress) -> tuple[
 
 def _family_templates() -> list[str]:
     """Return the first template of each family."""
-    from sbafab.actuators import load_design
-    from sbafab.design.files import template_names
-
     templates: dict[type, str] = {}
     for name in template_names():
         try:
@@ -225,7 +222,6 @@ TABS_HINT = (
 
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
     """Return a result as JSON."""
-    from sbafab.output.schema_ids import FIND_SCHEMA
 
     def trial_json(trial: Trial) -> dict[str, Any]:
         return {"keys": dict(trial.values), "figures": dict(trial.figures)}
@@ -257,8 +253,6 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
 
 def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     """Print the design with its figures, what binds and the front; or the nearest miss."""
-    from sbafab.search.trial import keys_said, value_said
-
     keys = keys_said(result.best.values)
     title = "Best design" if result.holds else "Nearest miss"
     print_line(f"{title}: {keys}, from {origin}", "bold" if result.holds else "bold red")
@@ -290,8 +284,6 @@ def _counted_requirements(result: FoundDesign) -> str:
 
 def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
-    from sbafab.search.quantities import shown_value
-
     requirements = result.problem.requirements
     for requirement in requirements:
         value = result.best.value(requirement)
@@ -354,8 +346,6 @@ def _print_miss(result: FoundDesign) -> None:
 
 def _print_front(result: FoundDesign) -> None:
     """Print the Pareto front, if it has several designs."""
-    from sbafab.search.trial import keys_said
-
     if len(result.front) < 2:
         return
     part = f"{len(result.front)} of " if result.on_front > len(result.front) else ""

@@ -6,15 +6,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.assemblies.files import load
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
 from sbafab.cli.printing import console, facts_table, print_line
 from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_request
+from sbafab.design.records import Design
+from sbafab.output.checked import EVERYTHING
+from sbafab.runs.run import Run, RunRequest
+from sbafab.simulators.simulator import NAMES
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from sbafab.cutting.properties import Curves
-    from sbafab.runs.run import Run
 
 
 @click.command()
@@ -28,12 +32,6 @@ def generate(request: Request, curves: Curves, decks: bool) -> None:
     --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
     has a folder for each of its designs, and sheets, a traveller and a solid of the whole.
     """
-    from sbafab.assemblies.files import load
-    from sbafab.design.records import Design
-    from sbafab.output.checked import EVERYTHING
-    from sbafab.runs.run import RunRequest
-    from sbafab.simulators.simulator import NAMES
-
     source = load(request.designs[0], request.assignments, request.waivers)
     if decks and not isinstance(source, Design):
         raise click.UsageError("--decks goes with one design; leave it out for an assembly")

@@ -9,12 +9,20 @@ import click
 
 from sbafab.cli.options import finite, json_option
 from sbafab.cli.printing import print_json, print_verdict
+from sbafab.cutting.calibration import (
+    Calibration,
+    Estimate,
+    Measurement,
+    Value,
+    calibrated,
+    read_measurements,
+)
+from sbafab.design.films import FILM_NAME, is_kerf
 from sbafab.errors import DesignError
+from sbafab.output.schema_ids import KERF_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from sbafab.cutting.calibration import Calibration, Estimate, Measurement, Value
 
 
 @click.command()
@@ -60,9 +68,6 @@ def kerf(
     scanner or a microscope rather than a calliper, which bends it. A constant reading error and a
     scale error are separated from the kerf.
     """
-    from sbafab.cutting.calibration import calibrated, read_measurements
-    from sbafab.output.schema_ids import KERF_SCHEMA
-
     sizes = read_measurements(measurements, instrument or "")
     calibration = calibrated(sizes, resolution)
     if split_xy and (calibration.x is None or calibration.y is None):
@@ -113,8 +118,6 @@ def kerf(
 
 def _film(name: str) -> str:
     """Return the name of a film; raises BadParameter for one that no film can have."""
-    from sbafab.design.films import FILM_NAME
-
     if not FILM_NAME.fullmatch(name):
         raise click.BadParameter(
             f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
@@ -178,8 +181,6 @@ def _remark(calibration: Calibration, widths: Widths) -> str:
 
 def _warnings(calibration: Calibration, widths: Widths) -> list[str]:
     """Return sentences on doubts about these widths."""
-    from sbafab.design.films import is_kerf
-
     places = ("",) if len(widths) == 1 else (" along x", " along y")
     warnings = [
         _interval_warning(estimate, place)

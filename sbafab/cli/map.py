@@ -7,10 +7,15 @@ from typing import Any
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli import options
 from sbafab.cli.options import PRESSURE, calibration_options, set_option
 from sbafab.cli.printing import print_verdict
 from sbafab.errors import DesignError, OutputError
+from sbafab.models.figures import Factors
+from sbafab.models.formulas import force
+from sbafab.models.map_files import FORMATS, map_text
+from sbafab.models.stack import stack
 
 
 @click.command(name="map")
@@ -51,12 +56,6 @@ def map_(
 
     The map covers all pressures and heights, for use in other programs.
     """
-    from sbafab.actuators import load_design
-    from sbafab.models.figures import Factors
-    from sbafab.models.formulas import force
-    from sbafab.models.map_files import FORMATS, map_text
-    from sbafab.models.stack import stack
-
     form = "csv" if to is None else to.suffix.removeprefix(".")
     if form not in FORMATS:
         raise DesignError(f"{to} must end with .{', .'.join(FORMATS)}, which sets the format")

@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from sbafab.cli.options import LENGTH, VOLUME, OfChamber, Request, by_chamber, run_options
 from sbafab.cli.run import run_parts
-
-if TYPE_CHECKING:
-    from sbafab.meshing.conforming.layup import Element, Symmetry
-
-
-class MeshEnding(click.Choice[str]):
-    """The endings of mesh formats, read from their table when first used, not by ``--help``."""
-
-    def __init__(self) -> None:
-        self.case_sensitive = True
-
-    @property
-    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
-        from sbafab.meshing.formats.table import CONFORMING_ENDINGS
-
-        return CONFORMING_ENDINGS
+from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
+from sbafab.meshing.formats.table import CONFORMING_ENDINGS
+from sbafab.runs.run import Conforming
 
 
 def _positive(ctx: click.Context, param: click.Parameter, value: float) -> float:
@@ -81,7 +66,7 @@ def _fill(
 @click.option(
     "--format",
     "formats",
-    type=MeshEnding(),
+    type=click.Choice(CONFORMING_ENDINGS),
     multiple=True,
     help="Formats of the volume, shell and cavity meshes. Repeatable.  [default: all]",
 )
@@ -99,9 +84,6 @@ def mesh(  # noqa: PLR0913, PLR0917 - one an option
 
     Volume and shell meshes need the extra "mesh": pip install "sbafab[mesh]".
     """
-    from sbafab.meshing.conforming.layup import MeshSettings
-    from sbafab.runs.run import Conforming
-
     settings = MeshSettings(size, element, symmetry, fill, gaps, not flat)
-    conforming = Conforming(settings, formats or MeshEnding().choices)
+    conforming = Conforming(settings, formats or CONFORMING_ENDINGS)
     run_parts(request, ("mesh",), conforming=conforming)

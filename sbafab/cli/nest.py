@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli.options import Request, dxf_options, several_run_options, sheet_options
 from sbafab.cli.printing import (
     console,
@@ -19,10 +20,11 @@ from sbafab.cli.printing import (
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.cli.run import add_batch, finish
+from sbafab.output.schema_ids import NESTED_SCHEMA
+from sbafab.runs.run import Run, RunRequest, generate
 
 if TYPE_CHECKING:
     from sbafab.cutting.properties import Curves
-    from sbafab.runs.run import Run
 
 
 @click.command()
@@ -36,9 +38,6 @@ def nest(request: Request, name: str, curves: Curves) -> None:
     OUT/<name>/ receives a folder for each DESIGN, and sheets/ with the parts of all. Overrides
     apply to every design. Copies: --copies of every design, else each design's order.copies.
     """
-    from sbafab.actuators import load_design
-    from sbafab.runs.run import RunRequest, generate
-
     designs = [
         load_design(design, request.assignments, request.waivers) for design in request.designs
     ]
@@ -67,8 +66,6 @@ def print_job(job: Run) -> None:
 
 def job_json(job: Run) -> dict[str, object]:
     """Return a job as JSON."""
-    from sbafab.output.schema_ids import NESTED_SCHEMA
-
     return {
         "schema": NESTED_SCHEMA,
         "folder": str(job.folder),

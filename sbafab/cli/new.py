@@ -9,6 +9,10 @@ import click
 from click.shell_completion import CompletionItem
 
 from sbafab.cli.options import completions
+from sbafab.cutting.calibration import write_coupon
+from sbafab.design.files import template_summaries, write_new
+from sbafab.design.kits import write_kit
+from sbafab.version import GENERATOR
 
 COUPON = "coupon"
 KIT = "kit"
@@ -16,8 +20,6 @@ KIT = "kit"
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of templates, "coupon" and "kit"."""
-    from sbafab.design.files import template_summaries
-
     extra = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, laser, limits"}
     return completions(typed, (template_summaries() | extra).items())
 
@@ -40,7 +42,6 @@ def new(template: str, file: Path | None) -> None:
     if template == KIT:
         _kit(file or Path("kit.toml"))
         return
-    from sbafab.design.files import write_new
 
     written = write_new(template, file)
     path = shlex.quote(str(written))
@@ -48,16 +49,11 @@ def new(template: str, file: Path | None) -> None:
 
 
 def _kit(file: Path) -> None:
-    from sbafab.design.kits import write_kit
-
     path = shlex.quote(str(write_kit(file)))
     click.echo(f'{path} written. Edit it, then: sbafab generate DESIGN --set kit="{path}"')
 
 
 def _coupon(folder: Path) -> None:
-    from sbafab.cutting.calibration import write_coupon
-    from sbafab.version import GENERATOR
-
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")
     path = shlex.quote(str(table))

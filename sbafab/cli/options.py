@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
+from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.design.files import key_paths, template_summaries
 from sbafab.design.pressure_units import KILOPASCALS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
-
-    from sbafab.cutting.properties import DxfProfile
 
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 
@@ -88,8 +88,6 @@ def by_chamber(
 
 def designs(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of templates, and files."""
-    from sbafab.design.files import template_summaries
-
     templates = [
         CompletionItem(name, help=summary)
         for name, summary in template_summaries().items()
@@ -104,6 +102,7 @@ designs_or_folders = designs
 
 def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of rules and checks."""
+    # Options need no rule; a shell asks for their names.
     from sbafab.rules.explained import EXPLAINED
 
     return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
@@ -126,8 +125,8 @@ def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> lis
 
 def _keys() -> dict[str, object]:
     """Return the keys of all families that hold a value, with their annotations."""
+    # `sbafab templates` has options too, and needs no family.
     from sbafab.actuators import records
-    from sbafab.design.files import key_paths
 
     keys: dict[str, object] = {}
     for record in records().values():
@@ -345,7 +344,6 @@ def dxf_options(command: Command) -> Command:
     def with_curves(dxf_profile: DxfProfile, chord_error: float | None, **parameters: Any) -> Any:
         if chord_error is not None and dxf_profile != "chords":
             raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
-        from sbafab.cutting.properties import Curves
 
         curves = Curves(dxf_profile)
         if chord_error is not None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sbafab.actuators import build, load_design
 from sbafab.cli.options import (
     PRESSURE,
     VOLUME,
@@ -18,11 +19,22 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
-from sbafab.errors import OutputError
+from sbafab.errors import DesignError, OutputError
+from sbafab.models.balloons import has_balloons
+from sbafab.models.drawn import model_form, near_discs
+from sbafab.models.paper import counterparts_of_pose
+from sbafab.models.stack import stack
+from sbafab.reports.inflated_picture import (
+    MOVING,
+    WHY,
+    Movement,
+    PictureRequest,
+    write_flat_picture,
+    write_picture,
+)
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
-    from sbafab.reports.inflated_picture import Movement, PictureRequest
 
 
 @click.command()
@@ -100,16 +112,6 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
     are replaced by discs of equal area. No model inflates oblong and other drawn pockets: these are
     drawn flat, to NAME-flat.png.
     """
-    from sbafab.actuators import load_design
-    from sbafab.errors import DesignError
-    from sbafab.models.balloons import has_balloons
-    from sbafab.models.drawn import model_form
-    from sbafab.reports.inflated_picture import (
-        MOVING,
-        WHY,
-        PictureRequest,
-    )
-
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")
     loaded = load_design(design, assignments)
@@ -138,20 +140,11 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
 
 
 def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
-    from sbafab.actuators import build
-    from sbafab.reports.inflated_picture import WHY, write_flat_picture
-
     write_flat_picture(build(design), path, wish.width, wish.height)
     print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}")
 
 
 def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
-    from sbafab.actuators import build
-    from sbafab.models.drawn import model_form, near_discs
-    from sbafab.models.paper import counterparts_of_pose
-    from sbafab.models.stack import stack
-    from sbafab.reports.inflated_picture import write_picture
-
     laminate = build(design)
     with shown_progress(False) as progress:
         pose = write_picture(
@@ -179,8 +172,6 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
 
 def _refuse_unused(suffix: str) -> None:
     """Raise UsageError for options that a file with this suffix does not use."""
-    from sbafab.reports.inflated_picture import MOVING
-
     if suffix not in MOVING:
         reason = f"is for an animation; give --to FILE{MOVING[0]}, or leave it out"
         refuse_options(reason, "motion")

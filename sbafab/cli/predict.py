@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.assemblies.build import assemble
+from sbafab.assemblies.files import load
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
     FLOW,
@@ -29,12 +31,20 @@ from sbafab.cli.printing import (
     wrapped,
 )
 from sbafab.cli.progress import shown_progress
+from sbafab.design.records import Design, Drawn
+from sbafab.errors import OutputError
+from sbafab.models.balloons import has_balloons
+from sbafab.models.drawn import model_form
+from sbafab.models.figures import LEFT_OUT, Factors, Figure, Model, Prediction, PredictionRequest
+from sbafab.models.formulas import size_phrases
+from sbafab.models.prediction import predict as predicted
+from sbafab.output.artefacts import prediction_json
+from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
+from sbafab.reports.assembly_prediction import AssemblyPrediction, as_json, predict_assembly
+from sbafab.runs.run import RunRequest, generate
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
-    from sbafab.design.records import Design
-    from sbafab.models.figures import Figure, Model, Prediction
-    from sbafab.reports.assembly_prediction import AssemblyPrediction
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa")
 """Options of the model of elastic balloons alone."""
@@ -113,15 +123,6 @@ def predict(
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
-    from sbafab.assemblies.files import load
-    from sbafab.design.records import Design
-    from sbafab.errors import OutputError
-    from sbafab.models.figures import Factors, PredictionRequest
-    from sbafab.models.formulas import size_phrases
-    from sbafab.models.prediction import predict as predicted
-    from sbafab.output.artefacts import prediction_json
-    from sbafab.runs.run import RunRequest, generate
-
     design = load(request.designs[0], request.assignments, request.waivers)
     if not isinstance(design, Design):
         _refuse_for_assembly(design, pressures)
@@ -166,10 +167,6 @@ def predict(
 
 def _refuse_for_design(design: Design) -> None:
     """Raise UsageError for an option that no model of the design uses."""
-    from sbafab.design.records import Drawn
-    from sbafab.models.balloons import has_balloons
-    from sbafab.models.drawn import model_form
-
     form = model_form(design)
     reason = f"and {design.name} has others; leave it out"
     refuse_options(f"is for an assembly, and {design.name} is one actuator; leave it out", "load_g")
@@ -196,10 +193,6 @@ def _refuse_for_assembly(assembly: Assembly, pressures: tuple[float, ...]) -> No
 def _predict_assembly(
     assembly: Assembly, request: Request, pressure_kpa: float, load_g: float
 ) -> None:
-    from sbafab.assemblies.build import assemble
-    from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
-    from sbafab.reports.assembly_prediction import as_json, predict_assembly
-
     prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
         print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **as_json(prediction)})
@@ -220,8 +213,6 @@ ALTERNATIVES_TITLE = "Alternative models: design with the figures above"
 
 def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
     """Print the main figures; ``verbose`` also all figures and the validity of their models."""
-    from sbafab.models.figures import LEFT_OUT
-
     width = console().width
     label = max((len(line.quantity) for line in prediction.verdict), default=0) + 2
     previous = ""

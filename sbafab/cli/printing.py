@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from sbafab.rules.finding import counted
+from sbafab.rules.finding import Finding, Verdict, counted, decisive
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from sbafab.output.checked import Checked
-    from sbafab.rules.finding import Finding, Verdict
 
 NO_BREAK = "\u00a0"
 """No-break space: `print_wrapped` keeps the words on both sides on one line."""
@@ -165,8 +164,6 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
     """Print a line for each rule's decisive finding; ``verbose``: for all, with their messages."""
     from rich.text import Text
 
-    from sbafab.rules.finding import decisive
-
     out = console()
     shown = findings if verbose else list(decisive(findings).values())
     wide = max((len(finding.rule) for finding in shown), default=0)
@@ -238,10 +235,12 @@ def _unit(finding: Finding) -> str:
 
 def _is_upper_limit(rule: str) -> bool:
     """Return True if the rule's limit is the largest permitted value."""
+    # What prints no findings loads neither rules nor numpy.
     from sbafab.rules.deck import AT_MOST, rule_names
 
     if rule in rule_names():
         return rule in AT_MOST
+    # A design has no checks between parts.
     from sbafab.assemblies.checks import AT_MOST as BETWEEN_PARTS
 
     return rule in BETWEEN_PARTS

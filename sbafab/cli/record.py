@@ -11,11 +11,13 @@ import click
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
 from sbafab.cli.printing import console, print_json, print_verdict
 from sbafab.output.schema_ids import RECORDS_SCHEMA, REPORT_SCHEMA
+from sbafab.results.recording import built_from, found_by, read_batch
+from sbafab.results.recording import record as record_results
+from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
+from sbafab.results.report import Comparison, Promise, Report, report
+from sbafab.results.store import Lab
 
 if TYPE_CHECKING:
-    from sbafab.results.records import Build, LabResult, Record
-    from sbafab.results.report import Comparison, Promise, Report
-    from sbafab.results.store import Lab
     from sbafab.rules.registration_yield import Share
 
 
@@ -108,10 +110,6 @@ def record(
     sbafab record 3dof-15mm --table batch.csv
     sbafab record --report
     """  # noqa: D301 (click reads the backspace as a mark)
-    from sbafab.results.recording import found_by
-    from sbafab.results.report import report
-    from sbafab.results.store import Lab
-
     store = Lab(lab)
     _one_task(design, values)
     if values["report"]:
@@ -147,8 +145,6 @@ def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
 
 
 def _result(values: Mapping[str, Any]) -> LabResult:
-    from sbafab.results.records import ERRORS, NUMBERS, LabResult
-
     options = {name.replace("-", "_"): value for name, value in values.items()}
     return LabResult(
         serial=values["serial"],
@@ -180,10 +176,6 @@ def _add_records(
     store: Lab, source: str, assignments: tuple[str, ...], values: Mapping[str, Any]
 ) -> list[Any]:
     """Load the design that was built, read the results and store both."""
-    from sbafab.results.recording import built_from, read_batch
-    from sbafab.results.recording import record as record_results
-    from sbafab.results.records import checked
-
     if values["table"] is not None:
         results = read_batch(values["table"])
     else:

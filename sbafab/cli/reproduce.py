@@ -9,6 +9,7 @@ import click
 
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
+from sbafab.reproduction import page
 
 if TYPE_CHECKING:
     from sbafab.reproduction.rows import Row
@@ -25,8 +26,6 @@ def reproduce(out: Path, as_json: bool) -> None:
     OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for each predicted
     figure of the paper, with its error bars.
     """
-    from sbafab.reproduction import page
-
     sections = page.reproduce(out / FOLDER)
     if as_json:
         print_json({**page.as_json(sections), "folder": str(out / FOLDER)})

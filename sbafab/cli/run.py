@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import Request
 from sbafab.cli.printing import (
@@ -20,13 +21,15 @@ from sbafab.cli.printing import (
     print_passed,
 )
 from sbafab.cli.progress import shown_progress
+from sbafab.cutting.properties import TRUE_ARCS, Curves
+from sbafab.output.schema_ids import RUN_SCHEMA
+from sbafab.pressing.cycles import batch_times, design_runs
+from sbafab.runs.run import Conforming, Run, RunRequest, generate
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from sbafab.cutting.properties import Curves
     from sbafab.output.checked import RunPart
-    from sbafab.runs.run import Conforming, Run, RunRequest
 
 
 def run_parts(
@@ -36,10 +39,6 @@ def run_parts(
     conforming: Conforming | None = None,
 ) -> None:
     """Load a design, generate ``parts`` of it and exit with 1 if a rule failed."""
-    from sbafab.actuators import load_design
-    from sbafab.cutting.properties import TRUE_ARCS
-    from sbafab.runs.run import RunRequest
-
     design = load_design(request.designs[0], request.assignments, request.waivers)
     run_request(
         RunRequest(design, request.out, parts, curves or TRUE_ARCS, conforming=conforming), request
@@ -50,8 +49,6 @@ def run_request(
     wanted: RunRequest, request: Request, show: Callable[[Run], None] | None = None
 ) -> None:
     """Write a folder, print its table (by ``show``) and exit with 1 if a rule failed."""
-    from sbafab.runs.run import generate
-
     with shown_progress(request.as_json) as progress:
         run = generate(wanted, progress)
     for name, reason in run.left_out:
@@ -132,8 +129,6 @@ def print_run_verdict(run: Run, change: str) -> None:
 
 def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
     """Yield label and text of each row of a design's run."""
-    from sbafab.pressing.cycles import batch_times, design_runs
-
     index = run.manifest
     lam = run.laminate
     counts: dict[str, int] = {}
@@ -255,8 +250,6 @@ def film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
 
 def run_json(run: Run) -> dict[str, object]:
     """Return a run as JSON."""
-    from sbafab.output.schema_ids import RUN_SCHEMA
-
     return {
         "schema": RUN_SCHEMA,
         "folder": str(run.folder),

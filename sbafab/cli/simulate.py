@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
     LENGTH,
@@ -20,20 +21,19 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
 from sbafab.cli.progress import shown_progress
+from sbafab.models.paper import BURST
+from sbafab.output.checked import checks
+from sbafab.runs.run import result_json
+from sbafab.runs.run import simulate as run
+from sbafab.simulators.simulator import NAMES, Name, Result, SimulationRequest, users
+from sbafab.simulators.simulator import simulator as simulator_module
 
-if TYPE_CHECKING:
-    from sbafab.simulators.simulator import Name, Result, SimulationRequest
-
-SIMULATORS = ("calculix", "sofa", "mujoco")
-"""As in ``sbafab.simulators.simulator``, whose imports would slow ``--help`` down."""
 MOST_MINUTES = 10_000
 
 
 @click.command()
 @run_options
-@click.option(
-    "--with", "simulator", type=click.Choice(SIMULATORS), required=True, help="Simulator."
-)
+@click.option("--with", "simulator", type=click.Choice(NAMES), required=True, help="Simulator.")
 @click.option(
     "--pressure",
     type=PRESSURE.read,
@@ -101,13 +101,6 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     the run. result.json holds the results over time. If a run stops early, its results are kept
     and the exit code is 1.
     """
-    from sbafab.actuators import load_design
-    from sbafab.models.paper import BURST
-    from sbafab.output.checked import checks
-    from sbafab.runs.run import result_json
-    from sbafab.runs.run import simulate as run
-    from sbafab.simulators.simulator import SimulationRequest
-
     wish = SimulationRequest(**settings)
     _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
@@ -138,9 +131,6 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
 
 def _refuse_unused(simulator: Name, wish: SimulationRequest) -> None:
     """Raise UsageError for an option that the simulator does not use."""
-    from sbafab.simulators.simulator import simulator as simulator_module
-    from sbafab.simulators.simulator import users
-
     for name in wish.specific_fields:
         if name not in simulator_module(simulator).USES:
             option = "volume" if name == "volumes" else name

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from sbafab.cli.printing import print_verdict
+from sbafab.studio.without_server import write
 
 
 @click.command()
@@ -55,6 +56,7 @@ def studio(
         return
     if pyodide is not None:
         raise click.UsageError("--pyodide goes with --static FOLDER")
+    # The server comes with the extra "studio"; the page that --static writes does without it.
     from sbafab.studio.app import serve
 
     def announce(link: str) -> None:
@@ -69,8 +71,6 @@ def studio(
 
 
 def _write(folder: Path, pyodide: Path | None) -> None:
-    from sbafab.studio.without_server import write
-
     page = write(folder, pyodide)
     for name in page.lacks:
         click.echo(

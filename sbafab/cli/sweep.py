@@ -6,10 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sbafab.actuators import load_design
 from sbafab.cli.exit import print_error
 from sbafab.cli.options import PRESSURE, Request, finite, run_options
 from sbafab.cli.printing import print_json, print_verdict
 from sbafab.cli.progress import shown_progress
+from sbafab.models.figures import PredictionRequest
+from sbafab.models.formulas import force
+from sbafab.output.schema_ids import SWEEP_SCHEMA
+from sbafab.search import sweep as search
+from sbafab.search.vary import read_varied
 
 if TYPE_CHECKING:
     from sbafab.search.sweep import SweepRequest, SweptDesigns
@@ -78,12 +84,6 @@ def sweep(
     each design, times.csv, and the page sweep.html. Run the same command again to resume a sweep
     that was stopped.
     """
-    from sbafab.actuators import load_design
-    from sbafab.models.figures import PredictionRequest
-    from sbafab.models.formulas import force
-    from sbafab.search import sweep as search
-    from sbafab.search.vary import read_varied
-
     design = load_design(request.designs[0], request.assignments, request.waivers)
     kpa = pressures or PredictionRequest.pressures_kpa
     force(kpa, 0.0)  # raises for pressures out of range
@@ -105,8 +105,6 @@ def sweep(
 
 
 def _as_json(designs: SweptDesigns) -> dict[str, object]:
-    from sbafab.output.schema_ids import SWEEP_SCHEMA
-
     return {
         "schema": SWEEP_SCHEMA,
         "folder": str(designs.folder),

@@ -6,14 +6,13 @@ import click
 
 from sbafab.cli.options import json_option
 from sbafab.cli.printing import print_json
+from sbafab.design.files import template_summaries
 
 
 @click.command()
 @json_option
 def templates(as_json: bool) -> None:
     """List the templates, a line each."""
-    from sbafab.design.files import template_summaries
-
     summaries = template_summaries()
     if as_json:
         print_json([{"name": name, "summary": summary} for name, summary in summaries.items()])

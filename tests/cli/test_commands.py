@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sbafab.cli import COMMANDS, main
+from sbafab.cli import COMMANDS, SUMMARIES, main
 
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
@@ -22,6 +22,11 @@ def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]
     code, out, _ = run([command, "--help"], capsys)
     assert code == 0
     assert "Usage: sbafab" in out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_list_of_commands_quotes_their_help(command: str) -> None:
+    assert SUMMARIES[command] == COMMANDS[command].get_short_help_str(200)
 
 
 CUT_ONE = ["cut", "1dof-5mm", "--set", "bore.diameter=1"]

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from sbafab.cli import NAMES
+from sbafab.cli import SUMMARIES
 
 HEAVY = {
     "PIL",
@@ -41,19 +41,18 @@ def modules_after(*arguments: str) -> set[str]:
     return set(run.stdout.split())
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["generate", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["generat"]])
 def test_help_loads_neither_geometry_nor_pydantic(arguments: list[str]) -> None:
     loaded = modules_after(*arguments)
-    assert ("sbafab.cli.generate" in loaded) == ("--version" not in arguments)
     assert not loaded & (HEAVY | {"pydantic"})
     assert not {name for name in loaded if name.startswith("sbafab.geometry")}
 
 
 def test_a_command_loads_no_other_command() -> None:
     loaded = modules_after("templates")
-    others = {f"sbafab.cli.{name}" for name in NAMES if name != "templates"}
+    others = {f"sbafab.cli.{name}" for name in SUMMARIES if name != "templates"}
+    assert "sbafab.cli.templates" in loaded
     assert not loaded & others
-    assert others < modules_after("--help")
 
 
 def test_listing_the_templates_loads_no_heavy_library() -> None:

@@ -12,16 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 from sbafab.cli import app
-from sbafab.cli.simulate import SIMULATORS
 from sbafab.errors import DesignError
 from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures, simulator
 from tests.site.formats import hold
 
 CHAMBERS = ("chamber1", "chamber2")
-
-
-def test_the_command_knows_the_simulators() -> None:
-    assert SIMULATORS == NAMES
 
 
 def test_every_simulator_names_fields_of_a_wish() -> None:

@@ -11,7 +11,6 @@ import pytest
 import sbafab
 from sbafab.cli import formats, main
 from sbafab.cli.formats import schema_of
-from sbafab.cli.schema import FORMATS
 from sbafab.output.artefacts import prediction_json
 from tests.site.formats import hold
 
@@ -30,10 +29,6 @@ def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[
     assert schema == schema_of(name)
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["$id"] == f"urn:{formats.FORMATS[name].identity.replace('/', ':')}"
-
-
-def test_the_command_offers_every_schema() -> None:
-    assert tuple(formats.FORMATS) == FORMATS
 
 
 def test_files_of_a_folder_are_of_their_schemas(tmp_path: Path) -> None:
