@@ -167,6 +167,27 @@ class BalloonMap:
             polynomials[..., 1, :, :] *= fall
         return polynomials
 
+    def volume_slopes(self, pressure: ArrayLike, sucked: bool = False) -> Array:
+        """Polynomials by height of dV/dp = -d2W/dp2 at pressures: (..., pieces, powers).
+
+        ``sucked`` as for ``pressed``. Raises DesignError for a pressure outside the map.
+        """
+        below = np.asarray(pressure, dtype=float)
+        if below.min() < 0:
+            volumes = self.pressed(below, sucked)[..., 1, :, :]
+            rest = self.volume_slopes(np.maximum(below, 0.0))
+            return np.where((below < 0)[..., None, None], volumes / COLLAPSE_SUCTION, rest)
+        p = below
+        x, rate = self._scaled(p)
+        first = x.astype(np.int_)
+        powers = (x - first)[..., None] ** POWERS
+        weights = np.zeros_like(powers)
+        bend = rate * p / (p * p + P0 * P0)
+        weights[..., 1:] = powers[..., :-1] * POWERS[1:] * bend[..., None]
+        weights[..., 2:] -= powers[..., :-2] * POWERS[2:] * POWERS[1:-1] * (rate * rate)[..., None]
+        slopes = weights[..., None, :] @ self._polynomials[first]
+        return np.asarray(slopes.reshape(*p.shape, PIECES_IN_ALL, DEGREE + 1))
+
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
         each = PRESSURE_SPANS / math.asinh(self.most_pressure / P0)

@@ -28,6 +28,7 @@ from sbafab.laminate.laminate import film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.balloons import balloons_of
+from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.pneumatics import Line
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
@@ -60,6 +61,10 @@ GRIP = 0.15
 """Radius, as a share of its pocket's, of the disc by which plates hold a lone balloon."""
 PRESSURE_SHARES = (1.0, 0.5, 0.2, 0.1)
 """Shares of the highest pressure, tried one after the other."""
+
+
+NO_LOAD: dict[str, Any] = {"tip_load": (0.0, 0.0, 0.0), "gravity": False, "plate": None}
+"""Defaults of the arguments of ``Stack.load``."""
 
 
 @dataclass(frozen=True)
@@ -277,6 +282,20 @@ class Stack:
             self.each(springs), self.pitch, load, start, near is not None
         )
         return self.pose_at(pressures, springs, freedoms, None, push / 1000, stable)
+
+    def derivatives(self, pressures: Sequence[float], **load: Any) -> Derivatives:
+        """Return the equilibrium pose at pressures (kPa, one a chamber) with its derivatives;
+        ``load`` are keyword arguments of ``pose`` beside pressures.
+
+        Raises DesignError as ``pose`` does, and for a pose that is about to buckle.
+        """
+        pose = self.pose(pressures, **load)
+        acting = self.load(*(load.get(name, value) for name, value in NO_LOAD.items()))
+        return derivatives(self, pose, acting, load.get("sucked", False))
+
+    def stiffness(self, pressures: Sequence[float], **load: Any) -> Array:
+        """Return the ``stiffness`` (6, 6) of the tip, as of ``derivatives``."""
+        return self.derivatives(pressures, **load).stiffness
 
     def start_freedoms(self, pressures: Sequence[float]) -> Array:
         """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the

@@ -275,6 +275,17 @@ class Springs:
             matrix += stiffer
         return value, gradient, matrix
 
+    def slopes(self, freedoms: Array) -> tuple[Array, Array]:
+        """Return by each freedom the potential of each balloon in mN (or mN mm), without contacts,
+        and its volume in ul: (rows, chambers, 3) each.
+        """
+        begins, ring = self.places.begins, self.places.ring
+        gaps = (ring @ freedoms[..., None])[..., 0]
+        both = begins + np.array([[[0]], [[self.table.shape[2] // 2]]])
+        rates = horner(self.table[:, 1], both, gaps)[..., None] * ring
+        rates = rates.reshape(*rates.shape[:2], -1, RING_POINTS, 3).sum(-2)
+        return rates[0], rates[1]
+
     def contents(self, freedoms: Array) -> tuple[Array, Array]:
         """Return ul in each balloon (rows, chambers), and the potential of each row."""
         begins, ring = self.places.begins, self.places.ring
@@ -456,9 +467,8 @@ class LoadedEnergy(NamedTuple):
     """Energy of a stack under a load with its gradient (freedoms).
 
     ``spring_gradient`` (levels, 3) and ``blocks`` (levels, 3, 3) are first and second derivatives
-    of the springs; ``motions`` (levels, 3, 6) of the plates beyond each level by its freedoms,
-    ``works`` (levels, 3, 6, 4) those with the forces on them; ``touch`` the contact with an outer
-    plate.
+    of the springs; ``motions`` (levels, 3, 6) of the ``plates`` beyond each level by its freedoms,
+    ``works`` (levels, 3, 6, 4) those with the forces ``acting`` on them.
     """
 
     value: float
@@ -467,7 +477,13 @@ class LoadedEnergy(NamedTuple):
     blocks: Array
     motions: Array
     works: Array
-    touch: PlateContact | None
+    plates: Chain
+    acting: ExternalForces
+
+    @property
+    def touch(self) -> PlateContact | None:
+        """Contact with an outer plate."""
+        return self.acting.touch
 
     @property
     def push(self) -> float:
@@ -522,7 +538,7 @@ def loaded_energy(
     works = motions @ force_motions(acting.arms, acting.forces)
     gradient = (spring_gradient - works[..., 3]).ravel()
     energy = float(value.sum()) + acting.energy
-    return LoadedEnergy(energy, gradient, spring_gradient, blocks, motions, works, acting.touch)
+    return LoadedEnergy(energy, gradient, spring_gradient, blocks, motions, works, plates, acting)
 
 
 @lru_cache(maxsize=16)
