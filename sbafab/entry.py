@@ -25,6 +25,7 @@ def main() -> None:
         # An ignored signal (nohup) stays ignored.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, stop_at_once)
+        # Guarded: Ctrl-C while they are loaded ends the process as it does later.
         from sbafab.process import prepare
 
         prepare()

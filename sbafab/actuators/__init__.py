@@ -22,6 +22,7 @@ from sbafab.design.files import (
     read_toml,
     suggest_from_user_folder,
 )
+from sbafab.design.outline import understood
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
@@ -131,7 +132,6 @@ def build(design: Design) -> Laminate:
         laminate = replace(laminate, notes=(room, *laminate.notes))
     if design.drawing is None:
         return laminate
-    from sbafab.design.outline import understood
 
     note = understood(design.drawing).description
     return replace(laminate, notes=(note, *laminate.notes))

@@ -21,6 +21,7 @@ from sbafab.actuators.ears import (
     with_tails,
 )
 from sbafab.design.files import listed, shown
+from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Free
 from sbafab.design.sections import Bore as BoreSection
 from sbafab.design.sections import Chamber as ChamberSection
@@ -294,7 +295,6 @@ def drawn_pocket(design: Design) -> Region | None:
     """Return the drawn pocket, or None. Raises DesignError if it cannot be read."""
     if design.drawing is None:
         return None
-    from sbafab.design.outline import read_outline
 
     return read_outline(design.drawing)
 

@@ -47,6 +47,7 @@ from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
 from sbafab.design.identity import design_sha256
+from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
@@ -355,7 +356,6 @@ def _drawn_in_chords(design: Design) -> bool:
     """Return True if the user's outline has chords in place of arcs."""
     if design.drawing is None:
         return False
-    from sbafab.design.outline import read_outline
 
     try:
         return chords_for_arc(read_outline(design.drawing)) is not None

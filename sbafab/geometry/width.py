@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from sbafab.geometry.cache import cached, stored
 from sbafab.geometry.contour import Contour, run_sweep
+from sbafab.geometry.edge_table import SideTable
 from sbafab.geometry.edges import (
     Arc,
     Bounds,
@@ -27,9 +28,6 @@ from sbafab.geometry.edges import (
 from sbafab.geometry.nearby import ALONGSIDE, BoundarySide, EdgeIndex, Foot, widened
 from sbafab.geometry.offset import Kerf, Lost, widths
 from sbafab.geometry.region import Region
-
-if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import SideTable
 
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
@@ -115,7 +113,6 @@ class Boundary:
     def table(self) -> SideTable:
         """The sides in arrays."""
         # A page without a server measures widths before it has loaded numpy.
-        from sbafab.geometry.edge_table import SideTable
 
         if self._table is None:
             self._table = SideTable(self.sides)

@@ -107,6 +107,7 @@ class DesignFolder:
     @cached_property
     def solid_png(self) -> bytes:
         """The picture of the solid, which the traveller shows as well."""
+        # `check` draws no picture.
         from sbafab.reports.solid_png import solid_png
 
         return solid_png(self.marked)
@@ -224,6 +225,7 @@ def _press_csv(folder: DesignFolder) -> str:
 
 
 def _underlay(folder: DesignFolder) -> bytes | None:
+    # Only a folder with a traveller has an underlay.
     from sbafab.reports.underlay import underlay_pdf
 
     places = design_runs(folder.design, folder.laminate).places
@@ -240,6 +242,7 @@ def _write_meshes(folder: DesignFolder) -> None:
     folder.meshes += write_meshes(folder.laminate, folder.path, progress=progress)
     conforming = folder.plan.conforming
     if conforming is not None:
+        # Conforming meshes take the extra "mesh".
         from sbafab.meshing.conforming.meshes import write_conforming
 
         progress = partial(folder.progress, "conforming meshes")
@@ -247,6 +250,7 @@ def _write_meshes(folder: DesignFolder) -> None:
 
 
 def _layers_svg(folder: DesignFolder) -> str:
+    # `check` and `cut` draw no layers.
     from sbafab.reports.layers_svg import layers_svg
 
     picture = layers_svg(folder.marked)
@@ -255,6 +259,7 @@ def _layers_svg(folder: DesignFolder) -> str:
 
 
 def _stack_svg(folder: DesignFolder) -> str:
+    # `check` and `cut` draw no section.
     from sbafab.reports.stack_svg import stack_svg
 
     picture = stack_svg(folder.marked)
@@ -292,6 +297,7 @@ def _predict_json(folder: DesignFolder) -> str:
 
 
 def _write_plots(folder: DesignFolder) -> None:
+    # Charts are for designs with a prediction.
     from sbafab.reports.charts import relation_svg
 
     assert folder.plan.prediction is not None
@@ -324,6 +330,7 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
 
 
 def _traveller(folder: DesignFolder) -> str:
+    # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.page import traveller_html
 
     order, solid = folder.design.order, folder.solid_png
@@ -335,6 +342,7 @@ def _traveller(folder: DesignFolder) -> str:
 
 def order_of(checked: Checked, folder: str = "") -> Job:
     """Return what a traveller says of the order of a design whose files lie in ``folder``."""
+    # `check` and `cut` have no traveller.
     from sbafab.reports.traveller.job import Job
     from sbafab.reports.underlay import NAME as UNDERLAY
     from sbafab.reports.underlay import guides
@@ -357,6 +365,7 @@ def findings_page(
     name: str, sha256: str, designs: Sequence[Checked], between: Sequence[Finding]
 ) -> str:
     """Return the designer's page: of every design, and of the checks ``between`` its parts."""
+    # The page of findings shares its pictures with the traveller.
     from sbafab.reports.traveller.findings import Inspected, findings_html
 
     inspected = [

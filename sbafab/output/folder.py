@@ -108,6 +108,7 @@ def _write_assembly(
     progress: Progress,
 ) -> dict[str, Any]:
     """Write what an assembly's folder holds beside its designs; return its manifest."""
+    # A design has no picture of an assembly.
     from sbafab.reports.assembly_png import assembly_pngs
 
     job = plan.job
@@ -177,6 +178,7 @@ def _claims(assembled: Assembled) -> dict[str, Any]:
 def _traveller(
     plan: Plan, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
 ) -> str:
+    # Nor has it the pages of an assembly, whose modules take 0.1 s to load.
     from sbafab.reports.traveller.assembly_page import AssemblyJob, DesignWork, assembly_html
     from sbafab.reports.traveller.job import Work
 

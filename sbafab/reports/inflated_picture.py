@@ -9,12 +9,24 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from sbafab.assemblies.shapes import linear
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.formats.glb import Node, write_glb, write_scene
+from sbafab.meshing.solid import solid
 from sbafab.meshing.surface import Surface
 from sbafab.models.paper import counterparts_of_pose
-from sbafab.reports.canvas import AMBIENT, Buffer, View, rasterize
+from sbafab.reports.canvas import (
+    AMBIENT,
+    BAR_INK,
+    Buffer,
+    View,
+    draw_length_bar,
+    rasterize,
+    view_of,
+)
 from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
+from sbafab.reports.solid_png import solid_png
 
 if TYPE_CHECKING:
     import numpy as np
@@ -197,8 +209,6 @@ def _images(
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Image]:
     """All poses seen from one place at one scale."""
-    from sbafab.reports.canvas import view_of
-
     width, height = wish.width, wish.height
     box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
     every = [part.surface for _, parts in shown for part in parts]
@@ -243,8 +253,6 @@ def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
 def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
     from PIL import ImageDraw, ImageFont
 
-    from sbafab.reports.canvas import BAR_INK, draw_length_bar
-
     width, height = image.size
     size = max(11, round(height / 40))
     font = ImageFont.load_default(size)
@@ -256,9 +264,6 @@ def _write(image: Image, caption: Sequence[str], pixels_per_mm: float) -> None:
 
 
 def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
-    from sbafab.assemblies.shapes import linear
-    from sbafab.meshing.formats.glb import Node, write_scene
-
     most = max(pose.pressures)
     write_scene(
         [Node(p.name, p.surface, "TPE", linear(_colour(p, pose, most))) for p in parts], path
@@ -283,14 +288,9 @@ def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) 
             "flat, and sbafab simulate inflates it"
         )
     if ending == ".png":
-        from sbafab.reports.solid_png import solid_png
-
         captioned = replace(laminate, notes=(WHY,))
         path.write_bytes(solid_png(captioned, width, height))
     elif ending == ".glb":
-        from sbafab.meshing.formats.glb import write_glb
-        from sbafab.meshing.solid import solid
-
         write_glb(solid(laminate), path, laminate.bonded_materials)
     else:
         raise DesignError(f"{path.name} must end in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}")

@@ -211,7 +211,7 @@ def _plan(
     (design,) = designs
     design = replace(design, prediction=request.prediction, simulated=request.simulated)
     if request.conforming is not None and "mesh" in parts:
-        # Takes the extra "mesh".
+        # Conforming meshes take the extra "mesh".
         from sbafab.meshing.conforming.meshes import conforming_meshes
 
         progress("meshing", 0, 1)

@@ -15,7 +15,7 @@ import threading
 from typing import IO, Any
 
 from sbafab.process import prepare
-from sbafab.search.measure import fingerprint
+from sbafab.search.measure import fingerprint, measured
 
 
 def main() -> None:
@@ -47,8 +47,6 @@ def _answer(job: dict[str, Any]) -> dict[str, Any]:
         return {"outcome": "unlike", "reason": fingerprint()}
     began = time.perf_counter()
     try:
-        from sbafab.search.measure import measured
-
         row = measured(**job)
     except Exception as error:
         message = " ".join(str(error).split())

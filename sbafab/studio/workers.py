@@ -281,6 +281,7 @@ def _sender(pipe: Connection, number: int) -> Any:
 
 def _warm_up() -> None:
     """Import everything and check one small design, so that the first answer is quick."""
+    # As in `serve`: in the worker alone.
     from sbafab.studio.jobs import design_keys
 
     with contextlib.suppress(SbafabError):

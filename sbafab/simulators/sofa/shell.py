@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
+from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
+from sbafab.meshing.conforming.mesh import Mesh, volumes
 from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.rounds import elastic_of
 from sbafab.simulators.coarse.shell import (
@@ -30,9 +33,6 @@ from sbafab.simulators.coarse.shell import (
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from sbafab.meshing.conforming.layup import Layup
-    from sbafab.meshing.conforming.mesh import Mesh
 
 Reading = Literal["tip", "crowns"]
 """What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""
@@ -162,10 +162,6 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
     The mouths of inlets are open and free. Raises DesignError where a chamber is unknown, a
     film's modulus is not known, or the mesher is not installed.
     """
-    from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
-    from sbafab.meshing.conforming.layup import MeshSettings, flat, layup, narrowest_ring
-    from sbafab.meshing.conforming.mesh import volumes
-
     names = tuple(chamber.name for chamber in laminate.chambers)
     kilopascals = checked(names, pressures, PRESSURE, "pressure", "kPa")
     for layer in laminate.tpe_layers:

@@ -1,0 +1,98 @@
+"""The program from Python: a function for each command.
+
+>>> import sbafab
+>>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
+>>> run = sbafab.generate("3dof-15mm", out="out")
+
+A design is given as a template's name, a TOML file, or a ``Design``. Keys are changed by texts,
+``"stack.balloons=6"``, by dicts, ``{"stack.balloons": 6}``, or by keywords, ``stack={"balloons":
+6}``. Bad input raises ``sbafab.errors.DesignError``, a folder that cannot be written
+``OutputError``, each with one sentence.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sbafab.api.checks import check, check_folder, checking
+    from sbafab.api.designs import (
+        Source,
+        assemble,
+        build,
+        dimensions,
+        drawing,
+        load,
+        loads,
+        resolved,
+        schema,
+        solid,
+        template,
+        templates,
+    )
+    from sbafab.api.lab import kerf, record, report
+    from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
+    from sbafab.api.runs import cut, generate, mesh, nest, press, simulate
+    from sbafab.api.search import find, sweep
+
+__all__ = [
+    "Source",
+    "assemble",
+    "build",
+    "check",
+    "check_folder",
+    "checking",
+    "cut",
+    "dimensions",
+    "drawing",
+    "find",
+    "generate",
+    "grip",
+    "kerf",
+    "load",
+    "loads",
+    "mesh",
+    "motion",
+    "nest",
+    "predict",
+    "predict_assembly",
+    "press",
+    "record",
+    "report",
+    "resolved",
+    "schema",
+    "simulate",
+    "solid",
+    "stack",
+    "sweep",
+    "template",
+    "templates",
+]
+
+MODULES = {
+    "checks": ("check", "check_folder", "checking"),
+    "lab": ("kerf", "record", "report"),
+    "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
+    "runs": ("cut", "generate", "mesh", "nest", "press", "simulate"),
+    "search": ("find", "sweep"),
+}
+"""The functions by their module, which is loaded when first asked for one of them; ``designs`` has
+the rest.
+
+So a script that builds laminates loads no model, and a page that runs Python in a browser may lack
+numpy.
+"""
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def __getattr__(name: str) -> Any:
+    """Return a function from the module that has it."""
+    if name not in __all__:
+        raise AttributeError(f"module 'sbafab.api' has no attribute '{name}'")
+    home = next((module for module, names in MODULES.items() if name in names), "designs")
+    value = globals()[name] = getattr(import_module(f"sbafab.api.{home}"), name)
+    return value

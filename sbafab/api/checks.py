@@ -1,0 +1,63 @@
+"""The rule deck on designs, assemblies and folders."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from sbafab.api.designs import Source, build, either_of, load
+from sbafab.assemblies.records import Assembly
+from sbafab.design.files import Change
+from sbafab.laminate.laminate import Laminate
+from sbafab.output.checked import limits
+from sbafab.process import Progress
+from sbafab.rules.deck import RULES, run_rule
+from sbafab.rules.finding import Findings
+from sbafab.rules.measures import Measures
+
+
+def check(
+    source: Source | Assembly,
+    *changes: Change,
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Findings:
+    """Check a design with the rule deck; an assembly also between its parts.
+
+    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is told
+    each rule; what it raises ends the check. Raises DesignError for what cannot be built. Limits
+    are the paper's (Sec. 2) where it gives one, else ours.
+    """
+    # A job takes models, hence numpy; a page without numpy has the rules of a design.
+    from sbafab.output.job import check_job
+
+    return Findings(check_job(either_of(source, changes, tables), progress=progress).findings)
+
+
+def checking(
+    source: Source, laminate: Laminate | None = None, pause: Callable[[], None] | None = None
+) -> Iterator[tuple[str, Findings]]:
+    """Yield every rule's name and its findings in a design, as they are measured.
+
+    Iteration may stop at any rule; registration-yield, which draws builds, comes last.
+    ``laminate`` is the design's, where it is built already; ``pause`` is called between parts of
+    long rules, and what it raises ends the deck. Raises DesignError.
+    """
+    design = load(source)
+    measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
+    for rule in RULES:
+        findings = run_rule(rule, measures.laminate, measures.limits, measures)
+        yield rule.name, Findings(findings)
+
+
+def check_folder(folder: str | Path) -> Findings:
+    """Check the cut files of an output folder as they lie on disk with the rule deck.
+
+    Also whether the folder is what its ``design.toml`` makes (findings ``manifest-claims``,
+    ``as-designed``, ``file-integrity``). Raises OutputError where none can be read there.
+    """
+    # Reading a folder back takes longer to load than the rules.
+    from sbafab.runs.check_folder import check_folder as read_and_check
+
+    return Findings(read_and_check(Path(folder)))

@@ -1,0 +1,63 @@
+"""Measurements of a lab: the kerf of its laser, results of its actuators."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from sbafab.api.designs import Source
+from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
+from sbafab.design.files import Change
+from sbafab.results import recording
+from sbafab.results.records import Record
+from sbafab.results.report import Report
+from sbafab.results.report import report as report_of
+from sbafab.results.store import Lab
+
+
+def kerf(
+    measurements: str | Path, resolution: float | None = None, instrument: str = ""
+) -> Calibration:
+    """The kerf in mm from a filled ``coupon.csv``, over all and along x and y.
+
+    ``instrument`` is "calliper", "scanner" or "microscope" where the table has no column of that
+    name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
+    constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
+    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for a table
+    that can be read in two ways, for a slip in it, and for what no beam cuts.
+    """
+    return calibrated(read_measurements(Path(measurements), instrument), resolution)
+
+
+def record(
+    source: Source,
+    *changes: Change,
+    lab: str | Path = "lab.sqlite",
+    table: str | Path | None = None,
+    again: bool = False,
+    **values: Any,
+) -> list[Record]:
+    """Record results of a design or an assembly in the lab's file; return the records added.
+
+    ``values`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
+    what was measured: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
+    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``; beside tables of the
+    design. A ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of
+    actuators that were mended and tested again. Raises DesignError, OutputError.
+    """
+    results_by_name = {
+        name: value for name, value in values.items() if name in recording.RESULT_NAMES
+    }
+    tables = {name: value for name, value in values.items() if name not in recording.RESULT_NAMES}
+    results = recording.results_of(results_by_name, table)
+    built = recording.built_from(source, [*changes, tables] if tables else changes)
+    return recording.record(Lab(Path(lab)), built, results, again)
+
+
+def report(lab: str | Path = "lab.sqlite") -> Report:
+    """Evaluate all records of a lab's file: success, figures, tolerances.
+
+    Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
+    OutputError where the file cannot be read.
+    """
+    return report_of(*Lab(Path(lab)).contents())

@@ -1,0 +1,125 @@
+"""Predictions by models, of designs and assemblies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.api.designs import Source, assemble, load, parted
+from sbafab.assemblies.build import Assembled, PlacedSba
+from sbafab.assemblies.records import Assembly
+from sbafab.design.files import Change
+from sbafab.errors import DesignError
+from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.surface import Surface
+from sbafab.models.figures import Factors, Prediction, PredictionRequest
+from sbafab.models.pneumatics import FLUIDS, Line
+from sbafab.models.prediction import predict as predict_design
+from sbafab.models.stack import Motion, Stack
+from sbafab.models.stack import stack as stack_of
+from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip
+from sbafab.reports.assembly_prediction import grip as grip_of
+from sbafab.reports.assembly_prediction import predict_assembly as predict_assembled
+from sbafab.reports.inflated import gripping
+
+
+def predict(
+    source: Source,
+    *changes: Change,
+    pressures_kpa: Sequence[float] = (10.0, 100.0),
+    flow_ml_min: float = 35.0,
+    volumes_ul: Sequence[float] = (),
+    quick: bool = False,
+    laminate: Laminate | None = None,
+    **options: Any,
+) -> Prediction:
+    """Predict what a design will do; each figure has a unit and names its model and its trust.
+
+    Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
+    with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
+    elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
+    ``options`` holds fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss``
+    mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what is out of every
+    model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
+    in balance.
+    """
+    factors, tables = parted(options, Factors)
+    wish = PredictionRequest(
+        tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors)
+    )
+    return predict_design(load(source, *changes, **tables), wish, laminate, quick)
+
+
+def predict_assembly(
+    source: str | Path | Assembly | Assembled,
+    *changes: Change,
+    pressure_kpa: float = 10.0,
+    load_g: float = 1.2,
+    pause: Callable[[], None] | None = None,
+    **tables: Any,
+) -> AssemblyPrediction:
+    """Predict the inflated parts of an assembly: reach, load, grip, and what they then touch.
+
+    All actuators are at ``pressure_kpa``, and ``load_g`` g hangs across their tips; the paper's
+    marble by default (Sec. 5). ``pause`` is called between parts of the work, which takes seconds;
+    what it raises ends it. Raises DesignError for pressures that the models do not reach.
+    """
+    assembled = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
+    return predict_assembled(assembled, pressure_kpa, load_g, pause or (lambda: None))
+
+
+def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
+    """Return the grip of a radial part of an assembly and its inflated balloons; None for others.
+
+    The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
+    one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
+    DesignError where the assembly has no such part.
+    """
+    names = [placed.name for placed in assembled.parts]
+    if part not in names:
+        raise DesignError(f"no part is named {part!r}; there are {', '.join(names)}")
+    placed = assembled[part]
+    outcome = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
+    if outcome is None or not isinstance(placed, PlacedSba):
+        return None
+    free = (outcome.free - outcome.deflated) / 2 / placed.made.laminate.balloons
+    return outcome, gripping(placed, outcome.room or free)
+
+
+def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **options: Any) -> Stack:
+    """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
+
+    ``most_pressure`` kPa is the most that it may be asked for; ``options`` holds fields of
+    ``Factors`` beside tables of the design. Raises DesignError for pockets that are not round.
+    Balloons lengthen and tilt and carry no shear (paper, Sec. 4.4).
+    """
+    factors, tables = parted(options, Factors)
+    design = load(source, *changes, **tables)
+    return stack_of(design, most_pressure=most_pressure, factors=Factors(**factors))
+
+
+def motion(
+    stack: Stack,
+    length: float = 150.0,
+    diameter: float = 0.635,
+    *,
+    fluid: str = "air",
+    dead_volume: float = 0.0,
+    delay: float = 0.0,
+    pressures: Sequence[float] | None = None,
+    **load: Any,
+) -> Motion:
+    """A stack that is fed through tubes, to call ``motion.step(dt, pressures=...)`` with pressures
+    (kPa) at the valves, or ``motion.step(dt, flows=...)`` with flows (ul/s) of the pumps.
+
+    ``length`` and inner ``diameter`` of each chamber's tube are mm (the default is the paper's
+    tube, Sec. 2); ``fluid`` is air or water; ``dead_volume`` are ul between pump and tube
+    (syringe, valve, fittings), ``delay`` s until they act; ``pressures`` (kPa, by default 0) are
+    those to begin with; ``load`` is what ``stack.pose`` takes beside pressures. Flow is laminar
+    (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
+    """
+    if fluid not in FLUIDS:
+        raise DesignError(f'fluid = "{fluid}" must be one of {", ".join(sorted(FLUIDS))}')
+    line = Line(FLUIDS[fluid], length, diameter, dead_volume, delay)
+    return stack.motion(pressures, line, **load)

@@ -1,0 +1,110 @@
+"""Files of a design: everything, or one part of it; simulators that read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.api.designs import Source, either_of, load, parted
+from sbafab.assemblies.records import Assembly
+from sbafab.cutting.properties import Curves, DxfProfile
+from sbafab.design.files import Change
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.process import Progress
+from sbafab.runs.run import Conforming, Run, RunRequest, Simulated
+from sbafab.runs.run import generate as run
+from sbafab.runs.run import simulate as run_simulator
+from sbafab.simulators.simulator import Name, SimulationRequest
+
+
+def generate(
+    source: Source | Assembly,
+    *changes: Change,
+    out: str | Path = "out",
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Run:
+    """Writes everything into ``out/<name>/``; the run tells whether a rule failed.
+
+    ``progress`` is told what is done; what it raises ends the run, with the old folder whole.
+    Raises DesignError, OutputError where the folder cannot be written or is another design's, and
+    DefectError where what was written is not what was checked.
+    """
+    return run(RunRequest(either_of(source, changes, tables), Path(out)), progress)
+
+
+def cut(
+    source: Source,
+    *changes: Change,
+    out: str | Path = "out",
+    dxf_profile: DxfProfile = "bulges",
+    chord_error: float = 0.005,
+    progress: Progress | None = None,
+    **tables: Any,
+) -> Run:
+    """Writes the cut files and film sheets, DXF R2010 in mm.
+
+    ``dxf_profile`` is "bulges", "arcs" (LINE, ARC, CIRCLE) or "chords"; ``chord_error`` mm counts
+    for the last. ``progress`` is told what is done, as in ``generate``. Raises DesignError,
+    OutputError and DefectError.
+    """
+    design = load(source, *changes, **tables)
+    curves = Curves(dxf_profile, chord_error)
+    return run(RunRequest(design, Path(out), ("cut",), curves), progress)
+
+
+def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
+    """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
+
+    The steps are the paper's (Sec. 2). Raises DesignError where temperature, pad or pins do not
+    suit the laminate, and OutputError.
+    """
+    return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)))
+
+
+def mesh(
+    source: Source,
+    *changes: Change,
+    out: str | Path = "out",
+    formats: Sequence[str] = ("vtu",),
+    **options: Any,
+) -> Run:
+    """Writes solid, cavities and conforming meshes; the latter stand in the run's ``conforming``.
+
+    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``options`` holds
+    fields of ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``, beside tables of the
+    design. Takes the extra "mesh". Raises DesignError and OutputError.
+    """
+    settings, tables = parted(options, MeshSettings)
+    conforming = Conforming(MeshSettings(**settings), tuple(formats))
+    design = load(source, *changes, **tables)
+    return run(RunRequest(design, Path(out), ("mesh",), conforming=conforming))
+
+
+def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Run:
+    """Writes several designs into ``out/<name>/``, cut from the same film sheets.
+
+    Their films, sheets and kerf must be alike. Raises DesignError, OutputError and DefectError.
+    """
+    return run(RunRequest([load(source) for source in sources], Path(out), name=name))
+
+
+def simulate(
+    source: Source,
+    *changes: Change,
+    simulator: Name,
+    out: str | Path = "out",
+    export: bool = False,
+    **options: Any,
+) -> Simulated:
+    """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
+
+    ``simulator`` is "calculix", "sofa" or "mujoco". ``options`` holds fields of ``Wish``, such as
+    ``pressure`` kPa, ``chambers`` kPa by name and ``minutes``, beside tables of the design.
+    ``export`` writes what it reads and runs nothing. Raises DesignError for what it cannot do, and
+    OutputError.
+    """
+    wish, tables = parted(options, SimulationRequest)
+    design = load(source, *changes, **tables)
+    return run_simulator(design, simulator, SimulationRequest(**wish), Path(out), export=export)

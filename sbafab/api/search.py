@@ -1,0 +1,58 @@
+"""Designs found or swept by their predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.api.designs import Source, load, parted
+from sbafab.design.files import Change
+from sbafab.search.find import FindRequest, FoundDesign
+from sbafab.search.find import find as run_find
+from sbafab.search.sweep import SweepRequest, SweptDesigns
+from sbafab.search.sweep import sweep as run_sweep
+from sbafab.search.trial import read_all
+from sbafab.search.vary import read_varied
+
+
+def find(
+    source: Source,
+    *changes: Change,
+    least: Mapping[str, float] | None = None,
+    most: Mapping[str, float] | None = None,
+    best: str = "mass",
+    **options: Any,
+) -> FoundDesign:
+    """The design that meets requirements and is best in one thing, or the nearest miss.
+
+    ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
+    20})``: ``least`` and ``most`` are in mm, N, g and kPa. ``options`` holds fields of
+    ``FindRequest``, such as ``tries``, beside tables of the design; ``found.best.values`` are the
+    found keys. Raises DesignError for a quantity that it does not know, with those it does.
+    """
+    settings, tables = parted(options, FindRequest)
+    at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
+    at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
+    requirements, goal = read_all(at_least, at_most, best)
+    return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def sweep(
+    source: Source,
+    *changes: Change,
+    vary: Sequence[str],
+    out: str | Path = "out",
+    **options: Any,
+) -> SweptDesigns:
+    """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
+
+    ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` (mm) and
+    ``"stack.balloons=3,6,9"``. ``options`` holds fields of ``SweepRequest``, such as ``samples``,
+    ``pressures_kpa``, ``workers`` and ``dask``, beside tables of the design. Raises DesignError for
+    a key that is not there, and OutputError.
+    """
+    settings, tables = parted(options, SweepRequest)
+    design = load(source, *changes, **tables)
+    varied = tuple(read_varied(text) for text in vary)
+    return run_sweep(SweepRequest(design, varied, **settings), Path(out))
