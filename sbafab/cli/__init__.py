@@ -34,7 +34,7 @@ SUMMARIES = {
     "sweep": "Check and predict variants of a design.",
     "find": "Find the best design that meets requirements.",
     "record": "Record the results of builds, and report on them.",
-    "reproduce": "Compare predictions with the paper's measurements.",
+    "reproduce": "Compare predictions with measurements.",
     "studio": "Edit a design in the browser.",
     "schema": "Print a JSON schema, by default that of design files.",
 }

@@ -285,6 +285,33 @@ def _reproduction() -> dict[str, Any]:
     return and_perhaps(found, folder=TEXT)
 
 
+def _comparison() -> dict[str, Any]:
+    ends = {"type": ["array", "null"], "items": number(), "minItems": 2, "maxItems": 2}
+    point = table(
+        x=number("null"),
+        measured=number(),
+        error={**number("null"), "description": "standard error"},
+        model={**ends, "description": "least and largest over the assumptions"},
+        deviation={**ends, "description": "model minus measured"},
+        interval=ends,
+        within={"type": ["boolean", "null"]},
+    )
+    curve = table(
+        **dict.fromkeys(("source", "curve", "quantity", "unit", "place", "x_name"), TEXT),
+        comparable=YES,
+        reason=TEXT,
+        unknown=array(TEXT),
+        model=TEXT,
+        assumptions=array(TEXT),
+        no_model=TEXT,
+        points=array(point),
+    )
+    source = table(id=TEXT, citation=TEXT, doi=TEXT, missing=array(TEXT))
+    return table(
+        schema={"const": ids.COMPARISON_SCHEMA}, sources=array(source), curves=array(curve)
+    )
+
+
 def _design() -> dict[str, Any]:
     schema = actuators.schema(Assembly)
     return {key: value for key, value in schema.items() if key != "$schema"}
@@ -523,6 +550,9 @@ FORMATS: Mapping[str, Format] = {
         ids.REPRODUCTION_SCHEMA,
         "`reproduction.json`, and what `reproduce --json` prints",
         _reproduction,
+    ),
+    "comparison": Format(
+        ids.COMPARISON_SCHEMA, "what `reproduce SOURCE --json` prints", _comparison
     ),
     "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
     "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),

@@ -1,4 +1,4 @@
-"""``sbafab reproduce``: measured values of the paper beside predictions."""
+"""``sbafab reproduce``: measured values of the paper, of others and of a lab beside predictions."""
 
 from __future__ import annotations
 
@@ -9,23 +9,40 @@ import click
 
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
+from sbafab.evidence.files import load_evidence, shipped_evidence
 from sbafab.reproduction import page
+from sbafab.reproduction.comparison import as_json as as_document
+from sbafab.reproduction.comparison import compare, table_lines
+from sbafab.results.evidence import from_lab_records
+from sbafab.results.store import Lab
 
 if TYPE_CHECKING:
+    from sbafab.evidence.records import Evidence
     from sbafab.reproduction.rows import Row
 
 FOLDER = "reproduction"
+ALL = "all"
+RECORDS = (".sqlite", ".db")
+"""Endings of a lab's build records."""
 
 
 @click.command()
+@click.argument("source", required=False)
 @out_option
 @json_option
-def reproduce(out: Path, as_json: bool) -> None:
-    """Compare predictions with the paper's measurements.
+def reproduce(source: str | None, out: Path, as_json: bool) -> None:
+    """Compare predictions with measurements.
 
-    OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for each predicted
-    figure of the paper, with its error bars.
+    Without SOURCE: OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for
+    each predicted figure of the paper, with its error bars.
+
+    SOURCE is evidence that ships (paper, pneudots, ...), "all" of it, a file of your own (.toml or
+    .csv), or the lab's build records (.sqlite): its curves are printed beside the models, and
+    nothing is written. A range of a model spans what the source leaves open.
     """
+    if source is not None:
+        _print_comparison(source, as_json)
+        return
     sections = page.reproduce(out / FOLDER)
     if as_json:
         print_json({**page.as_json(sections), "folder": str(out / FOLDER)})
@@ -40,6 +57,34 @@ def reproduce(out: Path, as_json: bool) -> None:
         f"\nPaper reproduced: {predicted} of {len(rows)} values predicted. Written to "
         f"{out / FOLDER}: reproduction.md, reproduction.json, charts"
     )
+
+
+def _print_comparison(source: str, as_json: bool) -> None:
+    evidences = _evidences(source)
+    curves = [curve for evidence in evidences for curve in compare(evidence)]
+    if as_json:
+        print_json(as_document(evidences, curves))
+        return
+    for evidence in evidences:
+        click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
+        for line in table_lines([curve for curve in curves if curve.source == evidence.id]):
+            click.echo(line)
+        for sentence in evidence.missing:
+            click.echo(f"Not had: {sentence}")
+        click.echo()
+    points = [point for curve in curves for point in curve.points]
+    predicted = sum(point.model is not None for point in points)
+    print_verdict(
+        f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
+    )
+
+
+def _evidences(source: str) -> tuple[Evidence, ...]:
+    if source == ALL:
+        return shipped_evidence()
+    if Path(source).suffix.lower() in RECORDS:
+        return (from_lab_records(Lab(Path(source))),)
+    return (load_evidence(source),)
 
 
 def _measured(row: Row) -> str:

@@ -44,6 +44,9 @@ class _SetupTable(Section):
     tube_mm: float | None = Field(default=None, ge=0, le=1e5)
     tube_bore_mm: float | None = Field(default=None, gt=0, le=100)
     pressure_kpa: float | None = Field(default=None, ge=0, le=1e4)
+    height_share: float | None = Field(default=None, ge=0, le=1)
+    stroke_mm: float | None = Field(default=None, ge=0, le=1e4)
+    bend_deg: float | None = Field(default=None, ge=0, le=360)
     chambers: int | None = Field(default=None, ge=0, le=100)
     tip: Literal["free", "held", "bent", "pushed", ""] = ""
     note: str = Field(default="", max_length=400)
@@ -233,6 +236,9 @@ COLUMNS = (
     "tube_mm",
     "tube_bore_mm",
     "pressure_kpa",
+    "height_share",
+    "stroke_mm",
+    "bend_deg",
     "chambers",
     "tip",
     "note",
@@ -243,7 +249,10 @@ COLUMNS = (
 """Columns of a lab's table; only quantity and y are needed. ``unknown`` parts its sentences by "|".
 """
 OF_A_VALUE = ("x", "y", "error")
-NUMBERS = ("flow_ml_min", "tube_mm", "tube_bore_mm", "pressure_kpa")
+NUMBERS = (
+    *("flow_ml_min", "tube_mm", "tube_bore_mm"),
+    *("pressure_kpa", "height_share", "stroke_mm", "bend_deg"),
+)
 COUNTS = ("runs", "chambers")
 CHOICES: dict[str, tuple[str, ...]] = {
     "fluid": ("air", "water"),
@@ -439,6 +448,7 @@ def evidence_csv(curves: Sequence[MeasuredCurve]) -> str:
 
 def _cells_to_write(curve: MeasuredCurve) -> dict[str, Any]:
     setup, error = curve.setup, curve.error
+    texts = ("supply", "fluid", "chambers", "tip", "note")
     return {
         "curve": curve.id,
         "quantity": curve.quantity,
@@ -449,15 +459,7 @@ def _cells_to_write(curve: MeasuredCurve) -> dict[str, Any]:
         "kind": error.kind,
         "runs": error.runs,
         "error_source": error.source,
-        "supply": setup.supply,
-        "fluid": setup.fluid,
-        "flow_ml_min": setup.flow_ml_min,
-        "tube_mm": setup.tube_mm,
-        "tube_bore_mm": setup.tube_bore_mm,
-        "pressure_kpa": setup.pressure_kpa,
-        "chambers": setup.chambers,
-        "tip": setup.tip,
-        "note": setup.note,
+        **{key: getattr(setup, key) for key in (*texts, *NUMBERS)},
         "comparable": "yes" if curve.comparable else "no",
         "reason": curve.reason,
         "unknown": " | ".join(curve.unknown),

@@ -24,6 +24,7 @@ AXES = {
     "pressure_kpa": "kPa",
     "volume_ul": "ul",
     "height_share": "",
+    "stroke_mm": "mm",
     "bend_deg": "deg",
     NO_AXIS: "",
 }
@@ -31,7 +32,7 @@ AXES = {
 counts it; ``volume_ul`` of ``balloon_stroke_mm`` is that of one balloon, else of all chambers."""
 QUANTITIES = {
     "force_n": CurveQuantity(
-        "N", "blocked force", ("height_share", "bend_deg", "pressure_kpa", NO_AXIS)
+        "N", "blocked force", ("height_share", "stroke_mm", "bend_deg", "pressure_kpa", NO_AXIS)
     ),
     "stroke_mm": CurveQuantity("mm", "free stroke", ("pressure_kpa", "volume_ul", NO_AXIS)),
     "balloon_stroke_mm": CurveQuantity(
@@ -100,8 +101,9 @@ class Setup:
     """The set-up of a measurement; None and "" are what the source does not say.
 
     ``supply`` feeds ``fluid`` ("air" or "water") at ``flow_ml_min`` through a tube of ``tube_mm``
-    length and ``tube_bore_mm`` bore; ``pressure_kpa`` is held where pressure is no axis.
-    ``chambers`` are pressurised, the others empty. ``tip`` is one of TIPS.
+    length and ``tube_bore_mm`` bore. ``chambers`` are pressurised, the others empty. ``tip`` is one
+    of TIPS; it is held at ``height_share`` or ``stroke_mm``, or bent by ``bend_deg``. What is an
+    axis of the curve, as ``pressure_kpa`` may be, is empty here.
     """
 
     supply: str = ""
@@ -110,6 +112,9 @@ class Setup:
     tube_mm: float | None = None
     tube_bore_mm: float | None = None
     pressure_kpa: float | None = None
+    height_share: float | None = None
+    stroke_mm: float | None = None
+    bend_deg: float | None = None
     chambers: int | None = None
     tip: str = ""
     note: str = ""

@@ -403,7 +403,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "time to 10 kPa, air, 2.5 l/min",
         paper.AIR_TIME,
-        _air_time(whole),
+        air_time(whole, paper.AIR_FLOW, paper.FULL_KPA, Line(AIR)),
         f"{STACK} in time, 150 mm of tube, 10 kPa in the chambers",
         "likely valve and pump, which take their time to open and to rise; " + AVERAGED,
     )
@@ -419,15 +419,19 @@ def _pressure_at(whole: Stack, height: float) -> float:
     return high
 
 
-def _air_time(whole: Stack) -> float:
-    """Seconds at the paper's flow of air until the chambers have 10 kPa."""
-    moving = whole.motion(line=Line(AIR))
-    flow = paper.AIR_FLOW * 1000 / 60 / whole.chambers
-    step, before = 0.002, 0.0
-    while moving.pressures[0] < paper.FULL_KPA:
+def air_time(
+    whole: Stack, flow_ml_min: float, until: float, line: Line, step: float = 0.002
+) -> float:
+    """Return the seconds of air at a flow, shared by all chambers, until they have a pressure in
+    kPa, by steps of so many s.
+    """
+    moving = whole.motion(line=line)
+    flow = flow_ml_min * 1000 / 60 / whole.chambers
+    before = 0.0
+    while moving.pressures[0] < until:
         before = moving.pressures[0]
         moving.step(step, flows=(flow,) * whole.chambers)
-    over = (moving.pressures[0] - paper.FULL_KPA) / (moving.pressures[0] - before)
+    over = (moving.pressures[0] - until) / (moving.pressures[0] - before)
     return moving.time - step * over
 
 

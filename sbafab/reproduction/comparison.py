@@ -1,0 +1,209 @@
+"""Measured curves beside the models, point by point, as values and as lines of a table."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sbafab.evidence.records import Evidence, MeasuredCurve
+from sbafab.models.figures import Factors
+from sbafab.output.schema_ids import COMPARISON_SCHEMA
+from sbafab.reproduction.model_values import NoModel, model_values
+
+Ends = tuple[float, float]
+"""Least and largest value."""
+Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
+"""Intervals of a prediction at the points of a curve; None where there are none."""
+WIDTH = 100
+
+
+@dataclass(frozen=True)
+class ComparedPoint:
+    """A measured value beside the models' range over what its source leaves open.
+
+    ``error`` is the measured value's standard error. ``model`` is None where no model has a value;
+    ``interval`` is that of the prediction, None where it has none.
+    """
+
+    x: float | None
+    measured: float
+    error: float | None
+    model: Ends | None
+    interval: Ends | None
+
+    @property
+    def deviation(self) -> Ends | None:
+        """Least and largest of model minus measured."""
+        if self.model is None:
+            return None
+        return self.model[0] - self.measured, self.model[1] - self.measured
+
+    @property
+    def is_within(self) -> bool | None:
+        """True if the measured value lies in the interval; None without one."""
+        if self.interval is None:
+            return None
+        return self.interval[0] <= self.measured <= self.interval[1]
+
+
+@dataclass(frozen=True)
+class ComparedCurve:
+    """A measured curve with its points; ``assumptions`` are those of the model's range, and
+    ``reason`` says why there is no model.
+    """
+
+    source: str
+    curve: MeasuredCurve
+    points: tuple[ComparedPoint, ...]
+    model: str
+    assumptions: tuple[str, ...]
+    reason: str
+
+
+def compare(
+    evidence: Evidence, factors: Factors | None = None, intervals: Intervals | None = None
+) -> list[ComparedCurve]:
+    """Return the curves of a source beside the models with a calibration's factors."""
+    return [_compared(evidence.id, curve, factors, intervals) for curve in evidence.curves]
+
+
+def _compared(
+    source: str, curve: MeasuredCurve, factors: Factors | None, intervals: Intervals | None
+) -> ComparedCurve:
+    count = len(curve.y)
+    answer = model_values(curve, factors)
+    has_model = not isinstance(answer, NoModel)
+    ranges = [None] * count if isinstance(answer, NoModel) else answer.ranges()
+    of_prediction = intervals(curve) if intervals and has_model else None
+    points = [
+        ComparedPoint(point.x, point.y, point.error, model, interval)
+        for point, model, interval in zip(
+            curve.points(), ranges, of_prediction or [None] * count, strict=True
+        )
+    ]
+    if isinstance(answer, NoModel):
+        return ComparedCurve(source, curve, tuple(points), "", (), answer.reason)
+    return ComparedCurve(
+        source, curve, tuple(points), answer.model, tuple(filter(None, answer.series)), ""
+    )
+
+
+# The table.
+
+
+HEADER = ("curve", "x", "measured", "model", "deviation", "within interval")
+COLUMN = "{:<8}{:>12}{:>20}{:>22}{:>18}  {}"
+
+
+def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
+    """Yield the lines of the table, and below it what there is to say of its curves."""
+    yield COLUMN.format(*HEADER)
+    for compared in curves:
+        curve = compared.curve
+        yield f"{curve.id}: {curve.y_name} [{curve.y_unit or '-'}], {curve.place}"
+        for point in compared.points:
+            yield COLUMN.format(
+                "",
+                _axis(compared, point),
+                _measured(point),
+                _span(point.model) or "-",
+                _deviation(point),
+                {None: "-", True: "yes", False: "no"}[point.is_within],
+            ).rstrip()
+        yield from _remarks(compared)
+
+
+def _axis(compared: ComparedCurve, point: ComparedPoint) -> str:
+    return "" if point.x is None else f"{point.x:g} {compared.curve.x_unit}".rstrip()
+
+
+def _measured(point: ComparedPoint) -> str:
+    return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
+
+
+def _span(ends: Ends | None, sign: str = "") -> str:
+    if ends is None:
+        return ""
+    low, high = (f"{end:{sign}.4g}" for end in ends)
+    return low if low == high else f"{low} to {high}"
+
+
+def _deviation(point: ComparedPoint) -> str:
+    if point.deviation is None:
+        return "-"
+    if point.measured == 0:
+        return _span(point.deviation, "+")
+    low, high = (f"{end / point.measured:+.0%}" for end in point.deviation)
+    return low if low == high else f"{low} to {high}"
+
+
+def _remarks(compared: ComparedCurve) -> Iterator[str]:
+    if compared.reason:
+        reason = compared.reason
+        yield from _wrapped(f"{reason[:1].upper()}{reason[1:]}.")
+    if compared.assumptions:
+        yield from _wrapped(f"Not stated, so assumed: {'; '.join(compared.assumptions)}.")
+    if not compared.curve.comparable:
+        yield from _wrapped(f"Not comparable: {compared.curve.reason}")
+
+
+def _wrapped(text: str) -> list[str]:
+    indent = "    "
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
+
+
+def as_json(evidences: Sequence[Evidence], curves: Sequence[ComparedCurve]) -> dict[str, Any]:
+    """Return the comparison for programs."""
+    return {
+        "schema": COMPARISON_SCHEMA,
+        "sources": [
+            {
+                "id": evidence.id,
+                "citation": evidence.citation,
+                "doi": evidence.doi,
+                "missing": list(evidence.missing),
+            }
+            for evidence in evidences
+        ],
+        "curves": [_curve_as_json(compared) for compared in curves],
+    }
+
+
+def _curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
+    curve = compared.curve
+    return {
+        "source": compared.source,
+        "curve": curve.id,
+        "quantity": curve.quantity,
+        "unit": curve.y_unit,
+        "place": curve.place,
+        "x_name": curve.x_name,
+        "comparable": curve.comparable,
+        "reason": curve.reason,
+        "unknown": list(curve.unknown),
+        "model": compared.model,
+        "assumptions": list(compared.assumptions),
+        "no_model": compared.reason,
+        "points": [
+            {
+                "x": point.x,
+                "measured": point.measured,
+                "error": _rounded(point.error),
+                "model": _ends(point.model),
+                "deviation": _ends(point.deviation),
+                "interval": _ends(point.interval),
+                "within": point.is_within,
+            }
+            for point in compared.points
+        ],
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.7g}")
+
+
+def _ends(ends: Ends | None) -> list[float] | None:
+    return None if ends is None else [float(f"{end:.7g}") for end in ends]

@@ -1,0 +1,468 @@
+"""Values of the models at the points of a measured curve, or why there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sbafab.actuators import build, load_design, records
+from sbafab.design.files import toml_tables
+from sbafab.design.records import Design, validated
+from sbafab.errors import DesignError
+from sbafab.evidence.records import MeasuredActuator, MeasuredCurve
+from sbafab.laminate.laminate import Laminate
+from sbafab.models import elastic, paper
+from sbafab.models.balloon import Balloon
+from sbafab.models.balloons import balloons_of
+from sbafab.models.figures import Factors, Figure, PredictionRequest
+from sbafab.models.formulas import burst_pressure, modulus
+from sbafab.models.kinematics import Actuator, actuator
+from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
+from sbafab.models.prediction import predict
+from sbafab.models.rippled import free_shapes
+from sbafab.models.stack import Plate, Pose, Stack, stack
+from sbafab.reproduction.rows import air_time
+
+ModelValue = float | None
+"""A value of a model; None where the model has no such state."""
+SAMPLES = 16
+LEAST_FREE_KPA, FIRST_KPA, MOST_FREE_KPA = 0.002, 0.5, 20.0
+"""Pressures between which a single balloon is inflated, and the first end of its range."""
+NO_TUBE = 1e-3
+"""Length in mm of a tube that takes no pressure."""
+STEPS = 40
+"""Steps of time in which air fills an actuator."""
+
+
+@dataclass(frozen=True)
+class ModelValues:
+    """Values of a model at a curve's points, in its unit.
+
+    ``series`` has one value a point for each assumption on what the source does not say, by a
+    phrase that names it; the phrase is "" where nothing is assumed.
+    """
+
+    model: str
+    series: Mapping[str, tuple[ModelValue, ...]]
+
+    def ranges(self) -> list[tuple[float, float] | None]:
+        """Return the least and largest value of the assumptions at each point; None where no
+        assumption has one.
+        """
+        ends: list[tuple[float, float] | None] = []
+        for values in zip(*self.series.values(), strict=True):
+            known = [value for value in values if value is not None]
+            ends.append((min(known), max(known)) if known else None)
+        return ends
+
+
+class NoModel(NamedTuple):
+    """The reason why no model has values of a curve."""
+
+    reason: str
+
+
+def model_values(curve: MeasuredCurve, factors: Factors | None = None) -> ModelValues | NoModel:
+    """Return the values of the models at a curve's points, or why there are none.
+
+    ``factors`` are those of a calibration; by default there are none. What the curve's set-up
+    leaves open is assumed in every way that counts, a series each.
+    """
+    answer = ANSWERS.get(curve.quantity)
+    if answer is None:
+        return NoModel(WITHOUT_MODEL[curve.quantity])
+    if not curve.actuator.is_described:
+        return NoModel("no design describes the actuator")
+    try:
+        return answer(ModelledActuator(curve.actuator, factors or Factors()), curve)
+    except DesignError as error:
+        return NoModel(str(error))
+
+
+WITHOUT_MODEL = {
+    "loss_mj": "no model: the film loses no energy in any of them",
+    "geometric_kpa": "no model: the elastic ones stretch at every pressure",
+    "success_share": "no model: leaks and over-melting are not in any of them",
+    "build_time_h": "no model: the schedule's minutes are the paper's",
+    "cutting_error_mm": "no model: it is an input",
+    "pin_error_mm": "no model: it is an input",
+    "density_kg_m3": "no model: it is an input",
+}
+"""Why a quantity has no model."""
+
+
+@dataclass(frozen=True)
+class ModelledActuator:
+    """The actuator of a curve as the models take it; parts are built when first asked for."""
+
+    measured: MeasuredActuator
+    factors: Factors
+
+    @cached_property
+    def design(self) -> Design:
+        """The design. Raises DesignError."""
+        if self.measured.toml:
+            tables = toml_tables(self.measured.toml, "the record's design")
+            # All that its kit gave stands in the record.
+            tables.pop("kit", None)
+            return validated(tables, records(), Path())
+        return load_design(self.measured.design, [self.measured.changes])
+
+    @cached_property
+    def laminate(self) -> Laminate:
+        """The laminate. Raises DesignError."""
+        return build(self.design)
+
+    @cached_property
+    def actuator(self) -> Actuator:
+        """The actuator of the geometric models. Raises DesignError."""
+        return actuator(self.design, self.laminate, self.factors)
+
+    @cached_property
+    def stack(self) -> Stack:
+        """The elastic stack. Raises DesignError for pockets that are not round."""
+        return stack(self.design, self.laminate, factors=self.factors)
+
+    @cached_property
+    def name(self) -> str:
+        """The name of the elastic stack with its factors."""
+        return elastic.calibrated(elastic.FORCE, self.factors).name
+
+    def figure(self, name: str, pressures: tuple[float, ...] = (), quick: bool = True) -> Figure:
+        """Return the prediction's figure of a name. Raises DesignError where it has none."""
+        request = PredictionRequest(pressures or (100.0,), calibration=self.factors)
+        prediction = predict(self.design, request, self.laminate, quick)
+        for figure in prediction.figures:
+            if figure.name == name:
+                return figure
+        raise DesignError(
+            next((item.reason for item in prediction.left_out if item.name == name), f"no {name}")
+        )
+
+
+def _by_pressure(
+    curve: MeasuredCurve, value: Callable[[float], ModelValue]
+) -> tuple[str, tuple[ModelValue, ...]]:
+    """Return a value at each pressure of a curve, and what is assumed of the pressure: that of
+    full actuation, where neither axis nor set-up gives one.
+    """
+    if curve.x_name == "pressure_kpa":
+        return "", tuple(map(value, curve.x))
+    given = curve.setup.pressure_kpa
+    pressure = paper.FULL_KPA if given is None else given
+    assumed = f"{pressure:g} kPa in the chambers" if given is None else ""
+    return assumed, (value(pressure),) * len(curve.y)
+
+
+def _phrase(*parts: str) -> str:
+    return ", ".join(filter(None, parts))
+
+
+# Forces.
+
+
+def _forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    if curve.x_name == "bend_deg" or curve.setup.bend_deg is not None:
+        return _bent_forces(of, curve)
+    states = _blocked_states(of, curve)
+    if isinstance(states, NoModel):
+        return states
+    series = {}
+    for phrase, strokes in states.items():
+        values = []
+        for stroke, pressure in zip(strokes, _pressures(curve), strict=True):
+            one_chamber = float(elastic.blocked_force(of.stack, pressure, stroke))
+            values.append(_pushing(of, curve) * one_chamber)
+        series[phrase] = tuple(values)
+    return ModelValues(of.name, series)
+
+
+def _pushing(of: ModelledActuator, curve: MeasuredCurve) -> int:
+    """Return how many chambers push on a level plate."""
+    return curve.setup.chambers or of.actuator.form.pushing
+
+
+def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
+    """Return a pressure in kPa for each value of a force. Raises DesignError."""
+    if curve.x_name == "pressure_kpa":
+        return curve.x
+    if curve.setup.pressure_kpa is None:
+        raise DesignError("the set-up names no pressure")
+    return (curve.setup.pressure_kpa,) * len(curve.y)
+
+
+def _blocked_states(
+    of: ModelledActuator, curve: MeasuredCurve
+) -> dict[str, tuple[float, ...]] | NoModel:
+    """Return the strokes in mm at which a force was measured, by assumption on the full stroke."""
+    count = len(curve.y)
+    if curve.x_name == "stroke_mm":
+        return {"": curve.x}
+    if curve.x_name == "height_share":
+        return _shares(of, curve.x)
+    if curve.setup.stroke_mm is not None:
+        return {"": (curve.setup.stroke_mm,) * count}
+    if curve.setup.height_share is not None:
+        return _shares(of, (curve.setup.height_share,) * count)
+    return NoModel("the set-up names no height at which the tip is held")
+
+
+def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+    if not any(shares):
+        return {"": shares}
+    full = of.stack.pose((paper.FULL_KPA,) * of.stack.chambers).height - of.stack.flat_height
+    states = {f"full stroke at {paper.FULL_KPA:g} kPa": tuple(share * full for share in shares)}
+    if of.actuator.knows_full:
+        strokes = tuple(elastic.stroke_at(of.actuator, share) for share in shares)
+        states["full height as in Sec. 4.6"] = strokes
+    return states
+
+
+def _bent_forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    counts = _chamber_counts(of, curve)
+    if not counts:
+        return NoModel("one chamber does not bend")
+    given = curve.setup.bend_deg
+    angles = curve.x if curve.x_name == "bend_deg" else (given or 0.0,) * len(curve.y)
+    pairs = list(zip(angles, _pressures(curve), strict=True))
+    return ModelValues(
+        of.name,
+        {
+            _chambers(count, counts): tuple(_bent_force(of.stack, count, *pair) for pair in pairs)
+            for count in counts
+        },
+    )
+
+
+def _bent_force(whole: Stack, chambers: int, angle: float, pressure: float) -> ModelValue:
+    """Return N on a plate square to the tip at an angle; None where it does not bend so far."""
+    pose = elastic.pose_bent_by(whole, chambers, angle)
+    if pose is None or pose.pressures[0] > pressure:
+        return None
+    x, y, z = pose.tip.tolist()
+    across, aside, along = pose.frames[1][-1][:, 2].tolist()
+    plate = Plate((x, y, z), (across, aside, along))
+    return whole.pose(_filled(whole, chambers, pressure), plate=plate, near=pose).force
+
+
+def _filled(whole: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
+    return (pressure,) * chambers + (0.0,) * (whole.chambers - chambers)
+
+
+def _chamber_counts(of: ModelledActuator, curve: MeasuredCurve) -> list[int]:
+    """Return how many chambers may have been pressurised for a bend."""
+    given = curve.setup.chambers
+    return list(range(1, of.stack.chambers)) if given is None else [given]
+
+
+def _chambers(count: int, counts: list[int]) -> str:
+    """Return the assumption that so many chambers are pressurised; "" where the source says so."""
+    return elastic.chamber_count(count) if len(counts) > 1 else ""
+
+
+# Strokes, heights and bends.
+
+
+def _strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    flat = of.stack.flat_height if curve.quantity == "stroke_mm" else 0.0
+    return _risen(of, curve, lambda pose: pose.height - flat)
+
+
+def _bends(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    return _risen(of, curve, lambda pose: pose.bend)
+
+
+def _risen(
+    of: ModelledActuator, curve: MeasuredCurve, value: Callable[[Pose], float]
+) -> ModelValues | NoModel:
+    """Return values of the free stack's pose at the curve's pressures or volumes."""
+    whole = of.stack
+    counts = [curve.setup.chambers or whole.chambers]
+    if curve.quantity == "bend_deg":
+        counts = _chamber_counts(of, curve)
+    if not counts:
+        return NoModel("one chamber does not bend")
+    series = {}
+    for count in counts:
+        assumed, values = "", tuple[ModelValue, ...]()
+        if curve.x_name == "volume_ul":
+            poses = (_pose_with(whole, count, volume) for volume in curve.x)
+            values = tuple(None if pose is None else value(pose) for pose in poses)
+        else:
+            assumed, values = _by_pressure(curve, _at_pressure(whole, count, value))
+        series[_phrase(_chambers(count, counts), assumed)] = values
+    return ModelValues(of.name, series)
+
+
+def _at_pressure(
+    whole: Stack, chambers: int, value: Callable[[Pose], float]
+) -> Callable[[float], ModelValue]:
+    return lambda pressure: value(whole.pose(_filled(whole, chambers, pressure)))
+
+
+def _pose_with(whole: Stack, chambers: int, volume: float) -> Pose | None:
+    """Return the free pose whose chambers took in so many ul in all; None beyond the stack's
+    pressures.
+    """
+    empty = float(whole.pose((0.0,) * whole.chambers).volumes[:chambers].sum())
+    low, high = 0.0, whole.most_pressure
+    pose = whole.pose(_filled(whole, chambers, high))
+    if float(pose.volumes[:chambers].sum()) - empty < volume:
+        return None
+    for _ in range(40):
+        middle = (low + high) / 2
+        pose = whole.pose(_filled(whole, chambers, middle))
+        is_low = float(pose.volumes[:chambers].sum()) - empty < volume
+        low, high = (middle, high) if is_low else (low, middle)
+    return pose
+
+
+def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    kinds = set(balloons_of(of.design, of.laminate, of.factors))
+    if len(kinds) > 1:
+        return NoModel("its balloons are of unlike size")
+    (balloon,) = kinds
+    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
+    if curve.x_name == "volume_ul":
+        return ModelValues(model, {"": _strokes_by_volume(balloon, curve.x)})
+    assumed, values = _by_pressure(curve, lambda p: float(free_shapes(balloon, p).height[0]))
+    return ModelValues(model, {assumed: values})
+
+
+def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
+    """Return mm of a free balloon by ul in it, to 0.2 %; None where MOST_FREE_KPA hold less."""
+    top = FIRST_KPA
+    while top < MOST_FREE_KPA and _free_volume(balloon, top) < max(volumes):
+        top = min(2 * top, MOST_FREE_KPA)
+    shapes = free_shapes(balloon, np.geomspace(LEAST_FREE_KPA, top, SAMPLES))
+    held, heights = np.append(0.0, shapes.volume), np.append(0.0, shapes.height)
+    return tuple(
+        None if volume > held[-1] else float(np.interp(volume, held, heights)) for volume in volumes
+    )
+
+
+def _free_volume(balloon: Balloon, pressure: float) -> float:
+    return float(free_shapes(balloon, pressure).volume[0])
+
+
+# Work, times, stiffness, sizes.
+
+
+def _energies(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    request = PredictionRequest(curve.x, calibration=of.factors)
+    figures = {
+        figure.name: figure
+        for figure in elastic.free_strokes(of.actuator, request)
+        if isinstance(figure, Figure)
+    }
+    names = [f"pneumatic input work at {pressure:g} kPa, free" for pressure in curve.x]
+    values = tuple(figures[name].value if name in figures else None for name in names)
+    return ModelValues(elastic.calibrated(elastic.ELASTIC, of.factors).name, {"": values})
+
+
+def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    flow = curve.setup.flow_ml_min
+    if flow is None:
+        return NoModel("the set-up names no flow")
+    if curve.x_name == "bend_deg":
+        counts = _chamber_counts(of, curve)
+        if not counts:
+            return NoModel("one chamber does not bend")
+        return ModelValues(
+            f"{of.name}, no tube",
+            {
+                _chambers(count, counts): tuple(
+                    _time_to_bend(of.stack, count, angle, flow) for angle in curve.x
+                )
+                for count in counts
+            },
+        )
+    given = curve.setup.tube_mm
+    tubes = {"no tube": NO_TUBE, f"{TUBE_LENGTH:g} mm of tube": TUBE_LENGTH}
+    if given is not None:
+        tubes = {"": max(given, NO_TUBE)}
+    bore = curve.setup.tube_bore_mm or TUBE_DIAMETER
+    is_air = curve.setup.fluid != "water"
+    if not is_air and bore != TUBE_DIAMETER:
+        return NoModel(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
+    return ModelValues(
+        f"{of.name} in time",
+        {
+            phrase: tuple(
+                _time_with_air(of.stack, flow, until, Line(AIR, length, bore))
+                if is_air
+                else elastic.time_to_fill(of.stack, flow, until, length)[0]
+                for until in curve.x
+            )
+            for phrase, length in tubes.items()
+        },
+    )
+
+
+def _time_with_air(whole: Stack, flow: float, until: float, line: Line) -> float:
+    """Return the seconds of air until the chambers have a pressure, in STEPS steps or so."""
+    taken_in = float(whole.pose((until,) * whole.chambers).volumes.sum())
+    return air_time(whole, flow, until, line, taken_in / (flow * 1000 / 60) / STEPS)
+
+
+def _time_to_bend(whole: Stack, chambers: int, angle: float, flow: float) -> ModelValue:
+    """Return the seconds until the tip is bent, all the flow in some chambers, no tube."""
+    pose = elastic.pose_bent_by(whole, chambers, angle)
+    if pose is None:
+        return None
+    empty = whole.pose((0.0,) * whole.chambers)
+    taken_in = float((pose.volumes - empty.volumes)[:chambers].sum())
+    return taken_in / (flow * 1000 / 60)
+
+
+def _moduli(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    second = of.figure("second moment of area of the plate").value
+
+    def at(pressure: float) -> float:
+        name = f"lateral tip stiffness at {pressure:g} kPa, chambers shut"
+        tip = of.figure(name, (pressure,), quick=False).value
+        height = of.stack.pose((pressure,) * of.stack.chambers).height
+        return modulus(tip, 1.0, height, second)
+
+    assumed, values = _by_pressure(curve, at)
+    return ModelValues(f"{of.name}, chambers shut", {assumed: values})
+
+
+def _sizes(name: str) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]:
+    def answer(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+        figure = of.figure(name)
+        return ModelValues(figure.model.name, {"": (figure.value,) * len(curve.y)})
+
+    return answer
+
+
+def _bursts(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    value = burst_pressure(of.actuator.form, of.laminate)
+    if value is None:
+        return NoModel("no burst pressure was measured of such films or pockets")
+    model = "the paper's burst pressure, film stress in proportion"
+    return ModelValues(model, {"": (value,) * len(curve.y)})
+
+
+ANSWERS: dict[str, Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]] = {
+    "force_n": _forces,
+    "stroke_mm": _strokes,
+    "height_mm": _strokes,
+    "balloon_stroke_mm": _balloon_strokes,
+    "bend_deg": _bends,
+    "flat_height_mm": _sizes("deflated height"),
+    "energy_mj": _energies,
+    "time_s": _times,
+    "modulus_kpa": _moduli,
+    "burst_kpa": _bursts,
+    "deflated_diameter_mm": _sizes("deflated diameter"),
+    "inflated_diameter_mm": _sizes("inflated diameter"),
+    "folded_diameter_mm": _sizes("folded diameter"),
+    "mass_g": _sizes("mass"),
+}
+"""Functions that answer by quantity; the others are in WITHOUT_MODEL."""

@@ -1,0 +1,111 @@
+"""Records of a lab as evidence: curves of all actuators that build the same design."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from sbafab.errors import DesignError
+from sbafab.evidence.records import (
+    Evidence,
+    MeasuredActuator,
+    MeasuredCurve,
+    Setup,
+    StatedError,
+)
+from sbafab.results.records import Build
+from sbafab.results.report import Built, items
+from sbafab.results.store import Lab, rebuilt
+
+
+class _Recorded(NamedTuple):
+    quantity: str
+    x_name: str
+    x: float
+    setup: Setup
+    unknown: str
+
+
+RECORDED = {
+    "stroke_mm": _Recorded(
+        "stroke_mm", "", 0.0, Setup(tip="free"), "The pressure is not recorded."
+    ),
+    "force_n": _Recorded(
+        "force_n",
+        "height_share",
+        0.0,
+        Setup(pressure_kpa=100.0, tip="held"),
+        "How the sensor holds the tip is not recorded.",
+    ),
+    "height_mm": _Recorded("flat_height_mm", "", 0.0, Setup(tip="free"), ""),
+    "mass_g": _Recorded("mass_g", "", 0.0, Setup(), ""),
+    "burst_kpa": _Recorded("burst_kpa", "", 0.0, Setup(), ""),
+}
+"""Recorded numbers that are evidence, as ``sbafab record`` defines them."""
+
+
+def from_lab_records(lab: Lab) -> Evidence:
+    """Return a curve for each design and recorded quantity, one value an actuator.
+
+    No error of a value is recorded; that of the curve is the scatter of its actuators. An actuator
+    that was repaired counts by its first attempt. Raises DesignError where no number is recorded.
+    """
+    records, builds = lab.contents()
+    by_actuator: dict[str, list[Built]] = defaultdict(list)
+    for built in items(records, builds):
+        by_actuator[built.actuator].append(built)
+    curves = tuple(
+        curve
+        for actuator in by_actuator.values()
+        for curve in _curves(actuator, builds[actuator[0].design_sha256])
+    )
+    if not curves:
+        raise DesignError(
+            f"{lab.path} has no record with any of {', '.join(RECORDED)}; record one, such as "
+            "--stroke 16.8"
+        )
+    return Evidence(_id(lab.path.stem), f"build records in {lab.path.name}", "", _renamed(curves))
+
+
+def _curves(actuators: Sequence[Built], build: Build) -> list[MeasuredCurve]:
+    measured = MeasuredActuator(toml=build.toml) if rebuilt(build) else MeasuredActuator()
+    curves = []
+    for name, kind in RECORDED.items():
+        values = tuple(a.numbers[name] for a in actuators if name in a.numbers)
+        if not values:
+            continue
+        curves.append(
+            MeasuredCurve(
+                id=_id(f"{actuators[0].design}-{name}"),
+                quantity=kind.quantity,
+                place=f"{len(values)} actuators",
+                y=values,
+                x_name=kind.x_name,
+                x=(kind.x,) * len(values) if kind.x_name else (),
+                actuator=measured,
+                setup=kind.setup,
+                error=StatedError(source="not recorded"),
+                group=_id(actuators[0].design),
+                unknown=(kind.unknown,) if kind.unknown else (),
+            )
+        )
+    return curves
+
+
+def _id(text: str) -> str:
+    """Return a text as an id of evidence."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", text).lstrip("-._")[:64] or "lab"
+
+
+def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
+    """Return the curves with a number behind ids that several designs of a name share."""
+    counts: dict[str, int] = defaultdict(int)
+    renamed = []
+    for curve in curves:
+        counts[curve.id] += 1
+        number = counts[curve.id]
+        renamed.append(curve if number == 1 else replace(curve, id=f"{curve.id}-{number}"))
+    return tuple(renamed)
