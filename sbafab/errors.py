@@ -25,6 +25,10 @@ class DesignError(SbafabError, ValueError):
     """A design that cannot be built: field, value, permitted values, remedy."""
 
 
+class UnreachableError(DesignError):
+    """A place that the tip of a stack cannot reach: the nearest tip found, and its distance."""
+
+
 class TooLargeError(DesignError):
     """A part that is larger than its film; the exit code is that of a failed rule."""
 

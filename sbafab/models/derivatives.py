@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
 
+UNIT, QUARTER_TURN = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
+
 
 class Rates(NamedTuple):
     """Rates of a pose by n quantities: of the middle of the ``tip`` (3, n) in mm, the ``turn`` of
@@ -247,7 +249,7 @@ def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
     mean = (1 - sine) / safe
     sine_rate = (np.cos(angle) - sine) / safe
     mean_rate = -(sine_rate + 2 * mean) / safe
-    skew = np.stack([-half[:, 1], half[:, 0]], -1) * ((1 - np.cos(angle)) / safe)[:, None]
+    skew = half @ QUARTER_TURN * ((1 - np.cos(angle)) / safe)[:, None]
     # Moments about the level's middle, along the turns, v, the plane's axes, and across the rise.
     arms = acting.arms - plates.middles[:, :, None] * acting.forces[:, None, :]
     moment = (arms.reshape(-1, 9) @ CROSS.T)[:, None]
@@ -260,6 +262,6 @@ def _tilt_works(now: LoadedEnergy, freedoms: Array, pitch: float) -> Array:
     lift = now.works[:, 0, 3] * (freedoms[:, 0] + pitch)
     second = pairs + pairs.swapaxes(1, 2)
     second += (2 * mean_rate * along)[:, None, None] * (half[:, :, None] * half[:, None])
-    second += (2 * mean * along)[:, None, None] * np.eye(2)
+    second += (2 * mean * along)[:, None, None] * UNIT
     second += lift[:, None, None] * (plates.turns @ plates.turns.swapaxes(1, 2))
     return np.asarray(second / 4)

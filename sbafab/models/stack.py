@@ -31,6 +31,7 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.pneumatics import Line
+from sbafab.models.reach import reach
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
 from sbafab.models.stack_loads import (
     RING_POINTS,
@@ -296,6 +297,31 @@ class Stack:
     def stiffness(self, pressures: Sequence[float], **load: Any) -> Array:
         """Return the ``stiffness`` (6, 6) of the tip, as of ``derivatives``."""
         return self.derivatives(pressures, **load).stiffness
+
+    def reach(
+        self,
+        tip: Sequence[float],
+        most_pressure: float | None = None,
+        near: Pose | None = None,
+        **load: Any,
+    ) -> Pose:
+        """Return a pose whose tip stands at a place (3) in mm, within 1e-4 mm; its ``pressures``
+        (kPa) are from 0 to ``most_pressure``, by default that of the maps.
+
+        ``near`` is a pose to start from, such as the last one of a motion; ``load`` are keyword
+        arguments of ``pose`` beside pressures. Of several solutions of a stack with many chambers
+        it is one near the start. Raises UnreachableError, with the nearest tip found, and
+        DesignError for bad input.
+        """
+        place = vector_of(tip, "the place of the tip in mm")
+        most = self.most_pressure if most_pressure is None else float(most_pressure)
+        if not 0 < most <= self.most_pressure:
+            raise DesignError(
+                f"most_pressure = {most:g} kPa must be above 0 and at most "
+                f"{self.most_pressure:g} kPa, to which the stack was made"
+            )
+        acting = self.load(*(load.get(name, value) for name, value in NO_LOAD.items()))
+        return reach(self, place, acting, load, most, near)
 
     def start_freedoms(self, pressures: Sequence[float]) -> Array:
         """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the

@@ -1,0 +1,292 @@
+"""Inverse kinematics of a stack: the pressures at which the middle of its top stands at a place,
+under a load and in contact.
+
+First freedoms and pressures are found together by Newton's method: each step solves the linearised
+equilibrium, and the pressures' change is the least, within their limits, that brings the linearised
+tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Where these steps do not
+converge, or a plate is in the way, Levenberg and Marquardt's method goes from equilibrium to
+equilibrium by the tip's derivatives. Pressures are counted in asinh(p / P0), in which heights are
+nearly linear.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.errors import DesignError, UnreachableError
+from sbafab.models.balloon_map import P0
+from sbafab.models.derivatives import derivatives, hessian, tip_motion
+from sbafab.models.least_energy import is_positive_definite, step_limit
+from sbafab.models.stack_loads import level_motions, loaded_energy, plate_chain
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+    from typing import Any
+
+    from sbafab.models.film_elements import Array
+    from sbafab.models.stack import Pose, Stack
+    from sbafab.models.stack_loads import Load
+
+NEAR = 1e-4
+"""Distance in mm from the place at which the tip has reached it."""
+STEPS, LAST_STEP = 9, 2e-3
+"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
+LONGEST_STEP = 1.5
+"""Largest change of asinh(p / P0) in one step."""
+POSES = 40
+"""Equilibria from one start."""
+DAMPING = 1e-3
+"""First damping, as a share of the largest square of a derivative (mm by asinh)."""
+LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e3
+STILL = 1e-6
+"""Step (asinh) at which the tip comes no nearer."""
+
+
+class Task(NamedTuple):
+    """A ``place`` (3,) in mm that the tip of a stack is to reach under a load, and the highest
+    asinh(p / P0).
+    """
+
+    stack: Stack
+    place: Array
+    load: Load | None
+    most: float
+
+
+class Newton(NamedTuple):
+    """Linearised equilibrium: the tip (3,) in mm, the freedoms' own step to equilibrium (rows, 3)
+    and their step by each pressure (rows, 3, chambers), the tip's motion by freedoms (3, rows x 3),
+    and the tangent stiffness (groups of rows, size, size).
+    """
+
+    tip: Array
+    own: Array
+    by_pressure: Array
+    motion: Array
+    matrix: Array
+
+
+def reach(
+    stack: Stack,
+    place: Array,
+    load: Load | None,
+    arguments: dict[str, Any],
+    most_pressure: float,
+    near: Pose | None,
+) -> Pose:
+    """Return the pose whose tip stands at ``place`` (3,) in mm, with no more than ``most_pressure``
+    kPa; ``near`` is a pose to start from, ``arguments`` those of ``Stack.pose`` for the load.
+
+    Raises UnreachableError with the nearest tip found.
+    """
+    task = Task(stack, place, load, math.asinh(most_pressure / P0))
+    guess = start(task) if near is None else np.arcsinh(np.array(near.pressures) / P0)
+    guess = np.clip(guess, 0.0, task.most)
+    if near is not None or load is None or load.wall is None:
+        pose = _by_freedoms(task, guess, near)
+        if pose is not None:
+            return pose
+    if load is not None:
+        # From an equilibrium, where the load has bent the stack far.
+        posed = _equilibrium(task, guess, arguments, near)
+        pose = None if posed is None else _by_freedoms(task, guess, posed)
+        if pose is not None:
+            return pose
+    best = None
+    for x in (guess, *_further_starts(task, guess)):
+        pose = _by_poses(task, x, arguments, near if best is None else None)
+        if pose is None:
+            continue
+        if _distance(task, pose) < NEAR:
+            return pose
+        if best is None or _distance(task, pose) < _distance(task, best):
+            best = pose
+    if best is None:
+        raise DesignError("no equilibrium of the stack found near this place; try another load")
+    raise UnreachableError(
+        f"the tip cannot reach {_written(place)} mm with 0 to {most_pressure:g} kPa; the nearest "
+        f"place found is {_written(best.tip)} mm, {_distance(task, best):.3g} mm away"
+    )
+
+
+def _written(place: Array) -> str:
+    # Adding 0 makes -0 a plain 0.
+    return "(" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in place.tolist()) + ")"
+
+
+def start(task: Task) -> Array:
+    """Return asinh(p / P0) of chambers as long as on an arc from the base to the place.
+
+    The arc leaves the base at a right angle: constant curvature (Webster and Jones 2010).
+    """
+    stack = task.stack
+    aside, up = math.hypot(*task.place[:2]), float(task.place[2])
+    bend = 2 * math.atan2(aside, up)
+    length = math.hypot(aside, up)
+    if bend > 1e-9:
+        length *= (bend / 2) / math.sin(bend / 2)
+    way = task.place[:2] / max(aside, 1e-12)
+    rises = length - stack.flat_height - bend * (stack.axes @ way)
+    grid = np.linspace(0.0, task.most, 33)
+    kinds = np.stack([kind.rises(P0 * np.sinh(grid)) for kind in stack.maps])
+    return np.interp(rises, kinds[stack.levels].sum(0), grid)
+
+
+def _further_starts(task: Task, guess: Array) -> Iterator[Array]:
+    """Yield starts all over the range, the nearer to the middle the earlier."""
+    chambers = len(guess)
+    for share in (0.6, 0.85, 0.3):
+        yield np.full(chambers, share * task.most)
+    for chamber in range(chambers):
+        for low, high in ((0.3, 0.9), (0.9, 0.3)):
+            x = np.full(chambers, low * task.most)
+            x[chamber] = high * task.most
+            yield x
+
+
+def _distance(task: Task, pose: Pose) -> float:
+    return float(np.linalg.norm(pose.tip - task.place))
+
+
+def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array, Array]) -> Array:
+    """Return the step (n,) with least |rates @ step - missing|^2 + damping |step|^2 that stays
+    within ``room``, its least and largest values (n,).
+
+    What would leave the room is set to its end, until the rest stays within: an active set that
+    only grows, enough for one of many steps.
+    """
+    least, most = room
+    matrix = rates.T @ rates
+    matrix.ravel()[:: len(matrix) + 1] += damping
+    gradient = rates.T @ missing
+    step = np.linalg.solve(matrix, gradient)
+    inside = np.minimum(np.maximum(step, least), most)
+    is_free = inside == step
+    while not is_free.all():
+        step = inside
+        if not is_free.any():
+            break
+        right = gradient - matrix[:, ~is_free] @ step[~is_free]
+        step[is_free] = np.linalg.solve(matrix[np.ix_(is_free, is_free)], right[is_free])
+        inside = np.minimum(np.maximum(step, least), most)
+        still = is_free & (inside == step)
+        if (still == is_free).all():
+            break
+        is_free = still
+    return np.asarray(step)
+
+
+# Freedoms and pressures together.
+
+
+def _by_freedoms(task: Task, x: Array, near: Pose | None) -> Pose | None:
+    """Return the pose by Newton's method, None where it does not converge to a stable pose within
+    the limits.
+    """
+    stack = task.stack
+    if near is not None:
+        at = near.freedoms if task.load is not None else near.freedoms[stack.first_levels]
+    else:
+        at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
+        at = at if task.load is None else at[stack.levels]
+    for _ in range(STEPS):
+        now = _linearised(task, x, at)
+        if now is None:
+            return None
+        rates = now.motion @ now.by_pressure.reshape(-1, len(x))
+        missing = task.place - now.tip - now.motion @ now.own.ravel()
+        damping = LEAST_DAMPING * float((rates * rates).sum()) + 1e-12
+        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(task.most - x, LONGEST_STEP))
+        ahead = bounded_step(rates, missing, damping, room)
+        move = now.own + now.by_pressure @ ahead
+        share = float(step_limit(move).min())
+        x, at = np.clip(x + share * ahead, 0.0, task.most), at + share * move
+        if max(np.abs(move).max(), np.abs(ahead).max()) < LAST_STEP:
+            left = float(np.linalg.norm(missing - rates @ ahead))
+            return _pose(task, x, at) if left < NEAR and is_positive_definite(now.matrix) else None
+    return None
+
+
+def _linearised(task: Task, x: Array, at: Array) -> Newton | None:
+    stack, load = task.stack, task.load
+    springs = stack.springs((P0 * np.sinh(x)).tolist())
+    if load is None:
+        _, gradient, matrix = springs.energy(at)
+        freedoms, rows = at[stack.levels], springs
+        plates = plate_chain(freedoms, stack.pitch)
+        motions = level_motions(plates)
+    else:
+        rows = stack.each(springs)
+        now = loaded_energy(rows, stack.pitch, load, at)
+        gradient, plates, motions = now.gradient[None], now.plates, now.motions
+        matrix = hessian(now, at, stack.pitch)[None]
+    motion = tip_motion(plates, motions)[:3]
+    if load is None:
+        motion = motion.transpose(0, 2, 1) @ (stack.levels[:, None] == np.arange(len(at)))
+        motion = motion.transpose(0, 2, 1)
+    filling = rows.slopes(at)[1].transpose(0, 2, 1) * (P0 * np.cosh(x))
+    right = np.concatenate([-gradient.reshape(*at.shape, 1), filling], axis=-1)
+    groups, size, _ = matrix.shape
+    try:
+        moves = np.linalg.solve(matrix, right.reshape(groups, size, -1)).reshape(right.shape)
+    except np.linalg.LinAlgError:
+        return None
+    return Newton(plates.places[-1], moves[..., 0], moves[..., 1:], motion.reshape(3, -1), matrix)
+
+
+def _pose(task: Task, x: Array, at: Array) -> Pose | None:
+    stack, pressures = task.stack, (P0 * np.sinh(x)).tolist()
+    springs = stack.springs(pressures)
+    try:
+        if task.load is None:
+            return stack.pose_at(pressures, springs, at[stack.levels], at)
+        return stack.pose_at(pressures, springs, at)
+    except DesignError:
+        return None
+
+
+# From equilibrium to equilibrium.
+
+
+def _by_poses(task: Task, x: Array, arguments: dict[str, Any], near: Pose | None) -> Pose | None:
+    """Return the pose whose tip is nearest to the place, as seen from a start; None where there is
+    no equilibrium.
+    """
+    stack = task.stack
+    pose = _equilibrium(task, x, arguments, near)
+    if pose is None:
+        return None
+    damping = DAMPING
+    for _ in range(POSES):
+        missing = task.place - pose.tip
+        if np.linalg.norm(missing) < NEAR:
+            return pose
+        try:
+            by_pressure = derivatives(stack, pose, task.load).by_pressure.tip
+        except DesignError:
+            return pose
+        rates = by_pressure * (P0 * np.cosh(x))
+        scale = float((rates * rates).sum(0).max()) + 1e-12
+        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(task.most - x, LONGEST_STEP))
+        while True:
+            ahead = bounded_step(rates, missing, damping * scale, room)
+            if np.abs(ahead).max() < STILL or damping > MOST_DAMPING:
+                return pose
+            tried = _equilibrium(task, x + ahead, arguments, pose)
+            if tried is not None and _distance(task, tried) < _distance(task, pose):
+                break
+            damping *= 8
+        x, pose = np.clip(x + ahead, 0.0, task.most), tried
+        damping = max(damping / 8, LEAST_DAMPING)
+    return pose
+
+
+def _equilibrium(task: Task, x: Array, arguments: dict[str, Any], near: Pose | None) -> Pose | None:
+    pressures: Sequence[float] = (P0 * np.sinh(np.clip(x, 0.0, task.most))).tolist()
+    try:
+        return task.stack.pose(pressures, near=near, **arguments)
+    except DesignError:
+        return None

@@ -1,0 +1,104 @@
+"""Inverse kinematics of a stack: places of the tip that poses have, and places that none has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError, UnreachableError
+from sbafab.models.stack import Stack
+
+MOST = 10.0
+"""kPa to which chambers may be filled."""
+CLOSE = 1e-3
+"""Distance in mm at which a target is met."""
+LOADS: dict[str, dict[str, Any]] = {
+    "free": {},
+    "tip": {"tip_load": (0.0, 0.005, -0.005)},
+    "gravity": {"gravity": (0.0, 0.6, -1.0)},
+    "both": {"tip_load": (0.002, 0.0, -0.004), "gravity": True},
+}
+
+
+@pytest.fixture(scope="module")
+def three() -> Stack:
+    return sbafab.stack("3dof-15mm")
+
+
+def targets(stack: Stack, count: int, loads: dict[str, Any]) -> Iterator[Any]:
+    """Yield tips of poses at random pressures, some chambers empty or full."""
+    numbers = np.random.default_rng(31)
+    for _ in range(count):
+        drawn = np.clip(numbers.uniform(-1.0, MOST + 1, stack.chambers), 0.0, MOST)
+        yield stack.pose(drawn.tolist(), **loads).tip
+
+
+def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
+    """Return how many targets are not met, by a pose of the stack at the pressures found."""
+    number = 0
+    for target in targets(stack, count, loads):
+        reached = stack.reach(target, most_pressure=MOST, **loads)
+        assert min(reached.pressures) >= 0
+        assert max(reached.pressures) <= MOST + 1e-9
+        again = stack.pose(np.clip(reached.pressures, 0, MOST).tolist(), **loads, near=reached)
+        number += not np.linalg.norm(again.tip - target) < CLOSE
+    return number
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
+    assert missed(three, 20, LOADS[load]) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("load", LOADS)
+def test_a_thousand_random_reachable_targets_are_met(three: Stack, load: str) -> None:
+    assert missed(three, 1000, LOADS[load]) == 0
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_stacks_with_fewer_and_more_chambers_reach_their_places(count: int) -> None:
+    stack = sbafab.stack("3dof-15mm", {"chamber.count": count, "stack.balloons": 5})
+    assert missed(stack, 5, {}) == 0
+    assert missed(stack, 5, {"tip_load": (0.0, 0.002, -0.002)}) == 0
+
+
+def test_a_path_is_followed_from_pose_to_pose(three: Stack) -> None:
+    load = LOADS["both"]
+    turns = np.linspace(0.0, 2 * np.pi, 13)
+    pose = three.reach((6.0, 0.0, 15.0), most_pressure=MOST, **load)
+    for turn in turns:
+        place = (6 * np.cos(turn), 6 * np.sin(turn), 15.0)
+        pose = three.reach(place, most_pressure=MOST, near=pose, **load)
+        assert pose.tip == pytest.approx(place, abs=CLOSE)
+        assert pose.stable
+
+
+def test_a_place_too_high_is_refused_with_the_highest_one(three: Stack) -> None:
+    """On the axis that is the tip with all chambers full."""
+    height = three.pose((MOST,) * 3).height
+    with pytest.raises(UnreachableError, match="the nearest place found is") as refused:
+        three.reach((0, 0, 60), most_pressure=MOST)
+    assert f"(0, 0, {round(height, 3):g}) mm, {60 - height:.3g} mm away" in str(refused.value)
+    assert "cannot reach (0, 0, 60) mm with 0 to 10 kPa" in str(refused.value)
+
+
+def test_one_chamber_reaches_places_on_its_axis_alone() -> None:
+    """The nearest place to one beside the axis is its foot on the axis."""
+    one = sbafab.stack("1dof-5mm")
+    assert one.reach((0, 0, 10)).height == pytest.approx(10, abs=CLOSE)
+    with pytest.raises(UnreachableError, match=r"is \(0, 0, 10\) mm, 1 mm away"):
+        one.reach((1, 0, 10))
+
+
+def test_bad_input_to_reach_is_refused(three: Stack) -> None:
+    with pytest.raises(DesignError, match="the place of the tip in mm must be three finite"):
+        three.reach((0, 0))
+    with pytest.raises(DesignError, match="most_pressure = 120 kPa must be above 0 and at most"):
+        three.reach((0, 0, 10), most_pressure=120)
+    with pytest.raises(DesignError, match="a plate 1 mm high is lower than the flat stack"):
+        three.reach((0, 0, 10), plate=1.0)
