@@ -45,7 +45,7 @@ STILL = 1e-6
 """Step (asinh) at which the tip comes no nearer."""
 
 
-class Task(NamedTuple):
+class TipTarget(NamedTuple):
     """A ``place`` (3,) in mm that the tip of a stack is to reach under a load, and the highest
     asinh(p / P0).
     """
@@ -56,7 +56,7 @@ class Task(NamedTuple):
     most: float
 
 
-class Newton(NamedTuple):
+class Linearisation(NamedTuple):
     """Linearised equilibrium: the tip (3,) in mm, the freedoms' own step to equilibrium (rows, 3)
     and their step by each pressure (rows, 3, chambers), the tip's motion by freedoms (3, rows x 3),
     and the tangent stiffness (groups of rows, size, size).
@@ -82,33 +82,33 @@ def reach(
 
     Raises UnreachableError with the nearest tip found.
     """
-    task = Task(stack, place, load, math.asinh(most_pressure / P0))
-    guess = start(task) if near is None else np.arcsinh(np.array(near.pressures) / P0)
-    guess = np.clip(guess, 0.0, task.most)
+    target = TipTarget(stack, place, load, math.asinh(most_pressure / P0))
+    guess = start(target) if near is None else np.arcsinh(np.array(near.pressures) / P0)
+    guess = np.clip(guess, 0.0, target.most)
     if near is not None or load is None or load.wall is None:
-        pose = _by_freedoms(task, guess, near)
+        pose = _by_freedoms(target, guess, near)
         if pose is not None:
             return pose
     if load is not None:
         # From an equilibrium, where the load has bent the stack far.
-        posed = _equilibrium(task, guess, arguments, near)
-        pose = None if posed is None else _by_freedoms(task, guess, posed)
+        posed = _equilibrium(target, guess, arguments, near)
+        pose = None if posed is None else _by_freedoms(target, guess, posed)
         if pose is not None:
             return pose
     best = None
-    for x in (guess, *_further_starts(task, guess)):
-        pose = _by_poses(task, x, arguments, near if best is None else None)
+    for x in (guess, *_further_starts(target, guess)):
+        pose = _by_poses(target, x, arguments, near if best is None else None)
         if pose is None:
             continue
-        if _distance(task, pose) < NEAR:
+        if _distance(target, pose) < NEAR:
             return pose
-        if best is None or _distance(task, pose) < _distance(task, best):
+        if best is None or _distance(target, pose) < _distance(target, best):
             best = pose
     if best is None:
         raise DesignError("no equilibrium of the stack found near this place; try another load")
     raise UnreachableError(
         f"the tip cannot reach {_written(place)} mm with 0 to {most_pressure:g} kPa; the nearest "
-        f"place found is {_written(best.tip)} mm, {_distance(task, best):.3g} mm away"
+        f"place found is {_written(best.tip)} mm, {_distance(target, best):.3g} mm away"
     )
 
 
@@ -117,38 +117,38 @@ def _written(place: Array) -> str:
     return "(" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in place.tolist()) + ")"
 
 
-def start(task: Task) -> Array:
+def start(target: TipTarget) -> Array:
     """Return asinh(p / P0) of chambers as long as on an arc from the base to the place.
 
     The arc leaves the base at a right angle: constant curvature (Webster and Jones 2010).
     """
-    stack = task.stack
-    aside, up = math.hypot(*task.place[:2]), float(task.place[2])
+    stack = target.stack
+    aside, up = math.hypot(*target.place[:2]), float(target.place[2])
     bend = 2 * math.atan2(aside, up)
     length = math.hypot(aside, up)
     if bend > 1e-9:
         length *= (bend / 2) / math.sin(bend / 2)
-    way = task.place[:2] / max(aside, 1e-12)
+    way = target.place[:2] / max(aside, 1e-12)
     rises = length - stack.flat_height - bend * (stack.axes @ way)
-    grid = np.linspace(0.0, task.most, 33)
+    grid = np.linspace(0.0, target.most, 33)
     kinds = np.stack([kind.rises(P0 * np.sinh(grid)) for kind in stack.maps])
     return np.interp(rises, kinds[stack.levels].sum(0), grid)
 
 
-def _further_starts(task: Task, guess: Array) -> Iterator[Array]:
+def _further_starts(target: TipTarget, guess: Array) -> Iterator[Array]:
     """Yield starts all over the range, the nearer to the middle the earlier."""
     chambers = len(guess)
     for share in (0.6, 0.85, 0.3):
-        yield np.full(chambers, share * task.most)
+        yield np.full(chambers, share * target.most)
     for chamber in range(chambers):
         for low, high in ((0.3, 0.9), (0.9, 0.3)):
-            x = np.full(chambers, low * task.most)
-            x[chamber] = high * task.most
+            x = np.full(chambers, low * target.most)
+            x[chamber] = high * target.most
             yield x
 
 
-def _distance(task: Task, pose: Pose) -> float:
-    return float(np.linalg.norm(pose.tip - task.place))
+def _distance(target: TipTarget, pose: Pose) -> float:
+    return float(np.linalg.norm(pose.tip - target.place))
 
 
 def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array, Array]) -> Array:
@@ -182,36 +182,38 @@ def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array
 # Freedoms and pressures together.
 
 
-def _by_freedoms(task: Task, x: Array, near: Pose | None) -> Pose | None:
+def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
     """Return the pose by Newton's method, None where it does not converge to a stable pose within
     the limits.
     """
-    stack = task.stack
+    stack = target.stack
     if near is not None:
-        at = near.freedoms if task.load is not None else near.freedoms[stack.first_levels]
+        at = near.freedoms if target.load is not None else near.freedoms[stack.first_levels]
     else:
         at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
-        at = at if task.load is None else at[stack.levels]
+        at = at if target.load is None else at[stack.levels]
     for _ in range(STEPS):
-        now = _linearised(task, x, at)
+        now = _linearised(target, x, at)
         if now is None:
             return None
         rates = now.motion @ now.by_pressure.reshape(-1, len(x))
-        missing = task.place - now.tip - now.motion @ now.own.ravel()
+        missing = target.place - now.tip - now.motion @ now.own.ravel()
         damping = LEAST_DAMPING * float((rates * rates).sum()) + 1e-12
-        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(task.most - x, LONGEST_STEP))
+        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(target.most - x, LONGEST_STEP))
         ahead = bounded_step(rates, missing, damping, room)
         move = now.own + now.by_pressure @ ahead
         share = float(step_limit(move).min())
-        x, at = np.clip(x + share * ahead, 0.0, task.most), at + share * move
+        x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
         if max(np.abs(move).max(), np.abs(ahead).max()) < LAST_STEP:
             left = float(np.linalg.norm(missing - rates @ ahead))
-            return _pose(task, x, at) if left < NEAR and is_positive_definite(now.matrix) else None
+            return (
+                _pose(target, x, at) if left < NEAR and is_positive_definite(now.matrix) else None
+            )
     return None
 
 
-def _linearised(task: Task, x: Array, at: Array) -> Newton | None:
-    stack, load = task.stack, task.load
+def _linearised(target: TipTarget, x: Array, at: Array) -> Linearisation | None:
+    stack, load = target.stack, target.load
     springs = stack.springs((P0 * np.sinh(x)).tolist())
     if load is None:
         _, gradient, matrix = springs.energy(at)
@@ -234,14 +236,16 @@ def _linearised(task: Task, x: Array, at: Array) -> Newton | None:
         moves = np.linalg.solve(matrix, right.reshape(groups, size, -1)).reshape(right.shape)
     except np.linalg.LinAlgError:
         return None
-    return Newton(plates.places[-1], moves[..., 0], moves[..., 1:], motion.reshape(3, -1), matrix)
+    return Linearisation(
+        plates.places[-1], moves[..., 0], moves[..., 1:], motion.reshape(3, -1), matrix
+    )
 
 
-def _pose(task: Task, x: Array, at: Array) -> Pose | None:
-    stack, pressures = task.stack, (P0 * np.sinh(x)).tolist()
+def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
+    stack, pressures = target.stack, (P0 * np.sinh(x)).tolist()
     springs = stack.springs(pressures)
     try:
-        if task.load is None:
+        if target.load is None:
             return stack.pose_at(pressures, springs, at[stack.levels], at)
         return stack.pose_at(pressures, springs, at)
     except DesignError:
@@ -251,42 +255,46 @@ def _pose(task: Task, x: Array, at: Array) -> Pose | None:
 # From equilibrium to equilibrium.
 
 
-def _by_poses(task: Task, x: Array, arguments: dict[str, Any], near: Pose | None) -> Pose | None:
+def _by_poses(
+    target: TipTarget, x: Array, arguments: dict[str, Any], near: Pose | None
+) -> Pose | None:
     """Return the pose whose tip is nearest to the place, as seen from a start; None where there is
     no equilibrium.
     """
-    stack = task.stack
-    pose = _equilibrium(task, x, arguments, near)
+    stack = target.stack
+    pose = _equilibrium(target, x, arguments, near)
     if pose is None:
         return None
     damping = DAMPING
     for _ in range(POSES):
-        missing = task.place - pose.tip
+        missing = target.place - pose.tip
         if np.linalg.norm(missing) < NEAR:
             return pose
         try:
-            by_pressure = derivatives(stack, pose, task.load).by_pressure.tip
+            by_pressure = derivatives(stack, pose, target.load).by_pressure.tip
         except DesignError:
             return pose
         rates = by_pressure * (P0 * np.cosh(x))
         scale = float((rates * rates).sum(0).max()) + 1e-12
-        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(task.most - x, LONGEST_STEP))
+        room = (np.maximum(-x, -LONGEST_STEP), np.minimum(target.most - x, LONGEST_STEP))
         while True:
             ahead = bounded_step(rates, missing, damping * scale, room)
             if np.abs(ahead).max() < STILL or damping > MOST_DAMPING:
                 return pose
-            tried = _equilibrium(task, x + ahead, arguments, pose)
-            if tried is not None and _distance(task, tried) < _distance(task, pose):
+            tried = _equilibrium(target, x + ahead, arguments, pose)
+            if tried is not None and _distance(target, tried) < _distance(target, pose):
                 break
             damping *= 8
-        x, pose = np.clip(x + ahead, 0.0, task.most), tried
+        x, pose = np.clip(x + ahead, 0.0, target.most), tried
         damping = max(damping / 8, LEAST_DAMPING)
     return pose
 
 
-def _equilibrium(task: Task, x: Array, arguments: dict[str, Any], near: Pose | None) -> Pose | None:
-    pressures: Sequence[float] = (P0 * np.sinh(np.clip(x, 0.0, task.most))).tolist()
+def _equilibrium(
+    target: TipTarget, x: Array, arguments: dict[str, Any], near: Pose | None
+) -> Pose | None:
+    pressures: Sequence[float] = (P0 * np.sinh(np.clip(x, 0.0, target.most))).tolist()
     try:
-        return task.stack.pose(pressures, near=near, **arguments)
+        return target.stack.pose(pressures, near=near, **arguments)
     except DesignError:
         return None

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import sbafab
+from sbafab.errors import DesignError
 from sbafab.models.derivatives import hessian
 from sbafab.models.stack import NO_LOAD, Plate, Pose, Stack
 from sbafab.models.stack_loads import (
@@ -186,7 +187,12 @@ def test_derivatives_are_central_differences_of_many_poses(name: str) -> None:
     stack, compared, most = stack_of(name), 0, 0
     for loads in loads_of(stack).values():
         for pressures in drawn(stack, 2, 20):
-            if stack.pose(pressures.tolist(), **loads).stable:
+            try:
+                pose = stack.pose(pressures.tolist(), **loads)
+            except DesignError:
+                # A top that slides under a leaning plate may find no balance.
+                continue
+            if pose.stable:
                 compared += compare(stack, pressures, loads)
                 most += stack.chambers + 3
     assert compared >= 0.7 * most
