@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections import Counter
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -22,6 +24,21 @@ settings.load_profile("sbafab")
 
 LONG = "SBAFAB_LONG" in os.environ
 """Whether only the tests marked ``long`` run, as ``.ci/run`` has them beside the suite."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Keep what is collected, which lives as long as the session, from the garbage collector.
+
+    Every full collection among the tests would walk through it again.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

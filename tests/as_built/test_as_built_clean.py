@@ -15,6 +15,7 @@ from sbafab.rules.deck import rule_names
 from sbafab.rules.finding import Finding
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
+from tests.quick import few
 
 DROP = (
     '<svg xmlns="http://www.w3.org/2000/svg" width="12mm" height="12mm" viewBox="-6 -6 12 12">'
@@ -62,7 +63,7 @@ MORE: list[tuple[str, tuple[str, ...], DxfProfile]] = [
 CASES = [*CLEAN, *(pytest.param(*case, marks=pytest.mark.long) for case in MORE)]
 
 
-@pytest.mark.parametrize(("template", "changes", "profile"), CASES)
+@pytest.mark.parametrize(("template", "changes", "profile"), few(CASES, 6, names=3))
 def test_what_was_written_checks_as_designed(
     template: str,
     changes: tuple[str, ...],

@@ -18,6 +18,7 @@ from sbafab.rules.finding import Finding
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
+from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_FOREIGN", "10"))
 SEED = 31
@@ -81,7 +82,7 @@ def drawn(folder: Path, others: list[Path], draw: Random) -> tuple[str, Path]:
     return (Path(where) / f"{stem}{ending}").as_posix(), donor
 
 
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("number", few(range(COUNT), 4, setting="SBAFAB_FOREIGN"))
 def test_a_file_of_another_design_fails_with_its_hash_in_line(
     number: int, folders: list[Path], tmp_path: Path
 ) -> None:
@@ -109,7 +110,7 @@ def test_the_files_that_once_got_past_are_named(
     assert found.message.startswith(f"{name} is listed and is no file of this design")
 
 
-@pytest.mark.parametrize("ending", OPENED)
+@pytest.mark.parametrize("ending", few(OPENED, 6))
 def test_what_a_laser_program_opens_fails_among_the_cut_files(
     ending: str, folders: list[Path], tmp_path: Path
 ) -> None:

@@ -25,6 +25,7 @@ from sbafab.rules.finding import Finding
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
+from tests.quick import few
 
 Move = Callable[[float], float]
 FOLDERS: list[tuple[str, tuple[str, ...], DxfProfile]] = [
@@ -96,10 +97,13 @@ def jittered(most: float) -> Callable[[Drawing], object]:
 
 @pytest.mark.parametrize(
     "change",
-    [
-        jittered(3e-4),
-        partial(moved, move=lambda value: round(value, 4)),
-    ],
+    few(
+        [
+            jittered(3e-4),
+            partial(moved, move=lambda value: round(value, 4)),
+        ],
+        1,
+    ),
     ids=["0.3 um", "4 decimals"],
 )
 def test_coordinates_off_by_less_than_a_micrometre_change_no_verdict(

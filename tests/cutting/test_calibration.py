@@ -23,6 +23,7 @@ from sbafab.cutting.calibration import (
     student_t,
 )
 from sbafab.errors import DesignError
+from tests.quick import few
 
 HEADER = "feature,axis,nominal_mm,measured_mm\n"
 
@@ -128,7 +129,7 @@ def read_coupon(reader: Reader, kerf: float, draw: random.Random) -> list[Measur
     return rows
 
 
-@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
+@pytest.mark.parametrize("reader", few(READERS, 2), ids=lambda reader: reader.name)
 def test_intervals_hold_the_kerf_about_95_times_in_100(reader: Reader) -> None:
     """Of COUPONS each; within four standard deviations of a share of 0.95."""
     draw = random.Random(10)

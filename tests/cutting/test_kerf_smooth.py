@@ -25,6 +25,7 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, polygon, stadium, union
+from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_KERF_SHAPES", "8"))
 PAIRS = ((0.12, 0.1), (0.1, 0.12), (0.05, 0.2), (0.3, 0.1), (0.08, 0.085))
@@ -92,7 +93,7 @@ def assert_sum(path: Region, region: Region, pair: tuple[float, float]) -> None:
     assert abs(own.area - judged.area) < off / 10 * own.length
 
 
-@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("number", few(range(COUNT), 4, setting="SBAFAB_KERF_SHAPES"))
 def test_path_is_the_sum_with_the_beam_s_ellipse(number: int) -> None:
     rng = random.Random(f"kerf {number}")
     makers: tuple[Callable[[random.Random], Region], ...] = (blob, blob, slot, star)

@@ -20,6 +20,7 @@ from tests.as_built.doctoring import Doctor
 from tests.faults.harmless import changes_nothing
 from tests.faults.mutants import mutated
 from tests.faults.once import remembering
+from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_FAULTS", "16"))
 SEED = int(os.environ.get("SBAFAB_FAULTS_SEED", "12"))
@@ -75,7 +76,7 @@ def missed(folders: list[Path], number: int, folder: Path) -> str:
         shutil.rmtree(target)
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("part", few(range(PARTS), 3, setting="SBAFAB_FAULTS"))
 def test_random_faults_are_caught_or_change_nothing(
     part: int, folders: list[Path], tmp_path: Path
 ) -> None:

@@ -17,6 +17,7 @@ from sbafab.geometry.arcs import (
 )
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Line, distance_to
+from tests.quick import few
 
 FULL = (0.0, math.tau)
 CURVES = {
@@ -30,7 +31,7 @@ CURVES = {
 }
 
 
-@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.parametrize("name", few(CURVES, 3))
 def test_arcs_stay_within_the_tolerance_of_the_curve(name: str) -> None:
     curve, (first, last) = CURVES[name]
     edges = fit_arcs(curve, first, last)

@@ -10,6 +10,7 @@ import pytest
 from sbafab.geometry.arrangement import PointPool
 from sbafab.geometry.edges import SAME, Point
 from sbafab.geometry.region import Region, difference, disc, intersection, rectangle, stadium, union
+from tests.quick import few
 
 STEPS = [(0.95 * SAME * i, 0.0) for i in range(5)]
 
@@ -57,7 +58,7 @@ SHAPES: list[Region] = [
 ]
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", few(SHAPES, 3))
 def test_shapes_shifted_by_a_hair(shape: Region) -> None:
     """Areas add up, and what is left of a shape is at most a band as wide as the shift."""
     around = sum(contour.length for contour in shape.contours)

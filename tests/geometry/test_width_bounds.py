@@ -10,6 +10,7 @@ import pytest
 from sbafab.geometry import width
 from sbafab.geometry.region import Region, disc, polygon, rectangle, union
 from sbafab.geometry.width import least_gap, least_width, may_be_narrower, widest_least
+from tests.quick import few
 
 AXIS = (0.0, 0.0)
 CLOSED = {
@@ -46,7 +47,7 @@ def plate(seed: int) -> Region:
 
 
 @pytest.mark.parametrize("least", [least_width, least_gap])
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", few(range(25), 8))
 def test_widths_are_those_found_without_bounds(
     seed: int, least: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.hardship.starting import ANSWERING, ignored_signals
+from tests.quick import few
 
 INTERRUPTS = int(os.environ.get("SBAFAB_KILLS", "4"))
 PROGRAM = """
@@ -50,7 +51,7 @@ def run(arguments: list[str], step: int, folder: Path) -> subprocess.CompletedPr
     )
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", few(COMMANDS, 1, setting="SBAFAB_KILLS"))
 def test_interrupted_at_random_imports(command: str, tmp_path: Path) -> None:
     arguments = COMMANDS[command]
     whole = run(arguments, 0, tmp_path)

@@ -21,6 +21,7 @@ from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import SbafabError
 from sbafab.output.job import check_job
+from tests.quick import few
 
 COUNT = int(os.environ.get("SBAFAB_MUTATIONS", "120"))
 BATCHES = 8
@@ -145,7 +146,7 @@ def refused(path: Path) -> str | None:
     return None
 
 
-@pytest.mark.parametrize("batch", range(BATCHES))
+@pytest.mark.parametrize("batch", few(range(BATCHES), 3, setting="SBAFAB_MUTATIONS"))
 def test_a_mutated_design_is_checked_or_refused_in_one_sentence(batch: int, tmp_path: Path) -> None:
     texts = sources()
     path = tmp_path / "design.toml"

@@ -13,6 +13,7 @@ from sbafab.geometry.region import disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.meshes import conforming_meshes
+from tests.quick import few
 
 AXIS = (0.0, 0.0)
 FILM = 0.038
@@ -46,13 +47,17 @@ def test_stretch_is_that_of_the_paraboloid(one_balloon: Laminate) -> None:
 
 @pytest.mark.parametrize(
     ("template", "changes", "fill"),
-    [
-        ("1dof-5mm", ("stack.balloons=3",), 5.0),
-        ("1dof-5mm", ("stack.balloons=2",), 16.9),
-        ("3dof-15mm", ("stack.balloons=2",), 8.0),
-        ("radial-15mm", ("chamber.count=1", "tube.outer_diameter=4"), 40.0),
-        ("1dof-5mm", ("stack.balloons=2", "registration.method=ears"), 4.0),
-    ],
+    few(
+        [
+            ("1dof-5mm", ("stack.balloons=3",), 5.0),
+            ("1dof-5mm", ("stack.balloons=2",), 16.9),
+            ("3dof-15mm", ("stack.balloons=2",), 8.0),
+            ("radial-15mm", ("chamber.count=1", "tube.outer_diameter=4"), 40.0),
+            ("1dof-5mm", ("stack.balloons=2", "registration.method=ears"), 4.0),
+        ],
+        2,
+        names=3,
+    ),
 )
 def test_cavities_hold_what_was_asked(template: str, changes: tuple[str, ...], fill: float) -> None:
     laminate = build(template, *changes)

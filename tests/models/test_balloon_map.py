@@ -13,6 +13,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.rippled import compressed_shapes, free_shapes, height_ratio
+from tests.quick import few
 
 SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
@@ -39,7 +40,7 @@ PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
 
-@pytest.fixture(scope="module", params=SIZES)
+@pytest.fixture(scope="module", params=few(SIZES, 3))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -117,7 +118,7 @@ def judged(balloon: Balloon, most: float = 110.0) -> None:
     assert (np.abs(made.force(at, held) - exact.force) < 0.06 * full).all()
 
 
-@pytest.mark.parametrize("balloon", QUOTED, ids=lambda one: f"d = {2 * one.pocket:g}")
+@pytest.mark.parametrize("balloon", few(QUOTED, 1), ids=lambda one: f"d = {2 * one.pocket:g}")
 def test_volumes_rise_with_pressure_and_forces_fall_with_height(balloon: Balloon) -> None:
     judged(balloon)
 

@@ -19,6 +19,7 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.drawn import FLAT_PLATES
 from sbafab.models.figures import Prediction
 from sbafab.models.kinematics import round_stack, slot_stack
+from tests.quick import few
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
 
@@ -184,7 +185,7 @@ def test_every_figure_and_curve_says_model_and_trust(name: str) -> None:
             assert len(line.x) == len(line.y) > 1
 
 
-@pytest.mark.parametrize("count", range(2, 9))
+@pytest.mark.parametrize("count", few(range(2, 9), 3))
 def test_lobes_from_2_to_8(count: int) -> None:
     # Widely spaced lobes, or the tabs of eight would meet.
     found = sbafab.predict("3dof-15mm", f"chamber.count={count}", "chamber.axis_radius=10")

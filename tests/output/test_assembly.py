@@ -22,6 +22,8 @@ from tests.site.formats import hold
 
 SMALL = [f"parts.{name}.set.stack.balloons=2" for name in ("left", "right", "head")]
 BRACE = ["parts.arm.set.stack.balloons=2"]
+OFF = ["parts.magnet.offset=[0, 0]"]
+"""A magnet beside its seat in the template of an aperture."""
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +34,11 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> Run:
 @pytest.fixture(scope="module")
 def brace(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return generate(RunRequest(load_assembly("brace", BRACE), tmp_path_factory.mktemp("out")))
+
+
+@pytest.fixture(scope="module")
+def aperture(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return generate(RunRequest(load_assembly("aperture", BRACE), tmp_path_factory.mktemp("out")))
 
 
 def test_a_folder_for_each_design_and_one_page_for_all(brace: Run) -> None:
@@ -129,14 +136,13 @@ def test_three_copies_share_a_lamination(standing: Run) -> None:
 
 
 def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> None:
-    keys = [*BRACE, "parts.tube.outer_diameter=14"]
-    run = generate(RunRequest(load_assembly("brace", keys), tmp_path))
+    run = generate(RunRequest(load_assembly("aperture", [*BRACE, *OFF]), tmp_path))
     assert run.failed
     assert not list(run.folder.rglob("*.dxf"))
     assert not (run.folder / "traveller.html").exists()
     told = json.loads((run.folder / "checks.json").read_text(encoding="utf-8"))
     failed = {f["rule"] for f in told["findings"] if f["verdict"] == "fail"}
-    assert failed == {"tube-match"}
+    assert failed == {"seat"}
 
 
 @pytest.mark.long
@@ -177,9 +183,6 @@ def test_lowered_limits_of_parts_and_checks_are_said(tmp_path: Path) -> None:
     assert any(said[1] in f.message for f in check_folder(run.folder) if f.verdict == "fail")
 
 
-OFF = ["parts.magnet.offset=[0, 0]"]
-
-
 def test_the_folder_is_found_as_it_was_built(standing: Run) -> None:
     findings = check_folder(standing.folder)
     assert [f.message for f in findings if f.verdict == "fail"] == []
@@ -218,13 +221,13 @@ def test_another_design_file_is_found(standing: Run, tmp_path: Path) -> None:
     assert "design.toml was changed" in said
 
 
-def test_a_broken_design_file_is_found(standing: Run, tmp_path: Path) -> None:
-    folder = doctored(standing, tmp_path)
+def test_a_broken_design_file_is_found(aperture: Run, tmp_path: Path) -> None:
+    folder = doctored(aperture, tmp_path)
     (folder / "design.toml").write_text("family = 1", encoding="utf-8")
     assert "the parts were not put together" in claims_failed(folder)
 
 
-def test_a_lost_sheet_is_found(standing: Run, tmp_path: Path) -> None:
-    folder = doctored(standing, tmp_path)
+def test_a_lost_sheet_is_found(aperture: Run, tmp_path: Path) -> None:
+    folder = doctored(aperture, tmp_path)
     (folder / "sheets" / "TPE_1.dxf").unlink()
     assert "sheets/TPE_1.dxf" in claims_failed(folder)

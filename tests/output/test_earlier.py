@@ -17,6 +17,7 @@ from sbafab.output.checked import RunPart
 from sbafab.output.manifest import file_hashes
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Conforming, RunRequest, generate
+from tests.quick import few
 
 SMALL = ("stack.balloons=1",)
 OTHER = (*SMALL, "press.temperature_c=140")
@@ -51,7 +52,7 @@ def test_a_failing_design_takes_the_place_of_a_failed_one(tmp_path: Path) -> Non
     assert {"checks.json", "preview/layers.svg"} <= set(run.manifest["files"])
 
 
-@pytest.mark.parametrize("part", ["cut", "press", "mesh", "preview"])
+@pytest.mark.parametrize("part", few(["cut", "press", "mesh", "preview"], 2))
 def test_a_part_alone_does_not_put_away_another_designs_files(
     part: RunPart, tmp_path: Path
 ) -> None:
@@ -88,28 +89,28 @@ def test_results_stay_while_what_they_come_from_is_the_same(tmp_path: Path) -> N
 
 
 def test_a_failing_assembly_leaves_an_earlier_run_as_it_was(tmp_path: Path) -> None:
-    def brace(*assignments: str) -> Assembly:
-        found = load("brace", ("parts.arm.set.stack.balloons=1", *assignments))
+    def aperture(*assignments: str) -> Assembly:
+        found = load("aperture", ("parts.arm.set.stack.balloons=1", *assignments))
         assert isinstance(found, Assembly)
         return found
 
-    good = generate(RunRequest(brace(), tmp_path))
+    good = generate(RunRequest(aperture(), tmp_path))
     before = file_hashes(good.folder)
-    run = generate(RunRequest(brace("deploy.lumen_diameter=15"), tmp_path))
+    run = generate(RunRequest(aperture("parts.magnet.offset=[0, 0]"), tmp_path))
     assert run.failed
     assert run.kept
     assert file_hashes(good.folder) == before
 
 
 def test_a_design_of_an_assembly_is_not_written_into(tmp_path: Path) -> None:
-    found = load("brace", ("parts.arm.set.stack.balloons=1",))
+    found = load("aperture", ("parts.arm.set.stack.balloons=1",))
     assert isinstance(found, Assembly)
-    brace = generate(RunRequest(found, tmp_path)).folder
-    before = file_hashes(brace)
-    arm = load_design(brace / "3dof-15mm" / "design.toml")
+    aperture = generate(RunRequest(found, tmp_path)).folder
+    before = file_hashes(aperture)
+    arm = load_design(aperture / "3dof-15mm" / "design.toml")
     with pytest.raises(OutputError, match="several designs made together"):
-        generate(RunRequest(arm, brace, ("press",)))
-    assert file_hashes(brace) == before
+        generate(RunRequest(arm, aperture, ("press",)))
+    assert file_hashes(aperture) == before
 
 
 def test_meshes_of_another_fill_are_not_mixed(tmp_path: Path) -> None:

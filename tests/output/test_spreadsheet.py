@@ -81,9 +81,13 @@ def test_pandas_reads_numbers_as_numbers() -> None:
 def test_every_table_is_written_by_the_one_writer() -> None:
     """No other module calls a writer of CSV."""
     writers = []
+    names = ("writer", "DictWriter", "to_csv")
     for module in PACKAGE.rglob("*.py"):
-        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Attribute) and node.attr in ("writer", "DictWriter", "to_csv"):
+        text = module.read_text(encoding="utf-8")
+        if not any(name in text for name in names):
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Attribute) and node.attr in names:
                 writers.append(module.name)
     assert writers == ["spreadsheet.py"]
 

@@ -11,6 +11,7 @@ import pytest
 from sbafab.actuators import load_design
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
+from tests.quick import few
 
 FEW = ("rules.yield_builds=100", "registration.method=ears")
 UNEVEN = ("laser.kerf_tpe=[0.12, 0.1]", "laser.kerf_ptfe=[0.08, 0.12]")
@@ -39,14 +40,18 @@ def draw_bone(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("template", "settings"),
-    [
-        # A fillet wider than the tab takes its square corners: the ears were taken for tabs.
-        ("3dof-15mm", ("stack.balloons=2", "fillet.radius=4")),
-        # The window of the outer balloons is as wide as a tooling hole.
-        ("radial-15mm", ("chamber.length=11.5",)),
-        # The path round a concave corner does not tell the corner.
-        ("3dof-15mm", BONE),
-    ],
+    few(
+        [
+            # A fillet wider than the tab takes its square corners: the ears were taken for tabs.
+            ("3dof-15mm", ("stack.balloons=2", "fillet.radius=4")),
+            # The window of the outer balloons is as wide as a tooling hole.
+            ("radial-15mm", ("chamber.length=11.5",)),
+            # The path round a concave corner does not tell the corner.
+            ("3dof-15mm", BONE),
+        ],
+        2,
+        names=2,
+    ),
 )
 def test_what_was_written_holds_as_built(
     template: str, settings: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -11,6 +11,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from tests.quick import few
 
 SHEET = (
     "stack.balloons=1",
@@ -41,7 +42,7 @@ def test_pins_too_thick_are_refused_in_one_sentence(
 
 
 @pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm"])
-@pytest.mark.parametrize("margin", [10, 12, 30])
+@pytest.mark.parametrize("margin", few([10, 12, 30], 1))
 def test_the_thickest_pins_that_fit_leave_a_millimetre_of_film(template: str, margin: int) -> None:
     """Held by shapely: every hole of a sheet keeps off its edges, its windows and other holes."""
     setting = f"panel.margin={margin}"

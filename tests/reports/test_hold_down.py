@@ -13,13 +13,14 @@ from lxml import html as lxml_html
 
 from sbafab.actuators import load_design
 from sbafab.runs.run import RunRequest, generate
+from tests.quick import few
 from tests.reports.bench_pages import page, words_of
 
 FREE = r"{}, [\d.]+ mm thick: (.*?) No tab holds a part: (\d+) come free, the lightest of ([\d.]+)"
 
 
 @pytest.mark.parametrize(
-    ("template", "copies"), [("1dof-5mm", 1), ("3dof-15mm", 2), ("radial-15mm", 1)]
+    ("template", "copies"), few([("1dof-5mm", 1), ("3dof-15mm", 2), ("radial-15mm", 1)], 1, names=2)
 )
 def test_every_free_part_of_every_film_is_counted(
     template: str, copies: int, tmp_path: Path
@@ -50,11 +51,15 @@ def test_a_mask_of_five_millimetres_weighs_a_milligram(sheet_files: Any) -> None
 
 @pytest.mark.parametrize(
     ("hold", "words"),
-    [
-        ("border", "all along its border with tape or magnets"),
-        ("carrier", "carrier sheet of low tack, of paper or polyester and never of vinyl"),
-        ("vacuum", "on the vacuum bed over a porous sheet"),
-    ],
+    few(
+        [
+            ("border", "all along its border with tape or magnets"),
+            ("carrier", "carrier sheet of low tack, of paper or polyester and never of vinyl"),
+            ("vacuum", "on the vacuum bed over a porous sheet"),
+        ],
+        2,
+        names=2,
+    ),
 )
 @pytest.mark.parametrize("material", ["TPE", "PTFE"])
 def test_each_film_is_held_as_the_laser_holds_it(

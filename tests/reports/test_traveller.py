@@ -31,6 +31,7 @@ from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.shapes import rounds
 from sbafab.rules.finding import Finding, Place
+from tests.quick import few
 
 SHA = hashlib.sha256(b"design").hexdigest()
 DESIGNS = [
@@ -72,7 +73,7 @@ def words_of(node: Any) -> str:
     return " ".join(node.text_content().split())
 
 
-@pytest.mark.parametrize("given", DESIGNS, ids=" ".join)
+@pytest.mark.parametrize("given", few(DESIGNS, 3), ids=" ".join)
 def test_every_layer_is_laid_once_and_in_order_within_its_step(
     sheet_files: Any, given: tuple[str, ...]
 ) -> None:
@@ -89,7 +90,7 @@ def test_every_layer_is_laid_once_and_in_order_within_its_step(
     assert sorted(laid) == [layer.index for layer in work.laminate.layers]
 
 
-@pytest.mark.parametrize("given", DESIGNS, ids=" ".join)
+@pytest.mark.parametrize("given", few(DESIGNS, 3), ids=" ".join)
 def test_the_page_is_whole_in_itself(sheet_files: Any, given: tuple[str, ...]) -> None:
     page = page_of(work_of(sheet_files, *given, solid_png=b"\x89PNG"))
     tree = lxml_html.fromstring(page)

@@ -22,6 +22,7 @@ import pytest
 
 from sbafab import api
 from sbafab.studio.editing import edited
+from tests.quick import few
 from tests.studio.browsing import served
 
 PARALLEL = 200
@@ -188,7 +189,7 @@ def test_a_file_too_long_for_a_design_is_not_read(link: str, folder: Path) -> No
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], 1))
 def test_the_end_of_the_studio_speaks_of_nothing_else(tmp_path: Path, number: int) -> None:
     # What starts the tests may ignore signals (nohup), and a child would inherit that.
     program = (
