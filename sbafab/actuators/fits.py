@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from sbafab.design.records import AnyDesign, Design
-from sbafab.design.section import Section
+from sbafab.design.toml_table import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import (

@@ -19,7 +19,7 @@ from sbafab.actuators.stacking import (
     round_pockets,
 )
 from sbafab.design.records import Design, Form, Free, degrees_of_freedom
-from sbafab.design.section import Section
+from sbafab.design.toml_table import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point, unit

@@ -33,9 +33,9 @@ from sbafab.actuators.stacking import (
     tab_and_strip,
 )
 from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap
-from sbafab.design.section import Section
 from sbafab.design.sections import Chamber as ChamberSection
 from sbafab.design.sections import Inlet, Stack
+from sbafab.design.toml_table import Section
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point

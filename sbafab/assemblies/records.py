@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from sbafab.design.section import Section
 from sbafab.design.sections import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
+from sbafab.design.toml_table import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
 Seat = Literal["top", "bottom", "start", "end", "outside", "lumen", "inlet"]

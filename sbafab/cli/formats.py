@@ -21,7 +21,7 @@ from sbafab.output.checked import CHECKS_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.tables import PRESS_SCHEMA
+from sbafab.pressing.schedule_files import PRESS_SCHEMA
 from sbafab.reports.assembly_prediction import (
     AssemblyFigure,
     AssemblyPrediction,

@@ -21,7 +21,7 @@ from sbafab.cli.printing import print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
-from sbafab.models.drawn import model_form, near_discs
+from sbafab.models.drawn_pockets import model_form, near_discs
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack import stack
 from sbafab.reports.inflated_picture import (

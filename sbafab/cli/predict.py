@@ -34,7 +34,7 @@ from sbafab.cli.progress import shown_progress
 from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
 from sbafab.models.balloons import has_balloons
-from sbafab.models.drawn import model_form
+from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import LEFT_OUT, Factors, Figure, Model, Prediction, PredictionRequest
 from sbafab.models.formulas import size_phrases
 from sbafab.models.prediction import predict as predicted

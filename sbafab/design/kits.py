@@ -27,7 +27,6 @@ from sbafab.design.files import (
     write_copy,
 )
 from sbafab.design.films import Films, LayerFilms, without_other_products
-from sbafab.design.section import Section, writable
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -37,6 +36,7 @@ from sbafab.design.sections import (
     Rules,
     Sheets,
 )
+from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import Length, millimetres
 from sbafab.errors import DesignError
 

@@ -38,7 +38,6 @@ from sbafab.design.films import (
     without_other_products,
 )
 from sbafab.design.kits import inlet_of_kit, load_kit, under_kit
-from sbafab.design.section import Section
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -57,6 +56,7 @@ from sbafab.design.sections import (
     Sheets,
     Stack,
 )
+from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.notebook import table_html

@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
-from sbafab.design.section import Section, writable
+from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name

@@ -14,8 +14,8 @@ from typing import Any, Literal, TypeVar
 from pydantic import Field
 
 from sbafab.design.files import checked, listed, read_toml, shown
-from sbafab.design.section import Section
 from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.evidence.records import (
     KINDS,

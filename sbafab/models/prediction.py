@@ -17,7 +17,13 @@ from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, paper
-from sbafab.models.drawn import bounded, flat_forces, near_discs, relation_by_disc, why_no_disc
+from sbafab.models.drawn_pockets import (
+    bounded,
+    flat_forces,
+    near_discs,
+    relation_by_disc,
+    why_no_disc,
+)
 from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
     REACHED,

@@ -438,7 +438,7 @@ def stack(
 
     ``most_pressure`` in kPa is the range of its maps; those of wide pockets end before. A lone
     balloon is held by a small disc. ``factors`` are calibrated ones; ``form`` replaces the
-    design's own, for drawn pockets that are nearly round (``models.drawn.model_form``). Raises
+    design's own, for drawn pockets that are nearly round (``drawn_pockets.model_form``). Raises
     DesignError for pockets of another shape, for actuators round a tube and for films of unknown
     modulus.
     """

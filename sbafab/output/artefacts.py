@@ -14,9 +14,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab.cutting.files import write_layer_files
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
+from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.second_cut import write_second_cut
@@ -28,7 +28,7 @@ from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.files import MeshFile, write_meshes
+from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.figures import Prediction
 from sbafab.nesting.nest import as_dict
 from sbafab.nesting.records import Nest
@@ -46,7 +46,7 @@ from sbafab.output.checked import (
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
 from sbafab.pressing.cycles import batch_json, design_runs
-from sbafab.pressing.tables import PRESS_SCHEMA, press_csv, press_json
+from sbafab.pressing.schedule_files import PRESS_SCHEMA, press_csv, press_json
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS

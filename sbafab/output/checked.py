@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
-from sbafab.cutting.files import compensated_paths
+from sbafab.cutting.layer_files import compensated_paths
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
 from sbafab.cutting.sheets import Machine
 from sbafab.design.films import KerfWidth, Sheet, material

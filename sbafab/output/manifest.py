@@ -25,7 +25,7 @@ from sbafab.design.records import Design
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role, SheetPanel
-from sbafab.meshing.files import MeshFile
+from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import DesignPlan, kerf_widths, warnings
 from sbafab.output.swap import SCHEMA

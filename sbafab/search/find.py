@@ -31,7 +31,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.models.paper import Counterpart
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
-from sbafab.search.page import front
 from sbafab.search.quantities import Subject, refuse_unknown_key, shown_value
 from sbafab.search.strategies import (
     explore,
@@ -41,6 +40,7 @@ from sbafab.search.strategies import (
     widen_ranges,
     with_optuna,
 )
+from sbafab.search.sweep_page import front
 from sbafab.search.trial import (
     Goal,
     GridPoint,

@@ -21,9 +21,9 @@ from sbafab.errors import OutputError
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
 from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
-from sbafab.search.page import sweep_html
 from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
-from sbafab.search.table import (
+from sbafab.search.sweep_page import sweep_html
+from sbafab.search.sweep_table import (
     Table,
     refuse_foreign,
     stale_designs,

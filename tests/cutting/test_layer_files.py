@@ -12,9 +12,9 @@ import ezdxf
 import pytest
 
 import sbafab
-from sbafab.cutting import files
+from sbafab.cutting import layer_files
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.files import CutFile, compensated_paths, write_layer_files
+from sbafab.cutting.layer_files import CutFile, compensated_paths, write_layer_files
 from sbafab.cutting.properties import Curves, CutSettings, DxfProfile
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
@@ -128,7 +128,7 @@ def test_a_copy_that_differs_is_found(
     def cut_short(source: Path, target: Path) -> None:
         target.write_bytes(source.read_bytes()[:-1])
 
-    monkeypatch.setattr(files.shutil, "copyfile", cut_short)
+    monkeypatch.setattr(layer_files.shutil, "copyfile", cut_short)
     with pytest.raises(OutputError, match=r"003_TPE_cap\.dxf: differs"):
         written(laminate, tmp_path, SETTINGS)
 
@@ -136,8 +136,8 @@ def test_a_copy_that_differs_is_found(
 def test_a_wrong_write_is_found(
     laminate: Laminate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = files.dxf_text
-    monkeypatch.setattr(files, "dxf_text", lambda contours, *rest: write(contours[1:], *rest))
+    write = layer_files.dxf_text
+    monkeypatch.setattr(layer_files, "dxf_text", lambda contours, *rest: write(contours[1:], *rest))
     with pytest.raises(OutputError, match=r"001_TPE_base\.dxf: it has 3 holes, not 4"):
         written(laminate, tmp_path, SETTINGS)
 

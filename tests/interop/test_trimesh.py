@@ -10,7 +10,7 @@ import trimesh
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.files import write_meshes
+from sbafab.meshing.mesh_files import write_meshes
 from sbafab.meshing.solid import cavity_slabs, solid_slabs
 
 TEMPLATES = ["1dof-5mm", "3dof-15mm", "radial-15mm"]

@@ -18,8 +18,8 @@ from sbafab.meshing.conforming.meshes import (
     conforming_meshes,
     write_conforming,
 )
-from sbafab.meshing.files import MeshFile
-from sbafab.meshing.formats.table import CONFORMING_ENDINGS
+from sbafab.meshing.formats.registry import CONFORMING_ENDINGS
+from sbafab.meshing.mesh_files import MeshFile
 
 Written = tuple[ConformingMeshes, list[MeshFile], Path]
 

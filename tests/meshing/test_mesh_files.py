@@ -12,7 +12,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.meshing.files import write_meshes
+from sbafab.meshing.mesh_files import write_meshes
 from sbafab.meshing.solid import cavity_slabs, solid, solid_slabs
 
 TEMPLATES = ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"]
@@ -78,7 +78,7 @@ def test_same_bytes_again_under_another_hash_seed_and_time_zone(
     script = (
         "import sys; from pathlib import Path\n"
         "from sbafab.actuators import build, load_design\n"
-        "from sbafab.meshing.files import write_meshes\n"
+        "from sbafab.meshing.mesh_files import write_meshes\n"
         "laminate = build(load_design('3dof-15mm', ['stack.balloons=3']))\n"
         "write_meshes(laminate, Path(sys.argv[1]))\n"
     )

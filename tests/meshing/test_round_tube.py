@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, flat, layup
 from sbafab.meshing.conforming.meshes import conforming_meshes, write_conforming
 from sbafab.meshing.conforming.round_tube import round_tube
-from sbafab.meshing.files import write_meshes
+from sbafab.meshing.mesh_files import write_meshes
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from sbafab.errors import DesignError
 from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
-from sbafab.models.drawn import FLAT_PLATES
+from sbafab.models.drawn_pockets import FLAT_PLATES
 from sbafab.models.figures import Prediction
 from sbafab.models.kinematics import round_stack, slot_stack
 from tests.quick import few

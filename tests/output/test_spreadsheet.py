@@ -13,7 +13,7 @@ import sbafab
 from sbafab.actuators import build
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.pressing.tables import press_csv
+from sbafab.pressing.schedule_files import press_csv
 from sbafab.spreadsheet import csv_text, plain_text
 
 PACKAGE = Path(sbafab.__file__).parent

@@ -21,7 +21,7 @@ from sbafab.pressing.build_up import (
     pressures,
 )
 from sbafab.pressing.schedule import PressSettings, schedule
-from sbafab.pressing.tables import press_json
+from sbafab.pressing.schedule_files import press_json
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()

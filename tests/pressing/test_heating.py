@@ -12,7 +12,7 @@ from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import PressSettings, Schedule, schedule
-from sbafab.pressing.tables import press_csv, press_json
+from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
 

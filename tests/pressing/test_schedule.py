@@ -14,7 +14,7 @@ from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import PressSettings, schedule
-from sbafab.pressing.tables import press_csv, press_json
+from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()

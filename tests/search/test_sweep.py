@@ -18,9 +18,9 @@ from sbafab.design.identity import design_sha256
 from sbafab.errors import OutputError
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
-from sbafab.search.page import Dots, Objective, passes_svg, trades_svg
 from sbafab.search.pool import MeasureJob
 from sbafab.search.sweep import SweptDesigns
+from sbafab.search.sweep_page import Dots, Objective, passes_svg, trades_svg
 from tests.site.formats import hold
 
 HAS_PARQUET = find_spec("pyarrow") is not None

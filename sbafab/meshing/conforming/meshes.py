@@ -21,8 +21,8 @@ from sbafab.meshing.conforming.element_mesh import (
 from sbafab.meshing.conforming.fill import Fill, filled, formed, pockets
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Symmetry, flat, layup
 from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
-from sbafab.meshing.files import MeshFile, MeshKind
-from sbafab.meshing.formats.table import CONFORMING_ENDINGS, MESH_FORMATS
+from sbafab.meshing.formats.registry import CONFORMING_ENDINGS, MESH_FORMATS
+from sbafab.meshing.mesh_files import MeshFile, MeshKind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

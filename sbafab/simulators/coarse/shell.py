@@ -87,11 +87,6 @@ def fullest(pocket: float, neck: float) -> Meridian:
     return holding(neck, pocket - neck, min(most, spare))
 
 
-def partly(pocket: float, neck: float) -> Meridian:
-    """About half of what 5 kPa holds: 6.4 ul in a pocket of 5 mm."""
-    return holding(neck, pocket - neck, 6.4 * (pocket / 2.5) ** 3)
-
-
 def standing(balloon: float) -> Start:
     """Balloons so many mm high, or as high as their film allows."""
 

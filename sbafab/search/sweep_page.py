@@ -17,7 +17,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE
-from sbafab.search.table import Table
+from sbafab.search.sweep_table import Table
 from sbafab.search.vary import Varied
 from sbafab.version import GENERATOR
 

@@ -1,7 +1,4 @@
-"""The mesh formats: each is one file of this folder and one row here.
-
-Nothing here loads numpy, so that ``sbafab mesh --help`` stays quick.
-"""
+"""The mesh formats: each is one file of this folder and one row here."""
 
 from __future__ import annotations
 
