@@ -356,8 +356,11 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
     data, expected_data = actual.read_bytes(), expected.read_bytes()
     if data == expected_data:
         return ""
+    compare = _readers().get(expected.suffix)
+    if compare is None:
+        return f"{name} is not what design.toml makes: its bytes differ"
     try:
-        difference = _readers()[expected.suffix](actual, expected)
+        difference = compare(actual, expected)
     except (OutputError, *UNREADABLE) as error:
         difference = f"it cannot be read ({error})"
     return f"{name} is not what design.toml makes: {difference}" if difference else ""
