@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import Any
 
+    from numpy.typing import NDArray
+
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Pose, Stack
-    from sbafab.models.stack_loads import Load
+    from sbafab.models.stack_loads import GapPlaces, Load
 
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
@@ -42,7 +44,7 @@ DAMPING = 1e-3
 """First damping, as a share of the largest square of a derivative (mm by asinh)."""
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e3
 STILL = 1e-6
-"""Step (asinh) at which the tip comes no nearer."""
+"""Step (mm, rad, asinh) that changes nothing."""
 
 
 class TipTarget(NamedTuple):
@@ -59,7 +61,8 @@ class TipTarget(NamedTuple):
 class Linearisation(NamedTuple):
     """Linearised equilibrium: the tip (3,) in mm, the freedoms' own step to equilibrium (rows, 3)
     and their step by each pressure (rows, 3, chambers), the tip's motion by freedoms (3, rows x 3),
-    and the tangent stiffness (groups of rows, size, size).
+    the tangent stiffness (groups of rows, size, size), and which contacts of balloons and rims are
+    closed.
     """
 
     tip: Array
@@ -67,6 +70,7 @@ class Linearisation(NamedTuple):
     by_pressure: Array
     motion: Array
     matrix: Array
+    closed: NDArray[np.bool_]
 
 
 def reach(
@@ -192,6 +196,7 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
     else:
         at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
         at = at if target.load is None else at[stack.levels]
+    rows = stack.places if target.load is None else stack.level_places
     for _ in range(STEPS):
         now = _linearised(target, x, at)
         if now is None:
@@ -204,11 +209,11 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         move = now.own + now.by_pressure @ ahead
         share = float(step_limit(move).min())
         x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
-        if max(np.abs(move).max(), np.abs(ahead).max()) < LAST_STEP:
-            left = float(np.linalg.norm(missing - rates @ ahead))
-            return (
-                _pose(target, x, at) if left < NEAR and is_positive_definite(now.matrix) else None
-            )
+        largest = max(float(np.abs(move).max()), float(np.abs(ahead).max()))
+        if largest < STILL or (largest < LAST_STEP and (_closed(rows, at) == now.closed).all()):
+            if np.linalg.norm(missing - rates @ ahead) < NEAR and is_positive_definite(now.matrix):
+                return _pose(target, x, at)
+            return None
     return None
 
 
@@ -237,8 +242,17 @@ def _linearised(target: TipTarget, x: Array, at: Array) -> Linearisation | None:
     except np.linalg.LinAlgError:
         return None
     return Linearisation(
-        plates.places[-1], moves[..., 0], moves[..., 1:], motion.reshape(3, -1), matrix
+        plates.places[-1],
+        moves[..., 0],
+        moves[..., 1:],
+        motion.reshape(3, -1),
+        matrix,
+        _closed(rows.places, at),
     )
+
+
+def _closed(places: GapPlaces, at: Array) -> NDArray[np.bool_]:
+    return (at[:, None] @ places.meet)[:, 0] < 0
 
 
 def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
