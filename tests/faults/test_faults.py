@@ -20,6 +20,7 @@ from tests.faults.catalogue import FAULTS, KINDS, TEMPLATES, Goods, caught_by, c
 from tests.faults.record import Fault
 from tests.faults.specimen import LEFT_OUT, failing, quick, unabridged
 from tests.faults.table import PAGE, cells_of, text
+from tests.quick import few
 
 MOST, WIDER = "1dof-5mm", "1dof-10mm"
 DRAWN = [
@@ -81,7 +82,7 @@ def test_the_rule_named_for_a_fault_catches_it(
     assert stated == cell(fault, found), "python -m tests.faults writes the page"
 
 
-@pytest.mark.parametrize("template", TEMPLATES)
+@pytest.mark.parametrize("template", few(TEMPLATES, 3))
 def test_a_folder_without_a_fault_passes(template: str, goods: Goods) -> None:
     for settings in dict.fromkeys(fault.settings for fault in FAULTS):
         with suppress(DesignError):

@@ -285,6 +285,7 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
 
 def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
+    asked += ["--free", "chamber.diameter=5:5.1:0.1"]
     ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
     assert "force@200mm@1kPa none, it does not rise that far; at least 1 N: MISSED" in ended.output

@@ -16,6 +16,7 @@ from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
 from sbafab.meshing.conforming.mesh import Mesh
+from sbafab.simulators.calculix import results
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.results import (
     Frame,
@@ -248,9 +249,10 @@ def test_deformed_vtu_holds_moved_points_and_stress(tmp_path: Path) -> None:
     np.testing.assert_array_equal(grid.cells_dict[pyvista.CellType.QUADRATIC_WEDGE], mesh.cells)
 
 
-def test_picture_shows_the_stress_by_colour() -> None:
+def test_picture_shows_the_stress_by_colour(monkeypatch: pytest.MonkeyPatch) -> None:
     from PIL import Image
 
+    monkeypatch.setattr(results, "ENLARGED", 1)
     _, mesh = lone("quarter")
     frame = stretched(mesh, 1.0)
     right = mesh.points[:, 0] > mesh.points[:, 0].mean()
