@@ -18,6 +18,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import disc, rectangle
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
+from tests.quick import few
 
 EARS = "registration.method=ears"
 FEW = ("stack.balloons=2", "rules.yield_builds=100")
@@ -59,7 +60,7 @@ def layers(doctor: Doctor, gap: dict[str, Any]) -> tuple[shapely.Geometry, shape
     return below & above, part(doctor.path(gap["masks"][0]))
 
 
-@pytest.mark.parametrize(("template", "settings", "error"), CASES)
+@pytest.mark.parametrize(("template", "settings", "error"), few(CASES, 1, names=3))
 def test_chords_keep_bonds_overhangs_and_pins(
     template: str, settings: tuple[str, ...], error: float, tmp_path: Path
 ) -> None:

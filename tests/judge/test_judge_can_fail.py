@@ -34,6 +34,7 @@ from tests.judge.pressing import judge_press
 from tests.judge.sheets import judge_sheets
 from tests.judge.using import sbafab
 from tests.judge.voids import judge_voids
+from tests.quick import few
 
 RULES = {"yield_builds": 100, "worst_bond_width": 0, "worst_mask_overhang": 0}
 BLOB = svg_drawing("M3,0 C3,2 1,2.6 -0.5,2.4 S-3.4,1 -2.6,-1 S3,-2.4 3,0 Z")
@@ -83,7 +84,7 @@ def of_blob(folder: Folder) -> Iterator[Disagreement]:
     return judge_pockets(folder, [BLOB.pocket] * 2)
 
 
-@pytest.mark.parametrize("name", DESIGNS)
+@pytest.mark.parametrize("name", few(DESIGNS, 2))
 def test_sound_folders_are_left_alone(sound: dict[str, Patient], name: str) -> None:
     drawn = [BLOB.pocket] * 2 if name == "drawn" else None
     folder = sound[name].opened()

@@ -107,7 +107,7 @@ def test_power_density_by_hand(template: str, pushes: int) -> None:
 
 
 def test_mass_of_a_lone_balloon_by_hand() -> None:
-    found = sbafab.predict("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
+    found = sbafab.predict("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5", quick=True)
     laminate = sbafab.build("1dof-10mm", "stack.balloons=1", "inlet.tab_length=5")
     base, mask, cap = (layer.profile.area for layer in laminate.layers)
     # 1122 and 2200 kg/m3 are 1.122e-3 and 2.2e-3 g/mm3.
@@ -169,7 +169,7 @@ def test_calibration_is_named_wherever_it_counts() -> None:
     assert all("factor" not in figure.model.name for figure in plain.figures)
 
 
-@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("name", few(TEMPLATES, 2))
 def test_every_figure_and_curve_says_model_and_trust(name: str) -> None:
     found = sbafab.predict(name, volumes_ul=[1.0])
     for figure in found.figures:
@@ -188,7 +188,8 @@ def test_every_figure_and_curve_says_model_and_trust(name: str) -> None:
 @pytest.mark.parametrize("count", few(range(2, 9), 3))
 def test_lobes_from_2_to_8(count: int) -> None:
     # Widely spaced lobes, or the tabs of eight would meet.
-    found = sbafab.predict("3dof-15mm", f"chamber.count={count}", "chamber.axis_radius=10")
+    changes = f"chamber.count={count}", "chamber.axis_radius=10"
+    found = sbafab.predict("3dof-15mm", *changes, quick=True)
     names = [figure.name for figure in found.figures] + [left.name for left in found.left_out]
     assert sum(name.startswith("bend with") for name in names) == count - 1
     assert ("folded diameter" in [left.name for left in found.left_out]) == (count != 3)
@@ -200,7 +201,7 @@ def test_lobes_from_2_to_8(count: int) -> None:
 
 
 def test_more_than_half_a_turn_is_left_out() -> None:
-    found = sbafab.predict("3dof-15mm", "stack.balloons=20")
+    found = sbafab.predict("3dof-15mm", "stack.balloons=20", quick=True)
     bends = [left for left in found.left_out if left.name.startswith("bend with")]
     assert len(bends) == 2
     assert "half a turn" in bends[0].reason

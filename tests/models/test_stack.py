@@ -270,6 +270,7 @@ def test_a_lone_balloon_rises_as_the_free_one_does() -> None:
     assert lone.pose((5,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
 
 
+@pytest.mark.long
 def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
     wide = sbafab.stack("1dof-10mm", "chamber.diameter=30")
     assert 10 < wide.most_pressure < 110

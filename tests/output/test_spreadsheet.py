@@ -97,7 +97,7 @@ def test_a_sweep_s_table_holds_no_formula(tmp_path: Path) -> None:
     swept = sbafab.sweep(
         "1dof-5mm",
         {"stack": {"balloons": 1}, "order": {"note": note, "made_for": "-Ada"}},
-        vary=["bond.width=0.75:0.8:0.05"],
+        vary=["order.copies=1:2:1"],
         out=tmp_path,
         all_columns=True,
     )
@@ -105,7 +105,7 @@ def test_a_sweep_s_table_holds_no_formula(tmp_path: Path) -> None:
     assert formulas(text) == []
     rows = list(csv.DictReader(io.StringIO(text, newline="")))
     assert [row["order.note"] for row in rows] == [f"'{note}"] * 2
-    assert [float(row["bond.width"]) for row in rows] == [0.75, 0.8]
+    assert [int(row["order.copies"]) for row in rows] == [1, 2]
 
 
 def test_a_press_table_holds_no_formula() -> None:

@@ -17,6 +17,7 @@ from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import record_text, traveller_html
+from tests.quick import few
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
@@ -53,7 +54,7 @@ def html(sheet_files: Any) -> str:
     return traveller_html(design, laminate, plan, sheet_files(laminate), job)
 
 
-@pytest.mark.parametrize("paper", PAPERS)
+@pytest.mark.parametrize("paper", few(PAPERS, 1))
 def test_it_prints_on_both_papers(paper: str, html: str, tmp_path: Path) -> None:
     page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
     # The page itself names no paper: a printer does.

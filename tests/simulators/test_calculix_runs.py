@@ -16,6 +16,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.simulators.calculix import results
 from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.run import History, run_ccx, simulate
@@ -89,7 +90,8 @@ def test_a_run_that_diverges() -> None:
 
 
 @needs_ccx
-def test_simulate_command(tmp_path: Path) -> None:
+def test_simulate_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(results, "ENLARGED", 1)
     arguments = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "calculix"]
     arguments += ["--symmetry", "quarter", "--h", "0.75", "--pressure", "5 mbar"]
     arguments += ["--procedure", "static", "--json", "-o", str(tmp_path)]
