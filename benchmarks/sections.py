@@ -196,6 +196,13 @@ def poses(rounds: int) -> Section:
         for kind, is_dragged in (("along a path", True), ("at random", False)):
             taken = [equilibria.pose_seconds(load, is_dragged) for _ in range(rounds)]
             rows.append(Row(f"{load}, {kind}", taken, rate(taken, "equilibria")))
+        taken = [equilibria.derivative_seconds(load) for _ in range(rounds)]
+        rows.append(Row(f"{load}, at random, with derivatives", taken, rate(taken, "equilibria")))
+        if "plate" in load:
+            continue
+        for kind, is_dragged in (("along a path", True), ("at random", False)):
+            taken = [equilibria.reach_seconds(load, is_dragged) for _ in range(rounds)]
+            rows.append(Row(f"{load}, tip to a place, {kind}", taken, rate(taken, "places")))
     rivals = {
         "SOFA, shells": simulators.sofa,
         "MuJoCo, flexes in rings of 8": lambda: simulators.mujoco(8),

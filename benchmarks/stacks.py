@@ -59,3 +59,24 @@ def pose_seconds(load: str, is_dragged: bool) -> float:
     for pressures in dragged() if is_dragged else drawn():
         pose = stack.pose(pressures, near=pose if is_dragged else None, **loads)
     return (time.process_time() - began) / POSES
+
+
+def derivative_seconds(load: str) -> float:
+    """Processor time of one equilibrium from nothing with its derivatives."""
+    stack, loads = sbafab.stack(DESIGN), LOADS[load]
+    stack.derivatives((9, 7, 5), **loads)
+    began = time.process_time()
+    for pressures in drawn():
+        stack.derivatives(pressures, **loads)
+    return (time.process_time() - began) / POSES
+
+
+def reach_seconds(load: str, is_dragged: bool) -> float:
+    """Processor time of bringing the tip to a place that a pose has: as of ``pose_seconds``."""
+    stack, loads = sbafab.stack(DESIGN), LOADS[load]
+    tips = [stack.pose(each, **loads).tip for each in (dragged() if is_dragged else drawn())]
+    pose = stack.reach(tips[0], MOST, **loads)
+    began = time.process_time()
+    for tip in tips:
+        pose = stack.reach(tip, MOST, near=pose if is_dragged else None, **loads)
+    return (time.process_time() - began) / POSES

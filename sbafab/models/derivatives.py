@@ -36,6 +36,10 @@ if TYPE_CHECKING:
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
 
+RESIDUAL = 1e-7
+"""Residual in mN (or mN mm) that counts as none: poses are in equilibrium to about 1e-6 mm."""
+CORRECTIONS = 6
+"""Most of Newton's steps to that, one of which suffices unless contacts open or close."""
 UNIT, QUARTER_TURN = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
@@ -117,12 +121,7 @@ class Linearised(NamedTuple):
         """
         groups, size, _ = self.matrices.shape
         count = pulls.shape[-1]
-        try:
-            moves = np.linalg.solve(self.matrices, pulls.reshape(groups, size, count))
-        except np.linalg.LinAlgError:
-            raise DesignError(
-                "the stack is about to buckle and has no derivatives; change a pressure or load"
-            ) from None
+        moves = _solved(self.matrices, pulls.reshape(groups, size, count))
         flat = moves.reshape(-1, count)
         motion = self.motion.reshape(6, -1) @ flat
         filled = self.filling.reshape(len(self.filling), -1) @ flat
@@ -169,21 +168,26 @@ def linearised(
     push, hardness = np.zeros_like(pose.freedoms), 0.0
     if load is None:
         kinds = pose.freedoms[stack.first_levels]
-        _, gradient, blocks = springs.energy(kinds)
-        # Poses are in equilibrium to about 1e-6; Newton's step squares the error.
-        kinds = kinds - np.linalg.solve(blocks, gradient[..., None])[..., 0]
-        matrices = springs.energy(kinds)[2][stack.levels]
+        for _ in range(CORRECTIONS):
+            _, gradient, blocks = springs.energy(kinds)
+            if np.abs(gradient).max() < RESIDUAL:
+                break
+            kinds = kinds - _solved(blocks, gradient[..., None])[..., 0]
+        matrices = blocks[stack.levels]
         freedoms = kinds[stack.levels]
         plates = plate_chain(freedoms, stack.pitch)
         motions = level_motions(plates)
         each = stack.each(springs)
     else:
         each = stack.each(springs)
-        now = loaded_energy(each, stack.pitch, load, pose.freedoms)
-        step = np.linalg.solve(hessian(now, pose.freedoms, stack.pitch), now.gradient)
-        freedoms = pose.freedoms - step.reshape(-1, 3)
-        now = loaded_energy(each, stack.pitch, load, freedoms)
-        matrices = hessian(now, freedoms, stack.pitch)[None]
+        freedoms = pose.freedoms
+        for _ in range(CORRECTIONS):
+            now = loaded_energy(each, stack.pitch, load, freedoms)
+            matrix = hessian(now, freedoms, stack.pitch)
+            if np.abs(now.gradient).max() < RESIDUAL * (1 + 1e-3 * now.push):
+                break
+            freedoms = freedoms - _solved(matrix, now.gradient).reshape(-1, 3)
+        matrices = matrix[None]
         plates, motions = now.plates, now.motions
         if now.touch is not None:
             touch = now.touch
@@ -201,6 +205,15 @@ def linearised(
         push,
         hardness,
     )
+
+
+def _solved(matrices: Array, right: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.solve(matrices, right))
+    except np.linalg.LinAlgError:
+        raise DesignError(
+            "the stack is about to buckle and has no derivatives; change a pressure or load"
+        ) from None
 
 
 def tip_motion(plates: Chain, motions: Array) -> Array:
