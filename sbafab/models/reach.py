@@ -20,7 +20,12 @@ from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.balloon_map import P0
 from sbafab.models.derivatives import derivatives, hessian, tip_motion
 from sbafab.models.least_energy import is_positive_definite, step_limit
-from sbafab.models.stack_loads import level_motions, loaded_energy, plate_chain
+from sbafab.models.stack_loads import (
+    level_motions,
+    loaded_energy,
+    plate_chain,
+    with_diagonal_blocks,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -36,6 +41,8 @@ NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
 STEPS, LAST_STEP = 9, 2e-3
 """Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
+CLOSE = 0.05
+"""Step (mm, rad, asinh) from which on tangents are exact."""
 LONGEST_STEP = 1.5
 """Largest change of asinh(p / P0) in one step."""
 POSES = 40
@@ -197,8 +204,9 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
         at = at if target.load is None else at[stack.levels]
     rows = stack.places if target.load is None else stack.level_places
+    largest = math.inf
     for _ in range(STEPS):
-        now = _linearised(target, x, at)
+        now = _linearised(target, x, at, largest < CLOSE)
         if now is None:
             return None
         rates = now.motion @ now.by_pressure.reshape(-1, len(x))
@@ -217,7 +225,8 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
     return None
 
 
-def _linearised(target: TipTarget, x: Array, at: Array) -> Linearisation | None:
+def _linearised(target: TipTarget, x: Array, at: Array, is_close: bool) -> Linearisation | None:
+    """Return the linearised equilibrium, None where it is singular; exact only if ``is_close``."""
     stack, load = target.stack, target.load
     springs = stack.springs((P0 * np.sinh(x)).tolist())
     if load is None:
@@ -229,7 +238,10 @@ def _linearised(target: TipTarget, x: Array, at: Array) -> Linearisation | None:
         rows = stack.each(springs)
         now = loaded_energy(rows, stack.pitch, load, at)
         gradient, plates, motions = now.gradient[None], now.plates, now.motions
-        matrix = hessian(now, at, stack.pitch)[None]
+        if is_close:
+            matrix = hessian(now, at, stack.pitch)[None]
+        else:
+            matrix = with_diagonal_blocks(now.rest(), now.blocks)[None]
     motion = tip_motion(plates, motions)[:3]
     if load is None:
         motion = motion.transpose(0, 2, 1) @ (stack.levels[:, None] == np.arange(len(at)))

@@ -305,7 +305,7 @@ class Stack:
         near: Pose | None = None,
         **load: Any,
     ) -> Pose:
-        """Return a pose whose tip stands at a place (3) in mm, within 1e-4 mm; its ``pressures``
+        """Return a pose whose tip stands at a place (3) in mm, within 1e-3 mm; its ``pressures``
         (kPa) are from 0 to ``most_pressure``, by default that of the maps.
 
         ``near`` is a pose to start from, such as the last one of a motion; ``load`` are keyword
