@@ -192,6 +192,33 @@ def unstated_minutes(films: list[Film], press: PressSettings) -> str:
     )
 
 
+STATED_C = 135.0
+"""Temperature that the paper states its minutes for, C (Sec. 2)."""
+
+
+def minutes_of_another_temperature(
+    laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
+) -> str:
+    """Return the warning that the paper's minutes are pressed at another temperature than the
+    paper's; empty for none. Minutes that differ from the paper's, and those of films that it did
+    not press, were stated by the user, who tried them as set.
+    """
+    films = {layer.film for layer in laminate.layers if not layer.is_mask}
+    paper = PressSettings()
+    usual = [
+        str(part.number) for part in parts if press.minutes(part.name) == paper.minutes(part.name)
+    ]
+    is_the_papers = any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
+    if press.temperature_c == STATED_C or not (usual and is_the_papers):
+        return ""
+    some = "" if len(usual) == len(parts) else f" of step{'s' * (len(usual) > 1)} "
+    return (
+        f"minutes{some}{joined_words(usual) if some else ''} stated for {STATED_C:g} C, the press "
+        f"is set to {press.temperature_c:g} C: nobody stated minutes for that, so try the bond on "
+        "scrap first, and set the press minutes to what held"
+    )
+
+
 def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
     """Return the structural films of a laminate for which no minutes are stated."""
     return unstated((layer.film for layer in laminate.layers), press.minutes_for)
@@ -627,11 +654,7 @@ def warnings(
                 f"pressed at {press.temperature_c:g} C (panel.carrier_limit_c)"
             )
     yield from _unknown_films(laminate, press)
-    if press.temperature_c > HOTTEST_TRIED:
-        yield (
-            f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
-            "which already over-melted more than 135 C does"
-        )
+    yield from _other_temperatures(laminate, press, parts)
     low, high = PRESSURES_TRIED
     if not low <= press.pressure_kpa <= high:
         yield (
@@ -684,6 +707,20 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
                 f"no melting point of {film.product} is known, so nobody has checked that "
                 f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
             )
+
+
+def _other_temperatures(
+    laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
+) -> Iterator[str]:
+    """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
+    has_minutes = not films_without_minutes(laminate, press)
+    if has_minutes and (words := minutes_of_another_temperature(laminate, press, parts)):
+        yield words
+    if press.temperature_c > HOTTEST_TRIED:
+        yield (
+            f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
+            "which already over-melted more than 135 C does"
+        )
 
 
 def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:

@@ -108,6 +108,50 @@ def test_minutes_are_those_of_a_film_that_somebody_stated_them_for(
     assert "press.minutes_for" in blank[0]
 
 
+OWN = ("press.flash_bottom_minutes=4", "press.bond_bottom_minutes=10")
+TPU = ("films.tpe.product=TPU 85A", "films.tpe.thickness=0.05")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        # The paper states 3, 12, 10 and 20 minutes at 135 C (Sec. 2).
+        (("press.temperature_c=150",), "minutes stated for 135 C, the press is set to 150 C:"),
+        (("press.temperature_c=130",), "minutes stated for 135 C, the press is set to 130 C:"),
+        (("press.temperature_c=135.5",), "minutes stated for 135 C, the press is set to 135.5 C:"),
+        (
+            ("press.temperature_c=150", *OWN),
+            "minutes of steps 3 and 4 stated for 135 C, the press is set to 150 C:",
+        ),
+        (
+            ("press.temperature_c=150", *OWN, "press.flash_middle_minutes=8"),
+            "minutes of step 4 stated for 135 C, the press is set to 150 C:",
+        ),
+        (("press.temperature_c=135",), ""),
+        (OWN, ""),
+        (
+            (
+                *("press.temperature_c=150", *OWN),
+                *("press.flash_middle_minutes=8", "press.bond_all_minutes=15"),
+            ),
+            "",
+        ),
+        # Blank minutes belong to no temperature; those of a film that a user names are the user's.
+        (("press.temperature_c=150", *TPU), ""),
+        (("press.temperature_c=150", *TPU, 'press.minutes_for=["TPU 85A, 0.05 mm"]'), ""),
+    ],
+)
+def test_the_papers_minutes_are_those_of_its_temperature(
+    changes: tuple[str, ...], words: str
+) -> None:
+    press = press_json(plan_of("1dof-5mm", *changes))
+    found = [text for text in press["warnings"] if "the press is set to" in text]
+    assert [text.startswith(words) for text in found] == [True] * bool(words)
+    assert all("scrap first" in text for text in found)
+    if words:
+        assert None not in [step["minutes"] for step in press["steps"]]
+
+
 def test_an_unknown_melting_point_is_named() -> None:
     plan = plan_of("1dof-5mm", "films.tpe.product=TPU 85A", "films.tpe.thickness=0.038")
     assert plan.heating.melting_c is None

@@ -54,6 +54,12 @@ def test_a_pin_counts_only_in_the_step_that_adds_the_layer(sheet_files: Any) -> 
     assert with_ears["P01"] == with_ears["P07"] == "film1 and film2"
 
 
+def test_minutes_of_another_temperature_are_not_pressed_without_a_word(sheet_files: Any) -> None:
+    words = "minutes stated for 135 C, the press is set to 150 C"
+    assert words in words_of(page(sheet_files, "1dof-5mm", "press.temperature_c=150"))
+    assert "stated for 135 C" not in words_of(page(sheet_files, "1dof-5mm"))
+
+
 @pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
 def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
     words = words_of(page(sheet_files, template).get_element_by_id("press").getparent())
