@@ -12,6 +12,7 @@ nearly linear.
 from __future__ import annotations
 
 import math
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -107,7 +108,8 @@ def reach(
         if pose is not None:
             return pose
     best = None
-    for x in (guess, *_further_starts(target, guess)):
+    further = _further_starts(target, guess)
+    for x in (guess, *(further if load is None or load.wall is None else islice(further, 2))):
         pose = _by_poses(target, x, arguments, near if best is None else None)
         if pose is None:
             continue

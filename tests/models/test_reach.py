@@ -10,7 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError, UnreachableError
-from sbafab.models.stack import Stack
+from sbafab.models.stack import Plate, Stack
 
 MOST = 10.0
 """kPa to which chambers may be filled."""
@@ -20,6 +20,7 @@ LOADS: dict[str, dict[str, Any]] = {
     "free": {},
     "tip": {"tip_load": (0.0, 0.005, -0.005)},
     "gravity": {"gravity": (0.0, 0.6, -1.0)},
+    "plate": {"plate": Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0))},
     "both": {"tip_load": (0.002, 0.0, -0.004), "gravity": True},
 }
 
@@ -51,7 +52,7 @@ def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
 
 @pytest.mark.parametrize("load", LOADS)
 def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    assert missed(three, 20, LOADS[load]) == 0
+    assert missed(three, 8 if load == "plate" else 20, LOADS[load]) == 0
 
 
 @pytest.mark.long
