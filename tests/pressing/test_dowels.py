@@ -20,13 +20,26 @@ from sbafab.laminate.base_plate import (
 )
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import press_settings
-from sbafab.pressing.dowels import PinHole, chamfer, hole_notes, lengths_sold
+from sbafab.pressing.dowels import (
+    PinHole,
+    Standard,
+    chamfer,
+    hole_notes,
+    is_sold,
+    lengths_sold,
+)
 from sbafab.pressing.schedule import PressSettings, Schedule, Step, plate_holes, schedule
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()
 ISO_8734 = {1.0: (3, 4, 5, 6, 8, 10), 2.0: (5, 6, 8, 10, 12, 14, 16, 18, 20)}
 """Lengths in mm of ISO 8734, Table 1."""
+LENGTHS_FROM_TO = {
+    "ISO 8734": "1: 3-10, 1.5: 4-16, 2: 5-20, 2.5: 6-24, 3: 8-30, 4: 10-40, 5: 12-50, 6: 14-60",
+    "ISO 2338": "0.6: 2-6, 0.8: 2-8, 1: 4-10, 1.2: 4-12, 1.5: 4-16, 2: 6-20, 2.5: 6-24, 3: 8-30, "
+    "4: 8-40, 5: 10-50, 6: 12-60",
+}
+"""Diameters, shortest and longest lengths, mm, as Table 1 of each standard prints them."""
 CHAMFERS = {1.0: 0.2, 2.0: 0.35, 3.0: 0.5, 4.0: 0.63, 5.0: 0.8, 6.0: 1.2}
 """mm, of the same table."""
 ISO_286 = {
@@ -59,6 +72,18 @@ def test_lengths_are_the_standards() -> None:
     assert {diameter: chamfer(diameter) for diameter in CHAMFERS} == CHAMFERS
     assert lengths_sold(1.0, "ISO 2338")[0] == 4
     assert lengths_sold(1.0, "ISO 8734", (7.0, 5.5)) == (5.5, 7.0)
+
+
+@pytest.mark.parametrize("standard", ["ISO 8734", "ISO 2338"])
+def test_every_diameter_of_the_standards_is_sold(standard: Standard) -> None:
+    table = LENGTHS_FROM_TO[standard].split(", ")
+    ends = {float(d): lengths.split("-") for d, lengths in (row.split(": ") for row in table)}
+    for diameter, (shortest, longest) in ends.items():
+        assert is_sold(diameter, standard)
+        sold = lengths_sold(diameter, standard)
+        assert (sold[0], sold[-1]) == (float(shortest), float(longest))
+    absent = {0.5, 0.6, 0.8, 1.2, 3.5, 4.5} - set(ends)
+    assert not any(is_sold(diameter, standard) for diameter in absent)
 
 
 @pytest.mark.parametrize("balloons", [1, 2, 15, 40])
@@ -187,6 +212,23 @@ def test_pins_or_plate_that_do_not_do_are_refused(stack: Stack) -> None:
         schedule(stack(15), replace(PAPER, pin_lengths=(3.0,)))
     with pytest.raises(DesignError, match=r"press.plate_thickness = 2 is thinner than the 3\.\d+"):
         schedule(stack(15), replace(PAPER, plate_thickness=2.0))
+
+
+def test_a_plate_as_thin_as_the_shallowest_shoulder_is_taken(stack: Stack) -> None:
+    """Films of 0.025 and 0.038 mm, a release film of 0.05, paper of 0.1, a chamfer of 0.2.
+
+    The highest stack on the pin is that of step 3: 0.025 + 0.038 + 0.025 + 0.05 + 0.1 + 0.2 =
+    0.438. A pin of 4 mm, give or take 0.25, leaves a shoulder 4 - 0.25 - 0.05 - 0.438 = 3.262 deep
+    at most: 3.25 in steps of 0.05. 1 mm stays under it. The pin of 6 mm would take 5.25.
+    """
+    own = replace(PAPER, pin_lengths=(4.0, 6.0))
+    plan = schedule(stack(2), replace(own, plate_thickness=4.25))
+    assert plate(plan) == 4.25
+    assert {pin.seat_mm for step in plan.steps for pin in step.pin_settings} == {3.25}
+    with pytest.raises(DesignError, match=r"plate_thickness = 4.24 is thinner than the 4.25 mm"):
+        schedule(stack(2), replace(own, plate_thickness=4.24))
+    # 6 mm is the thinnest plate sold.
+    assert plate(schedule(stack(2), own)) == 6.0
 
 
 def test_a_diameter_that_nobody_sells_draws_a_warning(stack: Stack) -> None:

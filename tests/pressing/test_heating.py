@@ -56,6 +56,8 @@ def test_minutes_follow_from_the_time_constant_of_the_bench() -> None:
     assert start.after_minutes == pytest.approx(reached[130.0], abs=0.01)
     assert end.after_minutes == pytest.approx(reached[130.0] + 10, abs=0.01)
     assert end.edge_c == pytest.approx(edge, abs=0.05)
+    # 135 - 5 exp(-4) = 134.908, said to a tenth.
+    assert end.edge_c == 134.9
 
 
 def test_the_clock_never_starts_below_the_melting_point(stack: Stack) -> None:
