@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.actuators import build
+from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.models import parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
 from sbafab.models.drawn_pockets import FLAT_PLATES
-from sbafab.models.figures import Prediction
-from sbafab.models.kinematics import round_stack, slot_stack
+from sbafab.models.figures import Factors, Prediction
+from sbafab.models.kinematics import actuator, round_stack, slot_stack
+from sbafab.models.prediction import workspace_relation
 from tests.quick import few
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
@@ -43,6 +44,20 @@ def test_3dof_forces_are_three_times_one_balloon_s(three: Prediction) -> None:
     assert by_eqs_1_to_3 == pytest.approx(flat / 2)
     held = three.value("blocked force at 100 kPa, at 75 % of full stroke", "virtual work on Eq. 4")
     assert held == pytest.approx(3 * 0.1 * float(printed.rate(0.75 * 17.5 / 15, 2.5)))
+
+
+def test_the_papers_height_stands_beside_its_own_actuator_alone(three: Prediction) -> None:
+    # Three stacks of fifteen balloons of 5 mm (Sec. 4.6).
+    [point] = three.relation("workspace").points
+    assert (tuple(point.x), tuple(point.y)) == ((0.0,), (17.5,))
+    for template, changes in [
+        ("3dof-15mm", ["stack.balloons=14"]),
+        ("1dof-5mm", ["stack.balloons=15"]),
+        ("3dof-15mm", ["chamber.diameter=4.5"]),
+    ]:
+        design = load_design(template, changes)
+        other = actuator(design, build(design), Factors())
+        assert workspace_relation(other).points == ()
 
 
 def test_3dof_folds_to_9_9_and_pressed_to_8_6(three: Prediction) -> None:

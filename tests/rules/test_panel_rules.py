@@ -138,6 +138,11 @@ def test_a_tongue_of_scrap_far_smaller_than_a_tab_is_found(reach: float) -> None
         )
         assert found.measured == 1.0
         assert said in found.message
+    # In front of the inlet the tongue leaves a rectangle; the place is on one of its sides, in the
+    # middle, and not at a corner.
+    sides = [(-reach / 2, 0.1), (-reach / 2, -0.1), (-reach, 0.0), (0.0, 0.0)]
+    at = [aside(scrap.AHEAD + along, off) for along, off in sides]
+    assert any((found.where.x, found.where.y) == pytest.approx(place, abs=1e-6) for place in at)
     # A mask sheet that reaches between the tongue and the tab keeps them apart.
     shut = with_sheet(laminate, 5, lambda sheet, _: sheet | held)
     cover = strip(aside(-1.5, tab - 1.0), aside(-1.5, tab + 4.0), 1.0)

@@ -35,7 +35,7 @@ from sbafab.rules.registration_yield import (
     rows_of,
     simulate,
 )
-from sbafab.rules.sealing import _around
+from sbafab.rules.sealing import _around, _gap
 
 Good = Callable[..., Laminate]
 BUILDS = 400
@@ -357,6 +357,27 @@ NOTCHED = rectangle((-4, -3), (4, 3)) - disc((0, 0), 1) - disc((4, 0), 1.5)
 )
 def test_what_is_round_a_region_is_what_a_boolean_leaves(region: Region) -> None:
     assert _around(region, FRAME).contours == (FRAME - region).contours
+
+
+def test_voids_that_touch_at_a_point_are_told_apart_along_one_circle() -> None:
+    """A pocket round a hole of radius 2. A square of film stands in the hole on its corners and
+    leaves four voids; or two wedges of bond reach the hole's edge and leave two pockets.
+    """
+    hole, frame = disc((0, 0), 2), disc((0, 0), 9)
+    ring, film = disc((0, 0), 3) - hole, disc((0, 0), 5) - hole
+    square = polygon([(2, 0), (0, 2), (-2, 0), (0, -2)])
+    gap = _gap(ring, film | square, frame)
+    # Four segments of 4 (pi / 4 - 1 / 2) each, and what is round the film.
+    segments = [number for number, void in enumerate(gap.missing) if void.area < 2]
+    assert [gap.missing[n].area for n in segments] == [pytest.approx(math.pi - 2)] * 4
+    assert sorted({(pocket, void) for pocket, void, _ in gap.touching}) == [
+        (0, number) for number in segments
+    ]
+    wedges = union(polygon([(way * 2, 0), (way * 4, 1), (way * 4, -1)]) for way in (1, -1))
+    gap = _gap(ring - wedges, film, frame)
+    assert len(gap.unbonded) == 2
+    joined = {(pocket, gap.missing[void].area) for pocket, void, _ in gap.touching}
+    assert sorted(joined) == [(0, pytest.approx(4 * math.pi)), (1, pytest.approx(4 * math.pi))]
 
 
 @pytest.mark.parametrize("by", [Region(), disc((0, 0), 2), NOTCHED, disc((4, 0), 1.5), FRAME])
