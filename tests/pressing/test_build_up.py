@@ -47,6 +47,20 @@ def test_what_films_and_plate_get_is_the_force(pad: Pad) -> None:
     assert found.bond < found.film < found.edge
 
 
+def test_the_pad_spans_beside_what_stands_out(stack: Stack) -> None:
+    """A soft half-space closes a gap of width w by 2 p w / E; E is 412.7 kPa at 10 Shore A.
+
+    The pin of step 1 is 4 mm long in a hole of 3.25, over 0.063 of films and 0.05 below them; it
+    may be 0.25 longer and its hole 0.05 shallower.
+    """
+    found = pressures(110.0, PLATEN, Pad(), 25.0, LAMINATE)
+    assert found.free == pytest.approx(1.865 * 412.7 / (2 * 110), abs=0.05)
+    first = schedule(stack(2), replace(PAPER, pin_lengths=(4.0,))).steps[0]
+    out = 4 - 3.25 + 0.25 + 0.05 - 0.063 - 0.05
+    width = out * 412.7 / (2 * 110)
+    assert first.pressure_basis.endswith(f"; up to {width:.1f} mm round a pin none")
+
+
 def test_solid_rubber_must_flow_aside_and_is_harder_than_a_sponge() -> None:
     # A disc of radius a on a pad of height H has the shape factor a / 2 H.
     a, thickness = 10.0, 5.0

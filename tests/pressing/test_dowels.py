@@ -71,6 +71,8 @@ def test_lengths_are_the_standards() -> None:
         assert lengths_sold(diameter, "ISO 8734") == lengths
     assert {diameter: chamfer(diameter) for diameter in CHAMFERS} == CHAMFERS
     assert lengths_sold(1.0, "ISO 2338")[0] == 4
+    long = (14, 16, 18, 20, 22, 24, 26, 28, 30, 32, 35, 40, 45, 50, 55, 60)
+    assert lengths_sold(6.0, "ISO 8734") == long
     assert lengths_sold(1.0, "ISO 8734", (7.0, 5.5)) == (5.5, 7.0)
 
 
@@ -229,6 +231,15 @@ def test_a_plate_as_thin_as_the_shallowest_shoulder_is_taken(stack: Stack) -> No
         schedule(stack(2), replace(own, plate_thickness=4.24))
     # 6 mm is the thinnest plate sold.
     assert plate(schedule(stack(2), own)) == 6.0
+
+
+def test_the_depth_with_which_pins_stand_out_least_is_taken(stack: Stack) -> None:
+    """As above, but with pins of 5.04: 5.04 - 0.3 - 0.438 = 4.302, drilled 4.30 deep, stands out
+    0.74 where pins of 4 stand out 0.75.
+    """
+    plan = schedule(stack(2), replace(PAPER, pin_lengths=(4.0, 5.04), plate_thickness=8.0))
+    pins = {(pin.length_mm, pin.seat_mm) for step in plan.steps for pin in step.pin_settings}
+    assert pins == {(5.04, 4.3)}
 
 
 def test_a_diameter_that_nobody_sells_draws_a_warning(stack: Stack) -> None:

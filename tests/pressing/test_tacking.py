@@ -61,6 +61,13 @@ def test_pins_of_a_tack_stand_over_one_film_and_its_masks() -> None:
         assert low.stands_mm < high.stands_mm - 0.9
 
 
+def test_all_sheets_but_the_caps_are_stacked_at_once() -> None:
+    # Two balloons have seven layers.
+    first, last = planned("1dof-5mm", "stack.balloons=2").steps
+    assert "Stack the sheets of layers 1 to 6 on the corner pins" in first.instructions
+    assert "Lay the sheet of layer 7 on its pins" in last.instructions
+
+
 @pytest.mark.parametrize("limit", [120, 135])
 def test_a_transfer_film_that_does_not_stand_the_press_is_refused(limit: float) -> None:
     with pytest.raises(DesignError, match=f"panel.carrier_limit_c = {limit}"):

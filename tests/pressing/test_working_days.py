@@ -105,3 +105,6 @@ def test_what_may_pause_is_split_between_copies() -> None:
         (4, (10, 10), 10),
     ]
     assert math.fsum(e.minutes for e in entries) == 100
+    # 10 min a copy: what follows copies 4 to 6 begins after 30.
+    work = [Task("cut", (4, 6), 30), Task("finish", (4, 6), 60, 1)]
+    assert [(e.day, e.start) for e in by_day(work, 100)] == [(1, 0), (1, 30)]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sbafab.geometry.region import Region, disc, strip
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, Layer, SheetPanel
 from sbafab.rules import bridges, scrap
 from sbafab.rules.deck import run_deck
 from sbafab.rules.freedoms import Part, freedoms
@@ -116,6 +116,22 @@ def test_stretch_of_the_sheets_lowers_the_yield() -> None:
     assert shares[0] == 1.0
     assert shares == sorted(shares, reverse=True)
     assert shares[2] < 0.7
+
+
+def test_of_bridges_that_are_equal_but_for_rounding_the_first_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Another order of summing moves a width by less than a nanometre."""
+    exact = bridges._bridges
+
+    def noisy(panel: SheetPanel, layer: Layer) -> list[bridges._Bridge]:
+        width = 1.0 - layer.index * 1e-9
+        return [bridge._replace(width=width) for bridge in exact(panel, layer)]
+
+    monkeypatch.setattr(bridges, "_bridges", noisy)
+    [found] = bridges.check(Measures(good(), FEW))
+    assert found.measured == pytest.approx(1.0, abs=1e-6)
+    assert found.where.layers == (1,)
 
 
 @pytest.mark.parametrize("reach", [0.02, 0.2])
