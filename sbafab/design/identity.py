@@ -17,6 +17,7 @@ from sbafab.design.records import Design, resolved, without_none
 from sbafab.design.sections import (
     Acceptance,
     Inlet,
+    Models,
     Order,
     Press,
     Registration,
@@ -48,6 +49,8 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
     # What came later, where it says what was always so.
     if design.acceptance == Acceptance():
         table["acceptance"] = None
+    if design.models == Models():
+        table["models"] = None
     for key in ("minutes_for", "time_constant"):
         if getattr(design.press, key) == getattr(Press(), key):
             table["press"][key] = None
@@ -110,7 +113,7 @@ def actuator_sha256(design: Design) -> str:
 
 
 NO_ACTUATOR = (
-    *("name", "kit", "films", "laser", "sheets", "order", "rules", "acceptance"),
+    *("name", "kit", "films", "laser", "sheets", "order", "rules", "models", "acceptance"),
     FITS,
 )
 """Sections that do not make another actuator; of films and laser the layup says what counts."""

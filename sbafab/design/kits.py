@@ -31,6 +31,7 @@ from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
     Laser,
+    Models,
     Press,
     Registration,
     Rules,
@@ -45,7 +46,10 @@ SCHEMA = "sbafab/kit@1"
 FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
-SECTIONS = (*("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),)
+SECTIONS = (
+    *("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),
+    "models",
+)
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = (
     "registration.method",
@@ -93,6 +97,7 @@ class KitFile(Section):
     laser: Laser = Laser.model_construct()
     sheets: Sheets = Sheets.model_construct()
     rules: Rules = Rules.model_construct()
+    models: Models = Models.model_construct()
     tubes: dict[Product, Tube] = Field(default_factory=dict)
     adhesives: dict[Product, Adhesive] = Field(default_factory=dict)
 

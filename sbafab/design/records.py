@@ -48,6 +48,7 @@ from sbafab.design.sections import (
     Inlet,
     Laser,
     Mask,
+    Models,
     Order,
     PanelSection,
     Press,
@@ -88,6 +89,7 @@ class Design(Section):
     sheets: Sheets = Sheets.model_construct()
     order: Order = Order.model_construct()
     rules: Rules = Rules.model_construct()
+    models: Models = Models.model_construct()
     chamber: Chamber = Chamber.model_construct()
 
     _folder: Path = PrivateAttr(default=Path())

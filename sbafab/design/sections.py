@@ -472,6 +472,14 @@ class Rules(Section):
     """Rules whose failure shall not stop the cut files; every file then says so."""
 
 
+class Models(Section):
+    """What predictions are made with."""
+
+    calibration: str = Field(default="paper", min_length=1, max_length=1000)
+    """The calibration of the models: "paper", a file beside the design that sbafab calibrate wrote,
+    or "none" for films as drawn and bought, and no intervals."""
+
+
 class Stack(Section):
     """How high the actuator is."""
 

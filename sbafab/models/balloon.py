@@ -82,6 +82,11 @@ class Balloon:
     mate: Balloon | None = None
     """The second film where the two differ: of the same sizes, and without a mate itself."""
 
+    def stiffened(self, ratio: float) -> Balloon:
+        """Return the balloon whose films have ``ratio`` times the modulus."""
+        mate = None if self.mate is None else self.mate.stiffened(ratio)
+        return replace(self, modulus=ratio * self.modulus, mate=mate)
+
     @cached_property
     def nodes(self) -> Array:
         """Radii of the flat film's nodes, mm, closer together at neck and rim, where it bends."""

@@ -117,13 +117,31 @@ ENDS = _taylor_shift(-1.0, 3), _taylor_shift(1.0, DEGREE + 1)
 @dataclass(frozen=True, eq=False)
 class BalloonMap:
     """The map of one balloon from no pressure to ``most_pressure`` kPa and from flat to
-    ``most_height`` mm; ``coefficients`` are those of the potential.
+    ``most_height`` mm; ``coefficients`` are those of the potential, in height and in
+    asinh(p / ``scale_pressure``).
     """
 
     balloon: Balloon
     most_pressure: float
     most_height: float
     coefficients: Array
+    scale_pressure: float = P0
+
+    def stiffened(self, ratio: float) -> BalloonMap:
+        """Return the map of the balloon whose films have ``ratio`` times the modulus.
+
+        Energies are proportional to the modulus at equal pressure over modulus:
+        W(ratio E; p, h) = ratio W(E; p / ratio, h). The map reaches ``ratio`` times the pressure.
+        """
+        if ratio == 1:
+            return self
+        return BalloonMap(
+            self.balloon.stiffened(ratio),
+            ratio * self.most_pressure,
+            self.most_height,
+            ratio * self.coefficients,
+            ratio * self.scale_pressure,
+        )
 
     @cached_property
     def spans(self) -> float:
@@ -190,9 +208,9 @@ class BalloonMap:
 
     def _scaled(self, p: Array) -> tuple[Array, Array]:
         """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
-        each = PRESSURE_SPANS / math.asinh(self.most_pressure / P0)
-        x = np.minimum(np.arcsinh(p / P0) * each, PRESSURE_SPANS * (1 - 1e-12))
-        return x, each / np.hypot(p, P0)
+        each = PRESSURE_SPANS / math.asinh(self.most_pressure / self.scale_pressure)
+        x = np.minimum(np.arcsinh(p / self.scale_pressure) * each, PRESSURE_SPANS * (1 - 1e-12))
+        return x, each / np.hypot(p, self.scale_pressure)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
         """Return the force in mN on the plate at either end; below 0 for a pull."""
@@ -227,12 +245,13 @@ class BalloonMap:
 
     def rises(self, pressure: ArrayLike) -> Array:
         """Return an interpolated free height, to start a search from."""
-        return np.interp(np.arcsinh(np.asarray(pressure, float) / P0), *self._rises)
+        return np.interp(np.arcsinh(np.asarray(pressure, float) / self.scale_pressure), *self._rises)
 
     @cached_property
     def _rises(self) -> tuple[Array, Array]:
-        x = np.linspace(0, math.asinh(self.most_pressure / P0), RISE_POINTS)
-        return x, self.free_height(np.minimum(P0 * np.sinh(x), self.most_pressure))
+        x = np.linspace(0, math.asinh(self.most_pressure / self.scale_pressure), RISE_POINTS)
+        pressures = np.minimum(self.scale_pressure * np.sinh(x), self.most_pressure)
+        return x, self.free_height(pressures)
 
 
 class Along(NamedTuple):

@@ -83,7 +83,7 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
             f"modulus and Poisson's ratio of {min(unknown)} are not known; add "
             f"films.{min(unknown).lower()}.modulus, in MPa, and poisson, its ratio"
         )
-    measured = None if factors is None else factors.modulus_mpa
+    measured, ratio = (None, 1.0) if factors is None else (factors.modulus_mpa, factors.modulus_ratio)
     if measured is not None and len(films) > 1:
         raise DesignError(
             "one modulus is given for unlike films; leave it out, and set films.<name>.modulus of "
@@ -94,7 +94,7 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
         modulus, poisson = film.elastic or (0.0, 0.0)
         properties[film] = (
             film.thickness,
-            1000 * (modulus if measured is None else measured),
+            1000 * ratio * (modulus if measured is None else measured),
             poisson,
         )
     row = [properties[layer.film] for layer in laminate.tpe_layers]

@@ -50,7 +50,7 @@ ELASTIC = Model(
 
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
-    factor_names = []
+    factor_names = [f"calibration {factors.calibration}"] if factors.calibration else []
     if factors.press_factor != 1:
         factor_names.append(f"press factor {factors.press_factor:g}")
     if factors.pocket_loss:
@@ -68,12 +68,12 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
         return
     try:
         kinds = Counter(
-            balloons_of(actuator.design, actuator.laminate, request.calibration, actuator.form)
+            balloons_of(actuator.design, actuator.laminate, request.factors, actuator.form)
         )
     except DesignError as error:
         yield LeftOut("free stroke, elastic balloon", str(error))
         return
-    model = calibrated(ELASTIC, request.calibration)
+    model = calibrated(ELASTIC, request.factors)
     together = _inflated(kinds, request.pressures_kpa)
     for row, pressure in enumerate(request.pressures_kpa):
         at = f"at {pressure:g} kPa"
@@ -172,9 +172,24 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
         return None
     most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
     try:
-        return stack(actuator.design, actuator.laminate, most, request.calibration, actuator.form)
+        return stack(actuator.design, actuator.laminate, most, request.factors, actuator.form)
     except DesignError as error:
         return LeftOut("elastic stack", str(error))
+
+
+def moved_stack(together: Stack, factors: Factors, moved: Factors) -> Stack | None:
+    """Return a stack of ``factors`` at other ones without new maps; None where it needs them."""
+    alike = replace(
+        moved, modulus_ratio=factors.modulus_ratio, press_factor=factors.press_factor
+    )
+    if alike != factors:
+        return None
+    ratio = moved.modulus_ratio / factors.modulus_ratio
+    return replace(
+        together,
+        maps=tuple(kind.stiffened(ratio) for kind in together.maps),
+        pitch=together.pitch * moved.press_factor / factors.press_factor,
+    )
 
 
 def stack_figures(
@@ -197,7 +212,7 @@ def stroke_at(actuator: Actuator, share: float) -> float:
 def _forces(
     actuator: Actuator, request: PredictionRequest, stack: Stack
 ) -> Iterator[Figure | LeftOut]:
-    model = calibrated(FORCE, request.calibration)
+    model = calibrated(FORCE, request.factors)
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
@@ -222,7 +237,7 @@ def chamber_count(number: int) -> str:
 
 
 def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
-    model = calibrated(BEND, request.calibration)
+    model = calibrated(BEND, request.factors)
     for pressure in request.pressures_kpa:
         for chambers in range(1, stack.chambers):
             name = f"bend at {pressure:g} kPa in {chamber_count(chambers)}, the others empty"
@@ -241,7 +256,7 @@ def _clearances(
     where: str, request: PredictionRequest, stack: Stack, pose: Pose
 ) -> Iterator[Figure]:
     """Yield the clearances of a bent stack: between rims, and between chambers."""
-    model = calibrated(CONTACT, request.calibration)
+    model = calibrated(CONTACT, request.factors)
     room = rim_gap(stack, pose)
     yield Figure("bending", f"room between rims on the inner side, {where}", room, "mm", model)
     room = chamber_gap(stack, pose)
@@ -271,7 +286,7 @@ def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[Figure | 
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
-    model = calibrated(FORCE, request.calibration)
+    model = calibrated(FORCE, request.factors)
     pressure = max(request.pressures_kpa)
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
@@ -312,7 +327,7 @@ def time_to_fill(
 
 
 def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
-    model = calibrated(TIME, request.calibration)
+    model = calibrated(TIME, request.factors)
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
@@ -320,7 +335,7 @@ def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOu
     except DesignError as error:
         yield LeftOut(name, str(error))
         return
-    yield Figure("actuation", name, time, "s", model)
+    yield Figure("actuation", name, time + request.factors.water_delay, "s", model)
     name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
     yield Figure("actuation", name, pose.height, "mm", model)
 
@@ -342,7 +357,7 @@ def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[Figure | Le
 
 def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:
     value = PROBE_FORCE / float(pose.tip[0])
-    return Figure("stiffness", name, value, "N/mm", calibrated(model, request.calibration))
+    return Figure("stiffness", name, value, "N/mm", calibrated(model, request.factors))
 
 
 def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:
@@ -351,7 +366,7 @@ def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -
     if not actuator.knows_full:
         most = min(k.largest_stroke for k in actuator.kinematics)
     strokes = np.linspace(0, most, SAMPLES)
-    model = calibrated(FORCE, request.calibration)
+    model = calibrated(FORCE, request.factors)
     lines = []
     for pressure in request.pressures_kpa:
         if pressure > stack.most_pressure:
@@ -363,7 +378,7 @@ def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -
 
 def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
     """Return the curves of bend against pressure."""
-    model = calibrated(BEND, request.calibration)
+    model = calibrated(BEND, request.factors)
     pressures = np.geomspace(0.01, 20.0, SAMPLES)
     lines = []
     for chambers in range(1, stack.chambers):
@@ -378,7 +393,7 @@ def bend_relation(request: PredictionRequest, stack: Stack) -> Relation:
 
 def workspace_traces(request: PredictionRequest, stack: Stack) -> list[Trace]:
     """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
-    model = calibrated(BEND, request.calibration)
+    model = calibrated(BEND, request.factors)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
     lines = []
     for rest, words in ((0.0, "empty"), (paper.FULL_KPA, f"at {paper.FULL_KPA:g} kPa")):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -48,6 +48,8 @@ class Figure:
     ``other``: another model gives the same quantity, and that one is to design with.
     ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
     The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
+    What would be measured lies in the ``interval`` with a probability of 90 %, where a calibration
+    says so.
     """
 
     group: str
@@ -58,6 +60,7 @@ class Figure:
     other: bool = False
     measured: Counterpart | None = None
     between: tuple[float, float] | None = None
+    interval: tuple[float, float] | None = None
 
     @property
     def counterpart(self) -> str:
@@ -87,6 +90,7 @@ class Figure:
             "design_with": not self.other,
             "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
             "between": self.between and [_rounded(end) for end in self.between],
+            "interval": self.interval and [_rounded(end) for end in self.interval],
         }
 
 
@@ -205,19 +209,26 @@ class Factors:
 
     ``press_factor`` is the films' thickness after pressing over that before, ``contact_factor`` the
     measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
-    by how many mm the press leaves pockets smaller in radius than drawn, and ``modulus_mpa``, the
-    film's modulus where it is not the one of the design.
+    by how many mm the press leaves pockets smaller in radius than drawn, ``modulus_mpa``, the
+    film's modulus where it is not the one of the design, and ``modulus_ratio``, the modulus of the
+    pressed film over that. ``water_delay`` and ``air_delay`` in s are the lag of pump and valve.
     """
 
     press_factor: float = 1.0
     contact_factor: float = 1.0
     pocket_loss: float = 0.0
     modulus_mpa: float | None = None
+    modulus_ratio: float = 1.0
+    water_delay: float = 0.0
+    air_delay: float = 0.0
+    calibration: str = ""
+    """Name of the calibration that the others come from, unless it is the user's own values."""
 
     def __post_init__(self) -> None:
         for name, value, most in (
             ("press factor", self.press_factor, 1.0),
             ("contact factor", self.contact_factor, 10.0),
+            ("modulus ratio", self.modulus_ratio, 1000.0),
         ):
             if not 0 < value <= most:
                 raise DesignError(f"{name} = {value:g} must be above 0 and at most {most:g}")
@@ -230,13 +241,22 @@ class Factors:
 @dataclass(frozen=True)
 class PredictionRequest:
     """Conditions of a prediction: pressures in kPa, flow in ml/min into each chamber or all,
-    volumes in ul a balloon, and calibration factors.
+    volumes in ul a balloon, and factors.
+
+    Without ``calibration`` the factors are those of the design's calibration, with the user's own
+    values (``overrides``, by field of ``Factors``) in place of its own.
     """
 
     pressures_kpa: tuple[float, ...] = (10.0, 100.0)
     flow_ml_min: float = 35.0
     volumes_ul: tuple[float, ...] = ()
-    calibration: Factors = field(default_factory=Factors)
+    calibration: Factors | None = None
+    overrides: Mapping[str, float | None] = field(default_factory=dict)
+
+    @property
+    def factors(self) -> Factors:
+        """The factors that predictions are made with; none where they are not resolved yet."""
+        return self.calibration or Factors()
 
 
 @dataclass(frozen=True, repr=False)
@@ -312,10 +332,14 @@ class Prediction:
                 "pressures_kpa": list(self.asked.pressures_kpa),
                 "flow_ml_min": self.asked.flow_ml_min,
                 "volumes_ul": list(self.asked.volumes_ul),
-                "press_factor": self.asked.calibration.press_factor,
-                "contact_factor": self.asked.calibration.contact_factor,
-                "pocket_loss": self.asked.calibration.pocket_loss,
-                "modulus_mpa": self.asked.calibration.modulus_mpa,
+                "press_factor": _rounded(self.asked.factors.press_factor),
+                "contact_factor": self.asked.factors.contact_factor,
+                "pocket_loss": _rounded(self.asked.factors.pocket_loss),
+                "modulus_mpa": self.asked.factors.modulus_mpa,
+                "modulus_ratio": _rounded(self.asked.factors.modulus_ratio),
+                "water_delay_s": _rounded(self.asked.factors.water_delay),
+                "air_delay_s": _rounded(self.asked.factors.air_delay),
+                "calibration": self.asked.factors.calibration,
             },
             "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, P0, PIECES, PRESSURE_SPANS
+from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def _python(name: str, stack: Stack) -> str:
         levels=stack.levels.tolist(),
         pitch=_short(stack.pitch),
         axes=[[_short(x) for x in axis] for axis in stack.axes.tolist()],
-        p0=P0,
+        p0=_short(stack.maps[0].scale_pressure),
         spans_p=PRESSURE_SPANS,
         spans_h=HEIGHT_SPANS,
         pieces=PIECES.tolist(),

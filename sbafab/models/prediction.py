@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ from sbafab.models.figures import (
     REACHED,
     STACK,
     WIDEST,
+    Factors,
     Figure,
     LeftOut,
     Model,
@@ -50,7 +52,9 @@ from sbafab.models.formulas import (
     tip_stiffness,
     work_uj,
 )
-from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics, actuator
+from sbafab.models.intervals import factors_of, uncertainty_of
+from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics
+from sbafab.models.kinematics import actuator as actuator_of
 from sbafab.models.paper import counterpart
 from sbafab.models.parabola import fullest
 from sbafab.models.pneumatics import seconds
@@ -136,7 +140,7 @@ def _force(
     stroke: ArrayLike,
     request: PredictionRequest,
 ) -> NDArray[np.float64]:
-    factor = actuator.form.pushing * request.calibration.contact_factor
+    factor = actuator.form.pushing * request.factors.contact_factor
     return factor * force(pressure, k.push(stroke))
 
 
@@ -152,7 +156,7 @@ def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) 
         else "no film tension, no stretch, one balloon stack; not measured"
     )
     model = Model(f"virtual work on {k.model.name}", "Sec. 4.3, F = p dv/dh", trust)
-    return model.times("contact factor", request.calibration.contact_factor)
+    return model.times("contact factor", request.factors.contact_factor)
 
 
 def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Iterator[Figure]:
@@ -208,7 +212,7 @@ def _power_density(
         "Sec. 7",
         "largest force times mean speed, as in the paper; the two never occur together. No lag of "
         "valve and pump: the paper's 0.067 s of air make it a fifth of this",
-    ).times("contact factor", request.calibration.contact_factor)
+    ).times("contact factor", request.factors.contact_factor)
     watts = pushes * push * actuator.full_stroke / 1000 / time
     return Figure(
         "actuation",
@@ -353,7 +357,7 @@ def folding(actuator: Actuator, request: PredictionRequest) -> Figure | LeftOut:
         "our geometry; the paper reports 9.25",
         "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
         "paper measures, between which its 9.25 lies",
-    ).times("press factor", request.calibration.press_factor)
+    ).times("press factor", request.factors.press_factor)
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
     return Figure("size", "folded diameter", value, "mm", model)
@@ -464,6 +468,10 @@ def predict(
     are out of range.
     """
     wish = request or PredictionRequest()
+    uncertainty = None
+    if wish.calibration is None:
+        uncertainty = uncertainty_of(design, wish.overrides)
+        wish = replace(wish, calibration=factors_of(design, wish.overrides))
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -471,14 +479,16 @@ def predict(
     discs = near_discs(design)
     if discs is not None and not discs.is_round:
         discs = None
-    subject = actuator(design, flat, wish.calibration, discs and discs.form(design, discs.equal))
+    subject = actuator_of(design, flat, wish.factors, discs and discs.form(design, discs.equal))
     check_request(subject, wish)
     together = None if quick else elastic.elastic_stack(subject, wish)
     items = _figures(subject, wish, together)
+    if uncertainty is not None:
+        items = uncertainty.bounded(items, partial(_moved_figures, subject, wish, together))
     relations = () if quick else tuple(_relations(subject, wish, _stack(together)))
     if discs is not None:
         bounds = [
-            actuator(design, flat, wish.calibration, discs.form(design, diameter))
+            actuator_of(design, flat, wish.factors, discs.form(design, diameter))
             for diameter in (discs.inner, discs.outer)
         ]
         each = [
@@ -498,6 +508,22 @@ def predict(
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
     )
+
+
+def _moved_figures(
+    actuator: Actuator,
+    request: PredictionRequest,
+    together: Stack | LeftOut | None,
+    factors: Factors,
+) -> list[Figure | LeftOut]:
+    """Return the figures of an actuator at other factors."""
+    subject = actuator_of(actuator.design, actuator.laminate, factors, actuator.form)
+    moved = replace(request, calibration=factors)
+    other: Stack | LeftOut | None = together
+    if isinstance(together, Stack):
+        other = elastic.moved_stack(together, request.factors, factors)
+        other = other or elastic.elastic_stack(subject, moved)
+    return _figures(subject, moved, other)
 
 
 def _stack(together: Stack | LeftOut | None) -> Stack | None:
@@ -581,7 +607,7 @@ def _relations(
 
 def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
-    factor = request.calibration.press_factor
+    factor = request.factors.press_factor
     pressed = NOMINAL.times("press factor", factor)
     for name, value in sizes(actuator.design, actuator.laminate).items():
         shown = name.replace("_", " ")

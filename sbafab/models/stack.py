@@ -29,6 +29,7 @@ from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.balloons import balloons_of
 from sbafab.models.derivatives import Derivatives, derivatives
+from sbafab.models.figures import Factors
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.pneumatics import Line
 from sbafab.models.reach import reach
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
 
     from sbafab.design.records import Design, Form
     from sbafab.laminate.laminate import Laminate
-    from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
 
 RIM_POINTS = 24
@@ -444,8 +444,11 @@ def stack(
     modulus.
     """
     flat = laminate or build(design)
-    row = [_clamped(balloon) for balloon in balloons_of(design, flat, factors, form)]
-    press = 1.0 if factors is None else factors.press_factor
+    factors = factors or Factors()
+    ratio = factors.modulus_ratio
+    # Maps scale with the modulus: that of the film as bought serves every ratio.
+    drawn = balloons_of(design, flat, replace(factors, modulus_ratio=1.0), form)
+    row = [_clamped(balloon) for balloon in drawn]
     kinds = list(dict.fromkeys(row))
     axes = np.array([chamber.centres[0] for chamber in flat.chambers])
     if len(axes) == 1:
@@ -453,10 +456,10 @@ def stack(
     reach = float(np.hypot(*axes.T).max()) + max(balloon.pocket + balloon.ring for balloon in row)
     has_densities = all(layer.film.density is not None for layer in flat.layers)
     return Stack(
-        tuple(_mapped(kind, most_pressure) for kind in kinds),
+        tuple(_mapped(kind, most_pressure / ratio).stiffened(ratio) for kind in kinds),
         np.array([kinds.index(balloon) for balloon in row]),
         axes,
-        flat.thickness * press / len(row),
+        flat.thickness * factors.press_factor / len(row),
         reach,
         film_mass(flat) * GRAVITY / len(row) if has_densities else None,
     )

@@ -1,0 +1,180 @@
+"""The factors of a design's calibration, and the 90 % intervals of its predictions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
+
+from sbafab.laminate.films import PAPER_PRODUCT
+from sbafab.models.calibrated import DESIGN_UNKNOWNS, Calibration, load_calibration
+from sbafab.models.figures import Factors, Figure, LeftOut
+from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, STACK
+from sbafab.models.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from sbafab.design.records import Design
+
+Items = Sequence[Figure | LeftOut]
+MODULUS_RATIO = next(n for n, unknown in enumerate(UNKNOWNS) if unknown.field == "modulus_ratio")
+DELAYS = {"water": "water_delay", "air": "air_delay"}
+
+
+def calibration_of(design: Design) -> Calibration | None:
+    """Return the calibration of a design; for another film than the evidence's its modulus ratio is
+    1, as uncertain as the prior has it. Raises DesignError where there is no such calibration.
+    """
+    calibration = load_calibration(design.models.calibration, design.folder)
+    if calibration is None or design.films.tpe.product == calibration.film:
+        return calibration
+    mean = list(calibration.mean)
+    covariance = [list(row) for row in calibration.covariance]
+    mean[MODULUS_RATIO] = 0.0
+    for other in range(len(mean)):
+        covariance[MODULUS_RATIO][other] = covariance[other][MODULUS_RATIO] = 0.0
+    covariance[MODULUS_RATIO][MODULUS_RATIO] = UNKNOWNS[MODULUS_RATIO].spread ** 2
+    return replace(
+        calibration, mean=tuple(mean), covariance=tuple(tuple(row) for row in covariance)
+    )
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
+    exact, in place of its own.
+    """
+
+    calibration: Calibration
+    overrides: Mapping[str, float | None]
+
+    @property
+    def factors(self) -> Factors:
+        """The factors at the median."""
+        return self._with_overrides(self.calibration.factors)
+
+    def shifted(self) -> list[tuple[float, Factors]]:
+        """Return factors moved in one design unknown each; by 0 where the user gave it."""
+        return [
+            (0.0 if unknown.field in self._given else change, self._with_overrides(factors))
+            for unknown, (change, factors) in zip(
+                UNKNOWNS, self.calibration.shifted(), strict=False
+            )
+        ]
+
+    @property
+    def _given(self) -> set[str]:
+        """Fields of the unknowns that the user gave, a modulus in place of its ratio included."""
+        given = {field for field, value in self.overrides.items() if value is not None}
+        return given | ({"modulus_ratio"} if "modulus_mpa" in given else set())
+
+    def _with_overrides(self, factors: Factors) -> Factors:
+        values = {field: value for field, value in self.overrides.items() if value is not None}
+        if "modulus_mpa" in values:
+            values.setdefault("modulus_ratio", 1.0)
+        return replace(factors, calibration=self.calibration.name, **values)  # type: ignore[arg-type]
+
+    def bounded(self, items: Items, evaluated: Callable[[Factors], Items]) -> list[Figure | LeftOut]:
+        """Return the items with the intervals of figures that the calibration covers.
+
+        ``evaluated`` gives the same figures with other factors. A figure that one of them lacks has
+        no interval.
+        """
+        moved: list[tuple[float, dict[tuple[str, str], float]]] = []
+        for change, factors in self.shifted():
+            values = {} if change == 0 else _by_name(evaluated(factors))
+            moved.append((change, values))
+        return [
+            self._bounded(item, moved) if isinstance(item, Figure) else item for item in items
+        ]
+
+    def _bounded(
+        self, figure: Figure, moved: Sequence[tuple[float, Mapping[tuple[str, str], float]]]
+    ) -> Figure:
+        group = discrepancy_group(figure)
+        if group is None:
+            return figure
+        key = figure.name, _kind(figure)
+        values = [figure.value if change == 0 else each.get(key) for change, each in moved]
+        present = [value for value in values if value is not None]
+        if len(present) < len(values) or not all(map(math.isfinite, present)):
+            return figure
+        is_log = figure.value > 0 and min(present) > 0 and not figure.name.startswith(CLEARANCES)
+        slopes = [
+            _slope(figure.value, value, change, is_log)
+            for value, (change, _) in zip(present, moved, strict=True)
+        ]
+        slopes += self._delay_slopes(figure)
+        low, high = self.calibration.interval(group, figure.value, slopes, is_log)
+        if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
+            low = max(low, 0.0)
+        return replace(figure, interval=(low, high))
+
+    def _delay_slopes(self, figure: Figure) -> list[float]:
+        """Return slopes of a time's logarithm by the logarithms of the delays."""
+        slopes = []
+        for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]:
+            fluid = unknown.field.removesuffix("_delay")
+            counts = figure.unit == "s" and fluid in figure.name
+            share = self.calibration.values[unknown.field] / figure.value if counts else 0.0
+            slopes.append(0.0 if unknown.field in self._given else share)
+        return slopes
+
+
+CLEARANCES = ("room between rims", "clearance between chambers")
+
+
+def _slope(value: float, moved: float, change: float, is_log: bool) -> float:
+    if change == 0:
+        return 0.0
+    return (math.log(moved / value) if is_log else moved - value) / change
+
+
+def _kind(figure: Figure) -> str:
+    """Return the model of a figure without its factors."""
+    return next((name for name in KINDS if figure.model.name.startswith(name)), "")
+
+
+KINDS = (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS)
+
+
+def _by_name(items: Items) -> dict[tuple[str, str], float]:
+    return {(item.name, _kind(item)): item.value for item in items if isinstance(item, Figure)}
+
+
+def discrepancy_group(figure: Figure) -> str | None:
+    """Return the group of a figure's discrepancy; None where no calibrated model gives it."""
+    kind = _kind(figure)
+    if not kind:
+        return None
+    if kind == FLAT_HEIGHT_OF_FILMS:
+        return "flat height"
+    by_unit = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness", "deg": "bend"}
+    if figure.unit in by_unit:
+        return by_unit[figure.unit]
+    return "bend" if figure.group == "bending" else "height"
+
+
+def uncertainty_of(
+    design: Design, overrides: Mapping[str, float | None] | None = None
+) -> Uncertainty | None:
+    """Return the calibration of a design with the user's own values; None without one."""
+    calibration = calibration_of(design)
+    return None if calibration is None else Uncertainty(calibration, overrides or {})
+
+
+def factors_of(design: Design, overrides: Mapping[str, float | None] | None = None) -> Factors:
+    """Return the factors of a design's calibration, with the user's own values in place of its own.
+
+    Raises DesignError where there is no such calibration, or for values out of range.
+    """
+    uncertainty = uncertainty_of(design, overrides)
+    if uncertainty is None:
+        given = {field: value for field, value in (overrides or {}).items() if value is not None}
+        return Factors(**given)  # type: ignore[arg-type]
+    return uncertainty.factors
+
+
+def factor_fields() -> Iterator[str]:
+    """Yield the fields of ``Factors`` that a user may give."""
+    return (item.name for item in fields(Factors) if item.name != "calibration")
