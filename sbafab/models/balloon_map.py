@@ -245,7 +245,9 @@ class BalloonMap:
 
     def rises(self, pressure: ArrayLike) -> Array:
         """Return an interpolated free height, to start a search from."""
-        return np.interp(np.arcsinh(np.asarray(pressure, float) / self.scale_pressure), *self._rises)
+        return np.interp(
+            np.arcsinh(np.asarray(pressure, float) / self.scale_pressure), *self._rises
+        )
 
     @cached_property
     def _rises(self) -> tuple[Array, Array]:

@@ -83,7 +83,8 @@ def _films(laminate: Laminate, factors: Factors | None) -> list[list[tuple[float
             f"modulus and Poisson's ratio of {min(unknown)} are not known; add "
             f"films.{min(unknown).lower()}.modulus, in MPa, and poisson, its ratio"
         )
-    measured, ratio = (None, 1.0) if factors is None else (factors.modulus_mpa, factors.modulus_ratio)
+    measured = None if factors is None else factors.modulus_mpa
+    ratio = 1.0 if factors is None else factors.modulus_ratio
     if measured is not None and len(films) > 1:
         raise DesignError(
             "one modulus is given for unlike films; leave it out, and set films.<name>.modulus of "

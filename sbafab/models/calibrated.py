@@ -4,7 +4,7 @@ that designs and kits name, and the 90 % intervals of predictions that follow fr
 Unknowns have a normal posterior in their coordinates. A prediction is linear in them: its
 logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
 change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
-deviation for each group of quantities.
+deviation for all quantities: the evidence does not tell them apart.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from sbafab.design.files import listed, read_toml, shown
 from sbafab.errors import DesignError
 from sbafab.models.figures import Factors
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.unknowns import UNKNOWNS, factors_at
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
@@ -35,17 +35,16 @@ SHARE = 0.9
 """Probability that an interval holds the measured value."""
 DESIGN_UNKNOWNS = 3
 """The first of UNKNOWNS, which change an actuator; the others change its supply."""
-GROUPS = ("force", "height", "bend", "time", "work", "stiffness", "flat height")
-"""Groups of quantities with a discrepancy of their own."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``,
-    ``discrepancy`` the relative standard deviation by group.
+    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``, and
+    ``discrepancy``, the relative standard deviation that the models miss.
 
-    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to; ``inside`` of ``points`` left-out points lay
-    in their intervals. ``sentences`` say what the evidence cannot tell apart.
+    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to;
+    ``inside`` of ``points`` left-out points lay in their intervals. ``sentences`` say what the
+    evidence cannot tell apart.
     """
 
     name: str
@@ -54,7 +53,7 @@ class Calibration:
     evidence: tuple[str, ...]
     mean: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
-    discrepancy: Mapping[str, float]
+    discrepancy: float
     points: int
     inside: int
     sentences: tuple[str, ...]
@@ -67,7 +66,7 @@ class Calibration:
     @cached_property
     def factors(self) -> Factors:
         """The factors at the median."""
-        return Factors(**self.values)
+        return factors_at(self.values)
 
     def bounds(self, field: str) -> tuple[float, float]:
         """Return the 90 % interval of an unknown."""
@@ -88,7 +87,7 @@ class Calibration:
             if abs(unknown.coordinate(value) - self.mean[row]) < step / 2:
                 value = unknown.value(self.mean[row] - step)
             change = unknown.coordinate(value) - unknown.coordinate(start)
-            moved.append((change, Factors(**{**self.values, unknown.field: value})))
+            moved.append((change, factors_at({**self.values, unknown.field: value})))
         return moved
 
     def variance(self, slopes: Sequence[float]) -> float:
@@ -99,27 +98,21 @@ class Calibration:
         rates[: len(slopes)] = slopes
         return float(rates @ np.array(self.covariance) @ rates)
 
-    def spread(self, group: str) -> float:
-        """Return the relative standard deviation that the models miss in a group."""
-        return self.discrepancy[group]
-
     def interval(
-        self, group: str, value: float, slopes: Sequence[float], is_log: bool, share: float = SHARE
+        self, value: float, slopes: Sequence[float], is_log: bool, share: float = SHARE
     ) -> tuple[float, float]:
         """Return the interval that holds the measured value with a probability of ``share``.
 
         ``slopes`` are those of the logarithm of the value (``is_log``) or of the value, by
         coordinate.
         """
-        half = deviations(share) * self._deviation(group, value, slopes, is_log)
+        half = deviations(share) * self._deviation(value, slopes, is_log)
         if is_log:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
-    def _deviation(
-        self, group: str, value: float, slopes: Sequence[float], is_log: bool
-    ) -> float:
-        missed = self.spread(group) * (1.0 if is_log else abs(value))
+    def _deviation(self, value: float, slopes: Sequence[float], is_log: bool) -> float:
+        missed = self.discrepancy * (1.0 if is_log else abs(value))
         return math.sqrt(self.variance(slopes) + missed**2)
 
     def as_dict(self) -> dict[str, Any]:
@@ -134,7 +127,7 @@ class Calibration:
             "mean": list(self.mean),
             "covariance": [list(row) for row in self.covariance],
             "sentences": list(self.sentences),
-            "discrepancy": dict(self.discrepancy),
+            "discrepancy": self.discrepancy,
             "held_out": {"points": self.points, "inside": self.inside},
         }
 
@@ -177,8 +170,8 @@ def load_calibration(name: object, folder: Path | None = None) -> Calibration | 
     if not is_there:
         raise DesignError(
             f'models.calibration = {shown(name)} is neither "none", nor one that ships '
-            f"({', '.join(shipped_names())}), nor a file beside the design; sbafab calibrate writes "
-            "one"
+            f"({', '.join(shipped_names())}), nor a file beside the design; sbafab calibrate "
+            "writes one"
         )
     return read_calibration(path)
 
@@ -209,7 +202,7 @@ KEYS = {
     "mean": list,
     "covariance": list,
     "sentences": list,
-    "discrepancy": dict,
+    "discrepancy": float,
     "held_out": dict,
 }
 
@@ -238,10 +231,8 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
                 f"mean of {unknown.field} must be from {low:.3g} to {high:.3g}"
                 + (" (a logarithm)" if unknown.is_log else "")
             )
-    spreads = {key: tables["discrepancy"].get(key) for key in GROUPS}
-    for key, value in spreads.items():
-        if not isinstance(value, int | float) or not 0 <= value <= 10:
-            raise DesignError(f"discrepancy.{key} must be a number from 0 to 10")
+    if not 0 <= tables["discrepancy"] <= 10:
+        raise DesignError("discrepancy must be from 0 to 10")
     held = tables["held_out"]
     points, inside = held.get("points"), held.get("inside")
     if not (isinstance(points, int) and isinstance(inside, int) and 0 <= inside <= points):
@@ -253,7 +244,7 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
         tuple(map(str, tables["evidence"])),
         tuple(mean.tolist()),
         tuple(tuple(row) for row in covariance.tolist()),
-        {key: float(value) for key, value in spreads.items()},
+        tables["discrepancy"],
         points,
         inside,
         tuple(map(str, tables["sentences"])),

@@ -179,9 +179,7 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
 
 def moved_stack(together: Stack, factors: Factors, moved: Factors) -> Stack | None:
     """Return a stack of ``factors`` at other ones without new maps; None where it needs them."""
-    alike = replace(
-        moved, modulus_ratio=factors.modulus_ratio, press_factor=factors.press_factor
-    )
+    alike = replace(moved, modulus_ratio=factors.modulus_ratio, press_factor=factors.press_factor)
     if alike != factors:
         return None
     ratio = moved.modulus_ratio / factors.modulus_ratio
@@ -348,11 +346,22 @@ def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[Figure | Le
             aside = (PROBE_FORCE, 0.0, 0.0)
             pushed = stack.pose(start.pressures, aside, near=start)
             yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request)
-            shut = Motion(stack, Line(AIR, length=1e-3), {"tip_load": aside}, start)
-            shut.step(1.0, flows=(0.0,) * stack.chambers)
-            yield _tip_stiffness(f"{name}, chambers shut", shut.pose, CHAMBERS_SHUT, request)
+            shut, _ = shut_stiffness(stack, pressure)
+            model = calibrated(CHAMBERS_SHUT, request.factors)
+            yield Figure("stiffness", f"{name}, chambers shut", shut, "N/mm", model)
         except DesignError as error:
             yield LeftOut(name, str(error))
+
+
+def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
+    """Return the lateral stiffness of the tip in N/mm with the chambers shut at a pressure in kPa,
+    and the height in mm.
+    """
+    aside = (PROBE_FORCE, 0.0, 0.0)
+    start = stack.pose((pressure,) * stack.chambers)
+    shut = Motion(stack, Line(AIR, length=1e-3), {"tip_load": aside}, start)
+    shut.step(1.0, flows=(0.0,) * stack.chambers)
+    return PROBE_FORCE / float(shut.pose.tip[0]), start.height
 
 
 def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:

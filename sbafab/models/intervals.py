@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
-from sbafab.laminate.films import PAPER_PRODUCT
 from sbafab.models.calibrated import DESIGN_UNKNOWNS, Calibration, load_calibration
 from sbafab.models.figures import Factors, Figure, LeftOut
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, STACK
@@ -72,9 +71,11 @@ class Uncertainty:
         values = {field: value for field, value in self.overrides.items() if value is not None}
         if "modulus_mpa" in values:
             values.setdefault("modulus_ratio", 1.0)
-        return replace(factors, calibration=self.calibration.name, **values)  # type: ignore[arg-type]
+        return replace(factors, calibration=self.calibration.name, **values)
 
-    def bounded(self, items: Items, evaluated: Callable[[Factors], Items]) -> list[Figure | LeftOut]:
+    def bounded(
+        self, items: Items, evaluated: Callable[[Factors], Items]
+    ) -> list[Figure | LeftOut]:
         """Return the items with the intervals of figures that the calibration covers.
 
         ``evaluated`` gives the same figures with other factors. A figure that one of them lacks has
@@ -84,15 +85,12 @@ class Uncertainty:
         for change, factors in self.shifted():
             values = {} if change == 0 else _by_name(evaluated(factors))
             moved.append((change, values))
-        return [
-            self._bounded(item, moved) if isinstance(item, Figure) else item for item in items
-        ]
+        return [self._bounded(item, moved) if isinstance(item, Figure) else item for item in items]
 
     def _bounded(
         self, figure: Figure, moved: Sequence[tuple[float, Mapping[tuple[str, str], float]]]
     ) -> Figure:
-        group = discrepancy_group(figure)
-        if group is None:
+        if not _kind(figure):
             return figure
         key = figure.name, _kind(figure)
         values = [figure.value if change == 0 else each.get(key) for change, each in moved]
@@ -105,7 +103,7 @@ class Uncertainty:
             for value, (change, _) in zip(present, moved, strict=True)
         ]
         slopes += self._delay_slopes(figure)
-        low, high = self.calibration.interval(group, figure.value, slopes, is_log)
+        low, high = self.calibration.interval(figure.value, slopes, is_log)
         if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
             low = max(low, 0.0)
         return replace(figure, interval=(low, high))
@@ -140,19 +138,6 @@ KINDS = (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS)
 
 def _by_name(items: Items) -> dict[tuple[str, str], float]:
     return {(item.name, _kind(item)): item.value for item in items if isinstance(item, Figure)}
-
-
-def discrepancy_group(figure: Figure) -> str | None:
-    """Return the group of a figure's discrepancy; None where no calibrated model gives it."""
-    kind = _kind(figure)
-    if not kind:
-        return None
-    if kind == FLAT_HEIGHT_OF_FILMS:
-        return "flat height"
-    by_unit = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness", "deg": "bend"}
-    if figure.unit in by_unit:
-        return by_unit[figure.unit]
-    return "bend" if figure.group == "bending" else "height"
 
 
 def uncertainty_of(

@@ -646,17 +646,17 @@ def _tubes(actuator: Actuator) -> Iterator[Figure]:
     yield Figure("inlet", name, spare, "mm", model)
 
 
-def _plate(actuator: Actuator) -> Region | None:
+def plate_of(laminate: Laminate) -> Region | None:
     """Return the profile of the topmost film, if it has neither tabs nor ears."""
-    if actuator.balloons == 1 or actuator.laminate.registration == "ears":
+    if laminate.balloons == 1 or laminate.registration == "ears":
         return None
-    return actuator.laminate.tpe_layers[-1].profile
+    return laminate.tpe_layers[-1].profile
 
 
 def _stiffness(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     """Yield the bending stiffness of a full actuator by the paper's cantilever formula."""
     name = "lateral tip stiffness, inflated"
-    plate = _plate(actuator)
+    plate = plate_of(actuator.laminate)
     if not actuator.radii:
         yield LeftOut(name, "the paper measured no modulus of oblong balloons")
         return

@@ -5,7 +5,11 @@ source.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
+
+from sbafab.models.figures import Factors
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ UNKNOWNS = (
         True,
         1.5,
         0.6,
-        0.5,
+        0.8,
         10.0,
         "thin polyurethane films are one to four times as stiff at small strain as in the long "
         "pull of a data sheet; pressing may add to that",
@@ -100,3 +104,8 @@ UNKNOWNS = (
     ),
 )
 """In the order of a calibration's mean and covariance."""
+
+
+def factors_at(values: Mapping[str, Any]) -> Factors:
+    """Return the factors with these values, by field; the others leave models unchanged."""
+    return Factors(**values)

@@ -1,0 +1,1 @@
+"""Calibration: from measured curves to the posterior of the models' unknowns."""

@@ -1,0 +1,198 @@
+"""A calibration from evidence: a fit to all curves, and fits to all but one group of curves, whose
+points are then predicted.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.calibration.curve_model import CurveModel
+from sbafab.calibration.posterior import (
+    LEAST_ERROR,
+    Posterior,
+    SampledCurve,
+    correlations,
+    sampled,
+)
+from sbafab.calibration.surface import ValueSurface, surfaces
+from sbafab.errors import DesignError
+from sbafab.models.calibrated import SHARE, Calibration
+from sbafab.models.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from sbafab.evidence.records import Evidence, MeasuredCurve
+    from sbafab.models.film_elements import Array
+
+DIGITS = 6
+TOLD_APART = 0.3
+"""Correlation from which two unknowns are said not to be told apart well."""
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class HeldOutPoint:
+    """A measured value, and its prediction with 90 % interval by a fit without its curve's group;
+    ``place`` is its place on the curve's axis, None without one.
+    """
+
+    curve: str
+    place: float | None
+    measured: float
+    median: float
+    low: float
+    high: float
+    unit: str
+
+    @property
+    def is_inside(self) -> bool:
+        """True if the measured value lies in the interval."""
+        return self.low <= self.measured <= self.high
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A calibration, its held-out points, and the curves that were not fitted, each with its
+    reason.
+    """
+
+    calibration: Calibration
+    points: tuple[HeldOutPoint, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+
+def usable_curves(
+    sources: Sequence[Evidence],
+) -> tuple[list[CurveModel], list[tuple[str, str]]]:
+    """Return the curves that a calibration can be fitted to, and the others with their reasons."""
+    models, left_out = [], []
+    for source in sources:
+        for curve in source.curves:
+            reason = "" if curve.comparable else curve.reason
+            model = CurveModel(curve)
+            if not reason:
+                try:
+                    model.check()
+                except DesignError as error:
+                    reason = str(error)
+            if not reason and min(curve.y) <= 0:
+                reason = "its values are not all above 0"
+            if reason:
+                left_out.append((curve.id, reason))
+            else:
+                models.append(model)
+    return models, left_out
+
+
+def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str = "") -> Fit:
+    """Return the calibration of sources of evidence.
+
+    Raises DesignError where no curve of theirs can be fitted, or without emcee.
+    """
+    models, left_out = usable_curves(sources)
+    if not models:
+        reasons = "; ".join(f"{curve}: {reason}" for curve, reason in left_out)
+        raise DesignError(f"no curve can be fitted to ({reasons})")
+    films = sorted({model.design.films.tpe.product for model in models})
+    if len(films) > 1:
+        raise DesignError(
+            f"the curves are of {len(films)} films ({', '.join(films)}); calibrate each by itself"
+        )
+    curves = [
+        sampled_curve(model, surface)
+        for model, surface in zip(models, surfaces(models, progress), strict=True)
+    ]
+    progress("posterior", 0, 1)
+    posterior = sampled(curves)
+    points = held_out(models, curves, progress)
+    return Fit(
+        _calibration(name, about, films[0], sources, posterior, points),
+        tuple(points),
+        tuple(left_out),
+    )
+
+
+def sampled_curve(model: CurveModel, surface: ValueSurface) -> SampledCurve:
+    """Return a curve as the posterior takes it."""
+    curve = model.curve
+    fields = [unknown.field for unknown in UNKNOWNS]
+    return SampledCurve(
+        curve.id,
+        curve.group or curve.id,
+        surface,
+        np.log(curve.y),
+        relative_errors(curve),
+        fields.index(model.delay) if model.delay else -1,
+    )
+
+
+def relative_errors(curve: MeasuredCurve) -> Array:
+    """Return standard errors of the logarithms of a curve's values (points,)."""
+    stated = np.array([error or 0.0 for error in curve.errors])
+    return np.asarray(np.maximum(stated / np.array(curve.y), LEAST_ERROR))
+
+
+def held_out(
+    models: Sequence[CurveModel], curves: Sequence[SampledCurve], progress: Progress
+) -> list[HeldOutPoint]:
+    """Return each curve's points as a fit without its group predicts them; none where all curves
+    are of one group.
+    """
+    groups = list(dict.fromkeys(curve.group for curve in curves))
+    rows: list[HeldOutPoint] = []
+    if len(groups) < 2:
+        return rows
+    for done, group in enumerate(groups):
+        progress("held out", done, len(groups))
+        seed = zlib.crc32(group.encode())
+        without = sampled([curve for curve in curves if curve.group != group], seed)
+        for model, curve in zip(models, curves, strict=True):
+            if curve.group == group:
+                rows += predicted_points(model.curve, curve, without, seed)
+    return rows
+
+
+def predicted_points(
+    curve: MeasuredCurve, values: SampledCurve, posterior: Posterior, seed: int
+) -> list[HeldOutPoint]:
+    """Return a curve's points with their intervals by a posterior."""
+    drawn = posterior.predicted(values, np.random.default_rng(seed))
+    ends = (1 - SHARE) / 2, 0.5, (1 + SHARE) / 2
+    low, median, high = np.exp(np.quantile(drawn, ends, axis=0))
+    places: Sequence[float | None] = curve.x or (None,) * len(curve.y)
+    return [
+        HeldOutPoint(curve.id, place, y, float(m), float(a), float(b), curve.y_unit)
+        for place, y, m, a, b in zip(places, curve.y, median, low, high, strict=True)
+    ]
+
+
+def _calibration(
+    name: str,
+    about: str,
+    film: str,
+    sources: Sequence[Evidence],
+    posterior: Posterior,
+    points: Sequence[HeldOutPoint],
+) -> Calibration:
+    sentences = tuple(
+        f"{row['first']} and {row['second']}: correlation {row['correlation']:.2f}"
+        for row in correlations(posterior.covariance, TOLD_APART)
+    )
+    return Calibration(
+        name=name,
+        about=about,
+        film=film,
+        evidence=tuple(source.id for source in sources),
+        mean=tuple(round(float(value), DIGITS) for value in posterior.mean),
+        covariance=tuple(
+            tuple(round(float(value), DIGITS + 2) for value in row) for row in posterior.covariance
+        ),
+        discrepancy=round(posterior.discrepancy, DIGITS),
+        points=len(points),
+        inside=sum(point.is_inside for point in points),
+        sentences=sentences,
+    )

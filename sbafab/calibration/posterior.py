@@ -1,0 +1,219 @@
+"""Posterior of the unknowns and of the models' discrepancy, sampled by emcee.
+
+The logarithm of a measured value is that of the model, plus a discrepancy, plus the error of the
+measurement. A curve's discrepancies are Student's t of FREEDOM degrees with one scale for all
+curves, half of their variance shared by the curve. Where a source leaves a set-up open, each one is
+as likely as the others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from sbafab.calibration.surface import ValueSurface, interpolated
+from sbafab.errors import DesignError
+from sbafab.models.unknowns import UNKNOWNS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sbafab.models.film_elements import Array
+
+FREEDOM = 4.0
+"""Degrees of freedom of the discrepancy: a curve that a model misses altogether does not widen the
+intervals of all others (Gelman et al., Bayesian Data Analysis, 17)."""
+SHARED = 0.5
+"""Share of the discrepancy's variance that the points of a curve have in common."""
+SCALE_MIDDLE, SCALE_SPREAD = 0.15, 0.7
+"""Prior of the discrepancy's scale: median, and standard deviation of its logarithm. Forces and
+strokes of such models are off by 10 to 20 %."""
+LEAST_ERROR = 0.01
+"""Least relative error of a measurement, for sources that state none or a scatter of repetitions
+on one actuator."""
+WALKERS, STEPS, BURN_IN, THINNING = 32, 1600, 600, 20
+SEED = 20220085
+
+
+class SampledCurve(NamedTuple):
+    """A curve as the posterior takes it: its surface, logarithms of the measured values and their
+    standard errors, (points,), its group, and the column of its delay in UNKNOWNS (-1: none).
+    """
+
+    id: str
+    group: str
+    surface: ValueSurface
+    measured: Array
+    errors: Array
+    delay: int
+
+    def logarithms(self, samples: Array) -> Array:
+        """Return logarithms of the models' values (n, open set-ups, points)."""
+        return self.delayed(self.surface.at(samples), samples)
+
+    def delayed(self, values: Array, samples: Array) -> Array:
+        """Return logarithms with the delay of pump or valve in them."""
+        if self.delay < 0:
+            return values
+        delays = np.exp(samples[:, self.delay])[:, None, None]
+        return np.asarray(np.log(np.exp(values) + delays))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Samples of the unknowns' coordinates (n, unknowns), and logarithms of the discrepancy's scale
+    (n,).
+    """
+
+    samples: Array
+    scales: Array
+
+    @cached_property
+    def mean(self) -> Array:
+        """Mean coordinates (unknowns,)."""
+        return np.asarray(self.samples.mean(0))
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the coordinates (unknowns, unknowns)."""
+        return np.asarray(np.cov(self.samples.T))
+
+    @cached_property
+    def discrepancy(self) -> float:
+        """Standard deviation of the normal whose 90 % interval is that of the discrepancy."""
+        return math.exp(float(np.median(self.scales))) * T_90 / NORMAL_90
+
+    def predicted(self, curve: SampledCurve, generator: np.random.Generator) -> Array:
+        """Return drawn logarithms of measured values of a curve (n, points)."""
+        values = curve.logarithms(self.samples)
+        count, setups, points = values.shape
+        chosen = values[np.arange(count), generator.integers(setups, size=count)]
+        missed = discrepancies(np.exp(self.scales), points, generator)
+        return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
+
+
+T_90 = 2.131847
+NORMAL_90 = 1.644854
+"""Half widths of the 90 % intervals of Student's t of FREEDOM degrees, and of the normal."""
+
+
+def discrepancies(scales: Array, points: int, generator: np.random.Generator) -> Array:
+    """Return drawn discrepancies of curves with ``scales`` (n,): (n, points)."""
+    count = len(scales)
+    common = generator.standard_normal((count, 1)) * math.sqrt(SHARED)
+    each = generator.standard_normal((count, points)) * math.sqrt(1 - SHARED)
+    width = np.sqrt(FREEDOM / generator.chisquare(FREEDOM, (count, 1)))
+    return np.asarray(scales[:, None] * width * (common + each))
+
+
+def log_prior(coordinates: Array) -> Array:
+    """Return the log prior at coordinates (n, unknowns + 1), up to a constant."""
+    total = -0.5 * ((coordinates[:, -1] - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2
+    for column, unknown in enumerate(UNKNOWNS):
+        place = coordinates[:, column]
+        middle = unknown.coordinate(unknown.middle)
+        total = total - 0.5 * ((place - middle) / unknown.spread) ** 2
+        low = unknown.coordinate(unknown.least)
+        high = unknown.coordinate(unknown.most)
+        total = np.where((place < low) | (place > high), -np.inf, total)
+    return total
+
+
+class Likelihood:
+    """The likelihood of curves, their surfaces joined in one table."""
+
+    def __init__(self, curves: Sequence[SampledCurve]) -> None:
+        self.curves = curves
+        tables = [curve.surface.table for curve in curves]
+        self.shapes = [table.shape[-2:] for table in tables]
+        self.flat = np.concatenate(
+            [
+                table.reshape(-1, math.prod(shape))
+                for table, shape in zip(tables, self.shapes, strict=True)
+            ],
+            axis=1,
+        )
+
+    def __call__(self, coordinates: Array) -> Array:
+        """Return the log likelihood at coordinates (n, unknowns + 1): (n,)."""
+        values = interpolated(self.flat, coordinates)
+        total, start = np.zeros(len(coordinates)), 0
+        for curve, shape in zip(self.curves, self.shapes, strict=True):
+            end = start + math.prod(shape)
+            block = values[:, start:end].reshape(-1, *shape)
+            residuals = curve.measured - curve.delayed(block, coordinates)
+            total = total + _curve_likelihood(residuals, curve.errors, coordinates[:, -1])
+            start = end
+        return total
+
+
+def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Array:
+    """Return the log density of residuals (n, set-ups, points), set-ups averaged.
+
+    A multivariate t whose scale matrix is the discrepancy's plus the measurement's.
+    """
+    points = residuals.shape[-1]
+    shape = SHARED * np.ones((points, points)) + (1 - SHARED) * np.eye(points)
+    matrices = np.exp(2 * log_scales)[:, None, None] * shape + np.diag(errors**2)
+    roots = np.linalg.cholesky(matrices)
+    scaled = np.linalg.solve(roots[:, None], residuals[..., None])[..., 0]
+    squares = (scaled**2).sum(-1)
+    logs = -0.5 * (FREEDOM + points) * np.log1p(squares / FREEDOM)
+    most = logs.max(-1)
+    mean = most + np.log(np.exp(logs - most[:, None]).mean(-1))
+    return np.asarray(mean - np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(-1))
+
+
+def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS) -> Posterior:
+    """Return the posterior of curves. Raises DesignError without emcee."""
+    try:
+        import emcee  # Optional: only calibration needs a sampler.
+    except ImportError:
+        raise DesignError(
+            'a calibration needs emcee, which is not installed; pip install "sbafab[calibrate]"'
+        ) from None
+
+    def log_posterior(coordinates: Array) -> Array:
+        prior = log_prior(coordinates)
+        inside = np.isfinite(prior)
+        total = np.full(len(prior), -np.inf)
+        if inside.any():
+            total[inside] = prior[inside] + likelihood(coordinates[inside])
+        return total
+
+    likelihood = Likelihood(curves)
+    generator = np.random.RandomState(seed)
+    start = _start(generator)
+    sampler = emcee.EnsembleSampler(WALKERS, start.shape[1], log_posterior, vectorize=True)
+    sampler.random_state = generator.get_state()
+    sampler.run_mcmc(start, steps)
+    chain = sampler.get_chain(discard=min(BURN_IN, steps // 2), thin=THINNING, flat=True)
+    return Posterior(chain[:, :-1], chain[:, -1])
+
+
+def _start(generator: np.random.RandomState) -> Array:
+    """Return places within the prior to start from: (walkers, unknowns + 1)."""
+    columns = []
+    for unknown in UNKNOWNS:
+        low, high = unknown.coordinate(unknown.least), unknown.coordinate(unknown.most)
+        drawn = unknown.coordinate(unknown.middle) + 0.5 * unknown.spread * generator.randn(WALKERS)
+        columns.append(np.clip(drawn, low + 1e-3 * (high - low), high - 1e-3 * (high - low)))
+    columns.append(math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS))
+    return np.stack(columns, -1)
+
+
+def correlations(covariance: Array, least: float) -> list[Mapping[str, object]]:
+    """Return pairs of unknowns whose correlation is at least ``least`` either way."""
+    deviations = np.sqrt(np.diag(covariance))
+    table = covariance / np.outer(deviations, deviations)
+    return [
+        {"first": UNKNOWNS[i].title, "second": UNKNOWNS[j].title, "correlation": float(table[i, j])}
+        for i in range(len(UNKNOWNS))
+        for j in range(i + 1, len(UNKNOWNS))
+        if abs(table[i, j]) >= least
+    ]
