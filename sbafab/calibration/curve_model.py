@@ -48,11 +48,18 @@ LONGEST = 60.0
 """Step and longest time of filling with air, s."""
 SHAPE_PRESSURES = np.geomspace(0.003, 60.0, 90)
 """Pressures in kPa at which free balloons are computed, for strokes by volume."""
-MODELLED = (
-    *("force_n", "stroke_mm", "balloon_stroke_mm", "height_mm", "flat_height_mm", "bend_deg"),
-    *("energy_mj", "time_s", "modulus_kpa"),
-)
-"""Quantities that the models give."""
+GROUP_OF = {
+    "force_n": "force",
+    "stroke_mm": "motion",
+    "balloon_stroke_mm": "motion",
+    "height_mm": "motion",
+    "bend_deg": "motion",
+    "flat_height_mm": "flat height",
+    "energy_mj": "work",
+    "time_s": "time",
+    "modulus_kpa": "stiffness",
+}
+"""Quantities that the models give, and the groups of their discrepancies."""
 WITHOUT_STACK = (*("stroke_mm", "balloon_stroke_mm", "height_mm", "flat_height_mm", "energy_mj"),)
 """Those that free balloons give."""
 
@@ -127,7 +134,7 @@ class CurveModel:
 
     def check(self) -> None:
         """Raise DesignError, with the reason, where the models give no such curve."""
-        if self.curve.quantity not in MODELLED:
+        if self.curve.quantity not in GROUP_OF:
             raise DesignError(f"no model gives the {self.curve.y_name}")
         if not self.curve.actuator.is_described:
             raise DesignError("no design describes the actuator")

@@ -1,5 +1,5 @@
-"""A calibration from evidence: a fit to all curves, and fits to all but one group of curves, whose
-points are then predicted.
+"""A calibration from evidence: a fit to all curves, and fits to all but the curves of one test,
+whose points are then predicted.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.calibration.curve_model import CurveModel
+from sbafab.calibration.curve_model import GROUP_OF, CurveModel
 from sbafab.calibration.posterior import (
     LEAST_ERROR,
     Posterior,
@@ -21,7 +21,7 @@ from sbafab.calibration.posterior import (
 )
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import SHARE, Calibration
+from sbafab.models.calibrated import GROUPS, SHARE, Calibration
 from sbafab.models.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class HeldOutPoint:
-    """A measured value, and its prediction with 90 % interval by a fit without its curve's group;
+    """A measured value, and its prediction with 90 % interval by a fit without the test that its curve is of;
     ``place`` is its place on the curve's axis, None without one.
     """
 
@@ -123,6 +123,7 @@ def sampled_curve(model: CurveModel, surface: ValueSurface) -> SampledCurve:
     return SampledCurve(
         curve.id,
         curve.group or curve.id,
+        GROUPS.index(GROUP_OF[curve.quantity]),
         surface,
         np.log(curve.y),
         relative_errors(curve),
@@ -139,19 +140,19 @@ def relative_errors(curve: MeasuredCurve) -> Array:
 def held_out(
     models: Sequence[CurveModel], curves: Sequence[SampledCurve], progress: Progress
 ) -> list[HeldOutPoint]:
-    """Return each curve's points as a fit without its group predicts them; none where all curves
-    are of one group.
+    """Return each curve's points as a fit without its test predicts them; none where all curves
+    are of one test.
     """
-    groups = list(dict.fromkeys(curve.group for curve in curves))
+    tests = list(dict.fromkeys(curve.test for curve in curves))
     rows: list[HeldOutPoint] = []
-    if len(groups) < 2:
+    if len(tests) < 2:
         return rows
-    for done, group in enumerate(groups):
-        progress("held out", done, len(groups))
-        seed = zlib.crc32(group.encode())
-        without = sampled([curve for curve in curves if curve.group != group], seed)
+    for done, test in enumerate(tests):
+        progress("held out", done, len(tests))
+        seed = zlib.crc32(test.encode())
+        without = sampled([curve for curve in curves if curve.test != test], seed)
         for model, curve in zip(models, curves, strict=True):
-            if curve.group == group:
+            if curve.test == test:
                 rows += predicted_points(model.curve, curve, without, seed)
     return rows
 
@@ -191,7 +192,7 @@ def _calibration(
         covariance=tuple(
             tuple(round(float(value), DIGITS + 2) for value in row) for row in posterior.covariance
         ),
-        discrepancy=round(posterior.discrepancy, DIGITS),
+        discrepancy={group: round(value, DIGITS) for group, value in posterior.discrepancy.items()},
         points=len(points),
         inside=sum(point.is_inside for point in points),
         sentences=sentences,

@@ -1,9 +1,9 @@
 """Posterior of the unknowns and of the models' discrepancy, sampled by emcee.
 
 The logarithm of a measured value is that of the model, plus a discrepancy, plus the error of the
-measurement. A curve's discrepancies are Student's t of FREEDOM degrees with one scale for all
-curves, half of their variance shared by the curve. Where a source leaves a set-up open, each one is
-as likely as the others.
+measurement. Discrepancies are normal with one standard deviation for each group of quantities; half
+of their variance is shared by the points of a curve. Where a source leaves a set-up open, each one
+is as likely as the others.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from sbafab.calibration.surface import ValueSurface, interpolated
 from sbafab.errors import DesignError
+from sbafab.models.calibrated import GROUPS
 from sbafab.models.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
@@ -25,28 +26,27 @@ if TYPE_CHECKING:
 
     from sbafab.models.film_elements import Array
 
-FREEDOM = 4.0
-"""Degrees of freedom of the discrepancy: a curve that a model misses altogether does not widen the
-intervals of all others (Gelman et al., Bayesian Data Analysis, 17)."""
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""
 SCALE_MIDDLE, SCALE_SPREAD = 0.15, 0.7
-"""Prior of the discrepancy's scale: median, and standard deviation of its logarithm. Forces and
-strokes of such models are off by 10 to 20 %."""
+"""Prior of a group's discrepancy: median of the standard deviation, and standard deviation of its
+logarithm. Such models are off by 10 to 20 %."""
 LEAST_ERROR = 0.01
 """Least relative error of a measurement, for sources that state none or a scatter of repetitions
 on one actuator."""
-WALKERS, STEPS, BURN_IN, THINNING = 32, 1600, 600, 20
+WALKERS, STEPS, BURN_IN, THINNING = 40, 2000, 800, 20
 SEED = 20220085
 
 
 class SampledCurve(NamedTuple):
     """A curve as the posterior takes it: its surface, logarithms of the measured values and their
-    standard errors, (points,), its group, and the column of its delay in UNKNOWNS (-1: none).
+    standard errors, (points,), the test that it comes from, the number of its quantity's group in
+    GROUPS, and the column of its delay in UNKNOWNS (-1: none).
     """
 
     id: str
-    group: str
+    test: str
+    group: int
     surface: ValueSurface
     measured: Array
     errors: Array
@@ -66,8 +66,8 @@ class SampledCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class Posterior:
-    """Samples of the unknowns' coordinates (n, unknowns), and logarithms of the discrepancy's scale
-    (n,).
+    """Samples of the unknowns' coordinates (n, unknowns), and logarithms of the discrepancies'
+    standard deviations (n, groups).
     """
 
     samples: Array
@@ -84,22 +84,18 @@ class Posterior:
         return np.asarray(np.cov(self.samples.T))
 
     @cached_property
-    def discrepancy(self) -> float:
-        """Standard deviation of the normal whose 90 % interval is that of the discrepancy."""
-        return math.exp(float(np.median(self.scales))) * T_90 / NORMAL_90
+    def discrepancy(self) -> dict[str, float]:
+        """Standard deviation of the discrepancy by group: the root of its mean square."""
+        squares = np.exp(2 * self.scales).mean(0)
+        return dict(zip(GROUPS, np.sqrt(squares).tolist(), strict=True))
 
     def predicted(self, curve: SampledCurve, generator: np.random.Generator) -> Array:
         """Return drawn logarithms of measured values of a curve (n, points)."""
         values = curve.logarithms(self.samples)
         count, setups, points = values.shape
         chosen = values[np.arange(count), generator.integers(setups, size=count)]
-        missed = discrepancies(np.exp(self.scales), points, generator)
+        missed = discrepancies(np.exp(self.scales[:, curve.group]), points, generator)
         return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
-
-
-T_90 = 2.131847
-NORMAL_90 = 1.644854
-"""Half widths of the 90 % intervals of Student's t of FREEDOM degrees, and of the normal."""
 
 
 def discrepancies(scales: Array, points: int, generator: np.random.Generator) -> Array:
@@ -107,13 +103,13 @@ def discrepancies(scales: Array, points: int, generator: np.random.Generator) ->
     count = len(scales)
     common = generator.standard_normal((count, 1)) * math.sqrt(SHARED)
     each = generator.standard_normal((count, points)) * math.sqrt(1 - SHARED)
-    width = np.sqrt(FREEDOM / generator.chisquare(FREEDOM, (count, 1)))
-    return np.asarray(scales[:, None] * width * (common + each))
+    return np.asarray(scales[:, None] * (common + each))
 
 
 def log_prior(coordinates: Array) -> Array:
-    """Return the log prior at coordinates (n, unknowns + 1), up to a constant."""
-    total = -0.5 * ((coordinates[:, -1] - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2
+    """Return the log prior at coordinates (n, unknowns + groups), up to a constant."""
+    scales = coordinates[:, len(UNKNOWNS) :]
+    total = -0.5 * (((scales - math.log(SCALE_MIDDLE)) / SCALE_SPREAD) ** 2).sum(-1)
     for column, unknown in enumerate(UNKNOWNS):
         place = coordinates[:, column]
         middle = unknown.coordinate(unknown.middle)
@@ -140,14 +136,15 @@ class Likelihood:
         )
 
     def __call__(self, coordinates: Array) -> Array:
-        """Return the log likelihood at coordinates (n, unknowns + 1): (n,)."""
+        """Return the log likelihood at coordinates (n, unknowns + groups): (n,)."""
         values = interpolated(self.flat, coordinates)
+        scales = coordinates[:, len(UNKNOWNS) :]
         total, start = np.zeros(len(coordinates)), 0
         for curve, shape in zip(self.curves, self.shapes, strict=True):
             end = start + math.prod(shape)
             block = values[:, start:end].reshape(-1, *shape)
             residuals = curve.measured - curve.delayed(block, coordinates)
-            total = total + _curve_likelihood(residuals, curve.errors, coordinates[:, -1])
+            total = total + _curve_likelihood(residuals, curve.errors, scales[:, curve.group])
             start = end
         return total
 
@@ -155,7 +152,7 @@ class Likelihood:
 def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Array:
     """Return the log density of residuals (n, set-ups, points), set-ups averaged.
 
-    A multivariate t whose scale matrix is the discrepancy's plus the measurement's.
+    A normal whose covariance is the discrepancy's plus the measurement's.
     """
     points = residuals.shape[-1]
     shape = SHARED * np.ones((points, points)) + (1 - SHARED) * np.eye(points)
@@ -163,7 +160,7 @@ def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Arr
     roots = np.linalg.cholesky(matrices)
     scaled = np.linalg.solve(roots[:, None], residuals[..., None])[..., 0]
     squares = (scaled**2).sum(-1)
-    logs = -0.5 * (FREEDOM + points) * np.log1p(squares / FREEDOM)
+    logs = -0.5 * squares
     most = logs.max(-1)
     mean = most + np.log(np.exp(logs - most[:, None]).mean(-1))
     return np.asarray(mean - np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(-1))
@@ -193,18 +190,18 @@ def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS
     sampler.random_state = generator.get_state()
     sampler.run_mcmc(start, steps)
     chain = sampler.get_chain(discard=min(BURN_IN, steps // 2), thin=THINNING, flat=True)
-    return Posterior(chain[:, :-1], chain[:, -1])
+    return Posterior(chain[:, : len(UNKNOWNS)], chain[:, len(UNKNOWNS) :])
 
 
 def _start(generator: np.random.RandomState) -> Array:
-    """Return places within the prior to start from: (walkers, unknowns + 1)."""
+    """Return places within the prior to start from: (walkers, unknowns + groups)."""
     columns = []
     for unknown in UNKNOWNS:
         low, high = unknown.coordinate(unknown.least), unknown.coordinate(unknown.most)
         drawn = unknown.coordinate(unknown.middle) + 0.5 * unknown.spread * generator.randn(WALKERS)
         columns.append(np.clip(drawn, low + 1e-3 * (high - low), high - 1e-3 * (high - low)))
-    columns.append(math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS))
-    return np.stack(columns, -1)
+    scales = math.log(SCALE_MIDDLE) + 0.5 * SCALE_SPREAD * generator.randn(WALKERS, len(GROUPS))
+    return np.concatenate([np.stack(columns, -1), scales], -1)
 
 
 def correlations(covariance: Array, least: float) -> list[Mapping[str, object]]:

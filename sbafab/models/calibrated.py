@@ -4,7 +4,7 @@ that designs and kits name, and the 90 % intervals of predictions that follow fr
 Unknowns have a normal posterior in their coordinates. A prediction is linear in them: its
 logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
 change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
-deviation for all quantities: the evidence does not tell them apart.
+deviation for each group of quantities.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ SCHEMA = "sbafab/calibration@1"
 NONE: Literal["none"] = "none"
 """The name of no calibration: the films as drawn and bought, and no intervals."""
 DEFAULT = "paper"
+GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness")
+"""Groups of quantities, each with a discrepancy of its own."""
 SHARE = 0.9
 """Probability that an interval holds the measured value."""
 DESIGN_UNKNOWNS = 3
@@ -40,7 +42,7 @@ DESIGN_UNKNOWNS = 3
 @dataclass(frozen=True)
 class Calibration:
     """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``, and
-    ``discrepancy``, the relative standard deviation that the models miss.
+    ``discrepancy``, the relative standard deviation that the models miss, by group.
 
     ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to;
     ``inside`` of ``points`` left-out points lay in their intervals. ``sentences`` say what the
@@ -53,7 +55,7 @@ class Calibration:
     evidence: tuple[str, ...]
     mean: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
-    discrepancy: float
+    discrepancy: Mapping[str, float]
     points: int
     inside: int
     sentences: tuple[str, ...]
@@ -99,20 +101,20 @@ class Calibration:
         return float(rates @ np.array(self.covariance) @ rates)
 
     def interval(
-        self, value: float, slopes: Sequence[float], is_log: bool, share: float = SHARE
+        self, group: str, value: float, slopes: Sequence[float], is_log: bool, share: float = SHARE
     ) -> tuple[float, float]:
         """Return the interval that holds the measured value with a probability of ``share``.
 
         ``slopes`` are those of the logarithm of the value (``is_log``) or of the value, by
         coordinate.
         """
-        half = deviations(share) * self._deviation(value, slopes, is_log)
+        half = deviations(share) * self._deviation(group, value, slopes, is_log)
         if is_log:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
 
-    def _deviation(self, value: float, slopes: Sequence[float], is_log: bool) -> float:
-        missed = self.discrepancy * (1.0 if is_log else abs(value))
+    def _deviation(self, group: str, value: float, slopes: Sequence[float], is_log: bool) -> float:
+        missed = self.discrepancy[group] * (1.0 if is_log else abs(value))
         return math.sqrt(self.variance(slopes) + missed**2)
 
     def as_dict(self) -> dict[str, Any]:
@@ -127,7 +129,7 @@ class Calibration:
             "mean": list(self.mean),
             "covariance": [list(row) for row in self.covariance],
             "sentences": list(self.sentences),
-            "discrepancy": self.discrepancy,
+            "discrepancy": dict(self.discrepancy),
             "held_out": {"points": self.points, "inside": self.inside},
         }
 
@@ -202,7 +204,7 @@ KEYS = {
     "mean": list,
     "covariance": list,
     "sentences": list,
-    "discrepancy": float,
+    "discrepancy": dict,
     "held_out": dict,
 }
 
@@ -231,8 +233,10 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
                 f"mean of {unknown.field} must be from {low:.3g} to {high:.3g}"
                 + (" (a logarithm)" if unknown.is_log else "")
             )
-    if not 0 <= tables["discrepancy"] <= 10:
-        raise DesignError("discrepancy must be from 0 to 10")
+    spreads = {group: tables["discrepancy"].get(group) for group in GROUPS}
+    for group, value in spreads.items():
+        if not isinstance(value, int | float) or not 0 <= value <= 10:
+            raise DesignError(f'discrepancy."{group}" must be a number from 0 to 10')
     held = tables["held_out"]
     points, inside = held.get("points"), held.get("inside")
     if not (isinstance(points, int) and isinstance(inside, int) and 0 <= inside <= points):
@@ -244,7 +248,7 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
         tuple(map(str, tables["evidence"])),
         tuple(mean.tolist()),
         tuple(tuple(row) for row in covariance.tolist()),
-        tables["discrepancy"],
+        spreads,
         points,
         inside,
         tuple(map(str, tables["sentences"])),

@@ -90,7 +90,8 @@ class Uncertainty:
     def _bounded(
         self, figure: Figure, moved: Sequence[tuple[float, Mapping[tuple[str, str], float]]]
     ) -> Figure:
-        if not _kind(figure):
+        group = discrepancy_group(figure)
+        if group is None:
             return figure
         key = figure.name, _kind(figure)
         values = [figure.value if change == 0 else each.get(key) for change, each in moved]
@@ -103,7 +104,7 @@ class Uncertainty:
             for value, (change, _) in zip(present, moved, strict=True)
         ]
         slopes += self._delay_slopes(figure)
-        low, high = self.calibration.interval(figure.value, slopes, is_log)
+        low, high = self.calibration.interval(group, figure.value, slopes, is_log)
         if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
             low = max(low, 0.0)
         return replace(figure, interval=(low, high))
@@ -138,6 +139,19 @@ KINDS = (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS)
 
 def _by_name(items: Items) -> dict[tuple[str, str], float]:
     return {(item.name, _kind(item)): item.value for item in items if isinstance(item, Figure)}
+
+
+def discrepancy_group(figure: Figure) -> str | None:
+    """Return the group of a figure's discrepancy; None where no calibrated model gives it."""
+    kind = _kind(figure)
+    if not kind:
+        return None
+    if kind == FLAT_HEIGHT_OF_FILMS:
+        return "flat height"
+    return GROUP_BY_UNIT.get(figure.unit, "motion")
+
+
+GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
 
 
 def uncertainty_of(
