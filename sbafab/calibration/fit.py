@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.calibration.curve_model import GROUP_OF, CurveModel
+from sbafab.calibration.model_values import ModelledActuator, NoModel, model_values
 from sbafab.calibration.posterior import (
     LEAST_ERROR,
     Posterior,
@@ -22,7 +22,7 @@ from sbafab.calibration.posterior import (
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS, SHARE, Calibration
-from sbafab.models.unknowns import UNKNOWNS
+from sbafab.models.unknowns import UNKNOWNS, factors_at
 
 if TYPE_CHECKING:
     from sbafab.evidence.records import Evidence, MeasuredCurve
@@ -36,8 +36,8 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class HeldOutPoint:
-    """A measured value, and its prediction with 90 % interval by a fit without the test that its curve is of;
-    ``place`` is its place on the curve's axis, None without one.
+    """A measured value, and its prediction with 90 % interval by a fit without its test; ``place``
+    is its place on the curve's axis, None without one.
     """
 
     curve: str
@@ -65,27 +65,44 @@ class Fit:
     left_out: tuple[tuple[str, str], ...]
 
 
+GROUP_OF = {
+    "force_n": "force",
+    "stroke_mm": "motion",
+    "balloon_stroke_mm": "motion",
+    "height_mm": "motion",
+    "bend_deg": "motion",
+    "flat_height_mm": "flat height",
+    "energy_mj": "work",
+    "time_s": "time",
+    "modulus_kpa": "stiffness",
+}
+"""Quantities that calibration is fitted to, and the groups of their discrepancies."""
+
+
 def usable_curves(
     sources: Sequence[Evidence],
-) -> tuple[list[CurveModel], list[tuple[str, str]]]:
+) -> tuple[list[MeasuredCurve], list[tuple[str, str]]]:
     """Return the curves that a calibration can be fitted to, and the others with their reasons."""
-    models, left_out = [], []
+    curves, left_out = [], []
     for source in sources:
         for curve in source.curves:
             reason = "" if curve.comparable else curve.reason
-            model = CurveModel(curve)
-            if not reason:
-                try:
-                    model.check()
-                except DesignError as error:
-                    reason = str(error)
+            if not reason and curve.quantity not in GROUP_OF:
+                reason = f"the unknowns do not change the {curve.y_name}"
             if not reason and min(curve.y) <= 0:
                 reason = "its values are not all above 0"
+            if not reason:
+                answer = model_values(curve, factors_at(MIDDLES))
+                reason = answer.reason if isinstance(answer, NoModel) else ""
             if reason:
                 left_out.append((curve.id, reason))
             else:
-                models.append(model)
-    return models, left_out
+                curves.append(curve)
+    return curves, left_out
+
+
+MIDDLES = {unknown.field: unknown.middle for unknown in UNKNOWNS}
+"""Values in the middle of the priors."""
 
 
 def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str = "") -> Fit:
@@ -93,22 +110,22 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
 
     Raises DesignError where no curve of theirs can be fitted, or without emcee.
     """
-    models, left_out = usable_curves(sources)
-    if not models:
+    usable, left_out = usable_curves(sources)
+    if not usable:
         reasons = "; ".join(f"{curve}: {reason}" for curve, reason in left_out)
         raise DesignError(f"no curve can be fitted to ({reasons})")
-    films = sorted({model.design.films.tpe.product for model in models})
+    films = sorted({film_of(curve) for curve in usable})
     if len(films) > 1:
         raise DesignError(
             f"the curves are of {len(films)} films ({', '.join(films)}); calibrate each by itself"
         )
     curves = [
-        sampled_curve(model, surface)
-        for model, surface in zip(models, surfaces(models, progress), strict=True)
+        sampled_curve(curve, surface)
+        for curve, surface in zip(usable, surfaces(usable, progress), strict=True)
     ]
     progress("posterior", 0, 1)
     posterior = sampled(curves)
-    points = held_out(models, curves, progress)
+    points = held_out(usable, curves, progress)
     return Fit(
         _calibration(name, about, films[0], sources, posterior, points),
         tuple(points),
@@ -116,9 +133,13 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
     )
 
 
-def sampled_curve(model: CurveModel, surface: ValueSurface) -> SampledCurve:
+def film_of(curve: MeasuredCurve) -> str:
+    """Return the product of the film of the actuator that was measured."""
+    return ModelledActuator(curve.actuator, factors_at(MIDDLES)).design.films.tpe.product
+
+
+def sampled_curve(curve: MeasuredCurve, surface: ValueSurface) -> SampledCurve:
     """Return a curve as the posterior takes it."""
-    curve = model.curve
     fields = [unknown.field for unknown in UNKNOWNS]
     return SampledCurve(
         curve.id,
@@ -127,8 +148,13 @@ def sampled_curve(model: CurveModel, surface: ValueSurface) -> SampledCurve:
         surface,
         np.log(curve.y),
         relative_errors(curve),
-        fields.index(model.delay) if model.delay else -1,
+        fields.index(delay_of(curve)) if curve.quantity == "time_s" else -1,
     )
+
+
+def delay_of(curve: MeasuredCurve) -> str:
+    """Return the field of the delay in a curve of times."""
+    return "water_delay" if curve.setup.fluid == "water" else "air_delay"
 
 
 def relative_errors(curve: MeasuredCurve) -> Array:
@@ -138,7 +164,7 @@ def relative_errors(curve: MeasuredCurve) -> Array:
 
 
 def held_out(
-    models: Sequence[CurveModel], curves: Sequence[SampledCurve], progress: Progress
+    measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], progress: Progress
 ) -> list[HeldOutPoint]:
     """Return each curve's points as a fit without its test predicts them; none where all curves
     are of one test.
@@ -151,9 +177,9 @@ def held_out(
         progress("held out", done, len(tests))
         seed = zlib.crc32(test.encode())
         without = sampled([curve for curve in curves if curve.test != test], seed)
-        for model, curve in zip(models, curves, strict=True):
+        for source, curve in zip(measured, curves, strict=True):
             if curve.test == test:
-                rows += predicted_points(model.curve, curve, without, seed)
+                rows += predicted_points(source, curve, without, seed)
     return rows
 
 

@@ -117,7 +117,7 @@ def log_prior(coordinates: Array) -> Array:
         low = unknown.coordinate(unknown.least)
         high = unknown.coordinate(unknown.most)
         total = np.where((place < low) | (place > high), -np.inf, total)
-    return total
+    return np.asarray(total)
 
 
 class Likelihood:

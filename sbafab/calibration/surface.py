@@ -6,17 +6,21 @@ press factor.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sbafab.calibration.curve_model import CurveModel
+from sbafab.calibration.model_values import NoModel, model_values
+from sbafab.errors import DesignError
 from sbafab.models.calibrated import DESIGN_UNKNOWNS
 from sbafab.models.unknowns import UNKNOWNS, factors_at
 
 if TYPE_CHECKING:
+    from sbafab.evidence.records import MeasuredCurve
+    from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
 
 NODES = (11, 6, 3)
@@ -66,11 +70,11 @@ NODE_COORDINATES = node_coordinates()
 
 
 def surfaces(
-    models: Sequence[CurveModel], progress: Callable[[str, int, int], None]
+    curves: Sequence[MeasuredCurve], progress: Callable[[str, int, int], None]
 ) -> list[ValueSurface]:
     """Return the surface of each curve. ``progress`` is called with step, done and total."""
     nodes = NODE_COORDINATES
-    tables = [np.zeros((*NODES, len(model.open_setups), len(model.curve.y))) for model in models]
+    tables: list[Array | None] = [None] * len(curves)
     # Maps of balloons hang on the pocket loss alone.
     for loss in range(NODES[1]):
         progress("models", loss, NODES[1])
@@ -83,9 +87,29 @@ def surfaces(
                 ]
                 fields = (unknown.field for unknown in UNKNOWNS)
                 factors = factors_at(dict(zip(fields, values, strict=False)))
-                for model, table in zip(models, tables, strict=True):
-                    least = IMPOSSIBLE * np.array(model.curve.y)
-                    values_there = model.values(factors)
-                    reached = np.where(np.isfinite(values_there), values_there, 0.0)
-                    table[place] = np.log(np.maximum(reached, least))
-    return [ValueSurface(table) for table in tables]
+                for number, curve in enumerate(curves):
+                    values_there = logarithms(curve, factors)
+                    table = tables[number]
+                    if table is None:
+                        table = tables[number] = np.zeros((*NODES, *values_there.shape))
+                    table[place] = values_there
+    return [ValueSurface(table) for table in tables if table is not None]
+
+
+def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
+    """Return logarithms of the models' values of a curve (open set-ups, points).
+
+    A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
+    DesignError where no model gives the curve.
+    """
+    answer = model_values(curve, factors)
+    if isinstance(answer, NoModel):
+        raise DesignError(f"{curve.id}: {answer.reason}")
+    rows = [
+        [
+            math.log(max(value or 0.0, IMPOSSIBLE * measured))
+            for value, measured in zip(values, curve.y, strict=True)
+        ]
+        for values in answer.series.values()
+    ]
+    return np.array(rows)

@@ -209,7 +209,7 @@ KEYS = {
 }
 
 
-def _checked(tables: Mapping[str, Any]) -> Calibration:
+def _check_keys(tables: Mapping[str, Any]) -> None:
     for key in tables:
         if key not in KEYS:
             raise DesignError(f"{shown(key)} is no key of a calibration; it has {listed(KEYS)}")
@@ -218,6 +218,10 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
             raise DesignError(f"{key} is missing or not a {kind.__name__}")
     if tables["schema"] != SCHEMA:
         raise DesignError(f"schema = {shown(tables['schema'])} must be {SCHEMA!r}")
+
+
+def _checked(tables: Mapping[str, Any]) -> Calibration:
+    _check_keys(tables)
     fields = [unknown.field for unknown in UNKNOWNS]
     if tables["unknowns"] != fields:
         raise DesignError(f"unknowns must be {listed(fields)}, in this order")

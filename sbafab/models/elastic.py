@@ -179,8 +179,7 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
 
 def moved_stack(together: Stack, factors: Factors, moved: Factors) -> Stack | None:
     """Return a stack of ``factors`` at other ones without new maps; None where it needs them."""
-    alike = replace(moved, modulus_ratio=factors.modulus_ratio, press_factor=factors.press_factor)
-    if alike != factors:
+    if (moved.pocket_loss, moved.modulus_mpa) != (factors.pocket_loss, factors.modulus_mpa):
         return None
     ratio = moved.modulus_ratio / factors.modulus_ratio
     return replace(
@@ -322,6 +321,22 @@ def time_to_fill(
     pose = stack.pose((until - tube,) * stack.chambers)
     empty = stack.pose((0.0,) * stack.chambers)
     return float((pose.volumes - empty.volumes).mean()) / flow, pose
+
+
+def air_time(
+    whole: Stack, flow_ml_min: float, until: float, line: Line, step: float = 0.002
+) -> float:
+    """Return the seconds of air at a flow, shared by all chambers, until they have a pressure in
+    kPa, by steps of so many s.
+    """
+    moving = whole.motion(line=line)
+    flow = flow_ml_min * 1000 / 60 / whole.chambers
+    before = 0.0
+    while moving.pressures[0] < until:
+        before = moving.pressures[0]
+        moving.step(step, flows=(flow,) * whole.chambers)
+    over = (moving.pressures[0] - until) / (moving.pressures[0] - before)
+    return moving.time - step * over
 
 
 def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.evidence.records import Evidence, MeasuredCurve
 from sbafab.models.figures import Factors
 from sbafab.output.schema_ids import COMPARISON_SCHEMA
-from sbafab.reproduction.model_values import NoModel, model_values
 
 Ends = tuple[float, float]
 """Least and largest value."""

@@ -10,7 +10,7 @@ import numpy as np
 from sbafab.actuators import build, load_design
 from sbafab.models import paper, parabola, printed
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import pose_bent_by, time_to_fill
+from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
@@ -417,22 +417,6 @@ def _pressure_at(whole: Stack, height: float) -> float:
         is_low = whole.pose((middle,) * whole.chambers).height < height
         low, high = (middle, high) if is_low else (low, middle)
     return high
-
-
-def air_time(
-    whole: Stack, flow_ml_min: float, until: float, line: Line, step: float = 0.002
-) -> float:
-    """Return the seconds of air at a flow, shared by all chambers, until they have a pressure in
-    kPa, by steps of so many s.
-    """
-    moving = whole.motion(line=line)
-    flow = flow_ml_min * 1000 / 60 / whole.chambers
-    before = 0.0
-    while moving.pressures[0] < until:
-        before = moving.pressures[0]
-        moving.step(step, flows=(flow,) * whole.chambers)
-    over = (moving.pressures[0] - until) / (moving.pressures[0] - before)
-    return moving.time - step * over
 
 
 def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:

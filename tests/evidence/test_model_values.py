@@ -23,7 +23,7 @@ from sbafab.evidence.records import (
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
 from sbafab.reproduction.comparison import compare, table_lines
-from sbafab.reproduction.model_values import (
+from sbafab.calibration.model_values import (
     ANSWERS,
     WITHOUT_MODEL,
     ModelValues,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,13 +21,13 @@ from sbafab.models import elastic, paper
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Factors, Figure, PredictionRequest
-from sbafab.models.formulas import burst_pressure, modulus
+from sbafab.models.formulas import burst_pressure, modulus, second_moments
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
-from sbafab.models.prediction import predict
+from sbafab.models.prediction import plate_of, predict
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.reproduction.rows import air_time
+from sbafab.models.unknowns import UNKNOWNS
 
 ModelValue = float | None
 """A value of a model; None where the model has no such state."""
@@ -35,6 +36,11 @@ LEAST_FREE_KPA, FIRST_KPA, MOST_FREE_KPA = 0.002, 0.5, 20.0
 """Pressures between which a single balloon is inflated, and the first end of its range."""
 NO_TUBE = 1e-3
 """Length in mm of a tube that takes no pressure."""
+OPEN_PRESSURES = (10.0, 30.0, 100.0)
+"""Pressures in kPa that stand for one that a source does not give: from the paper's full actuation
+(Sec. 4.5) to that of its forces (Sec. 4.3)."""
+LEAST_RATIO = UNKNOWNS[0].least
+"""Modulus ratio for which maps are made; those of stiffer films reach further."""
 STEPS = 40
 """Steps of time in which air fills an actuator."""
 
@@ -96,6 +102,38 @@ WITHOUT_MODEL = {
 """Why a quantity has no model."""
 
 
+def _text(measured: MeasuredActuator) -> str:
+    """Return what describes an actuator, as a key of caches."""
+    return json.dumps([measured.design, dict(measured.changes), measured.toml], sort_keys=True)
+
+
+@lru_cache(maxsize=64)
+def measured_design(text: str) -> tuple[Design, Laminate]:
+    """Return design and laminate of a measured actuator by its text. Raises DesignError."""
+    name, changes, toml = json.loads(text)
+    if toml:
+        tables = toml_tables(toml, "the record's design")
+        # All that its kit gave stands in the record.
+        tables.pop("kit", None)
+        design = validated(tables, records(), Path())
+    else:
+        design = load_design(name, [changes])
+    return design, build(design)
+
+
+@lru_cache(maxsize=64)
+def _drawn_stack(text: str, loss: float) -> tuple[Stack, Factors]:
+    factors = Factors(pocket_loss=loss, modulus_ratio=LEAST_RATIO)
+    return stack(*measured_design(text), factors=factors), factors
+
+
+def drawn_stack(measured: MeasuredActuator, loss: float) -> tuple[Stack, Factors]:
+    """Return the stack with a pocket loss in mm at the least modulus ratio, and its factors: other
+    factors need no maps of their own.
+    """
+    return _drawn_stack(_text(measured), loss)
+
+
 @dataclass(frozen=True)
 class ModelledActuator:
     """The actuator of a curve as the models take it; parts are built when first asked for."""
@@ -106,17 +144,12 @@ class ModelledActuator:
     @cached_property
     def design(self) -> Design:
         """The design. Raises DesignError."""
-        if self.measured.toml:
-            tables = toml_tables(self.measured.toml, "the record's design")
-            # All that its kit gave stands in the record.
-            tables.pop("kit", None)
-            return validated(tables, records(), Path())
-        return load_design(self.measured.design, [self.measured.changes])
+        return measured_design(_text(self.measured))[0]
 
     @cached_property
     def laminate(self) -> Laminate:
         """The laminate. Raises DesignError."""
-        return build(self.design)
+        return measured_design(_text(self.measured))[1]
 
     @cached_property
     def actuator(self) -> Actuator:
@@ -126,17 +159,19 @@ class ModelledActuator:
     @cached_property
     def stack(self) -> Stack:
         """The elastic stack. Raises DesignError for pockets that are not round."""
-        return stack(self.design, self.laminate, factors=self.factors)
+        together, base = drawn_stack(self.measured, self.factors.pocket_loss)
+        moved = elastic.moved_stack(together, base, self.factors)
+        return moved or stack(self.design, self.laminate, factors=self.factors)
 
     @cached_property
     def name(self) -> str:
         """The name of the elastic stack with its factors."""
         return elastic.calibrated(elastic.FORCE, self.factors).name
 
-    def figure(self, name: str, pressures: tuple[float, ...] = (), quick: bool = True) -> Figure:
+    def figure(self, name: str) -> Figure:
         """Return the prediction's figure of a name. Raises DesignError where it has none."""
-        request = PredictionRequest(pressures or (100.0,), calibration=self.factors)
-        prediction = predict(self.design, request, self.laminate, quick)
+        request = PredictionRequest((100.0,), calibration=self.factors)
+        prediction = predict(self.design, request, self.laminate, quick=True)
         for figure in prediction.figures:
             if figure.name == name:
                 return figure
@@ -147,16 +182,16 @@ class ModelledActuator:
 
 def _by_pressure(
     curve: MeasuredCurve, value: Callable[[float], ModelValue]
-) -> tuple[str, tuple[ModelValue, ...]]:
-    """Return a value at each pressure of a curve, and what is assumed of the pressure: that of
-    full actuation, where neither axis nor set-up gives one.
+) -> dict[str, tuple[ModelValue, ...]]:
+    """Return a value at each pressure of a curve, by what is assumed of the pressure where neither
+    axis nor set-up gives one: OPEN_PRESSURES.
     """
     if curve.x_name == "pressure_kpa":
-        return "", tuple(map(value, curve.x))
-    given = curve.setup.pressure_kpa
-    pressure = paper.FULL_KPA if given is None else given
-    assumed = f"{pressure:g} kPa in the chambers" if given is None else ""
-    return assumed, (value(pressure),) * len(curve.y)
+        return {"": tuple(map(value, curve.x))}
+    count = len(curve.y)
+    if curve.setup.pressure_kpa is not None:
+        return {"": (value(curve.setup.pressure_kpa),) * count}
+    return {f"{p:g} kPa in the chambers": (value(p),) * count for p in OPEN_PRESSURES}
 
 
 def _phrase(*parts: str) -> str:
@@ -289,13 +324,14 @@ def _risen(
         return NoModel("one chamber does not bend")
     series = {}
     for count in counts:
-        assumed, values = "", tuple[ModelValue, ...]()
         if curve.x_name == "volume_ul":
             poses = (_pose_with(whole, count, volume) for volume in curve.x)
             values = tuple(None if pose is None else value(pose) for pose in poses)
-        else:
-            assumed, values = _by_pressure(curve, _at_pressure(whole, count, value))
-        series[_phrase(_chambers(count, counts), assumed)] = values
+            series[_chambers(count, counts)] = values
+            continue
+        by_pressure = _by_pressure(curve, _at_pressure(whole, count, value))
+        for assumed, values in by_pressure.items():
+            series[_phrase(_chambers(count, counts), assumed)] = values
     return ModelValues(of.name, series)
 
 
@@ -329,11 +365,14 @@ def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues 
     (balloon,) = kinds
     model = elastic.calibrated(elastic.ELASTIC, of.factors).name
     if curve.x_name == "volume_ul":
-        return ModelValues(model, {"": _strokes_by_volume(balloon, curve.x)})
-    assumed, values = _by_pressure(curve, lambda p: float(free_shapes(balloon, p).height[0]))
-    return ModelValues(model, {assumed: values})
+        # A stroke by its volume is the same for every modulus.
+        slack = balloon.stiffened(1 / of.factors.modulus_ratio)
+        return ModelValues(model, {"": _strokes_by_volume(slack, curve.x)})
+    series = _by_pressure(curve, lambda p: float(free_shapes(balloon, p).height[0]))
+    return ModelValues(model, series)
 
 
+@lru_cache(maxsize=256)
 def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
     """Return mm of a free balloon by ul in it, to 0.2 %; None where MOST_FREE_KPA hold less."""
     top = FIRST_KPA
@@ -377,7 +416,7 @@ def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
             f"{of.name}, no tube",
             {
                 _chambers(count, counts): tuple(
-                    _time_to_bend(of.stack, count, angle, flow) for angle in curve.x
+                    _time_to_bend(of, count, angle, curve) for angle in curve.x
                 )
                 for count in counts
             },
@@ -390,13 +429,14 @@ def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
     is_air = curve.setup.fluid != "water"
     if not is_air and bore != TUBE_DIAMETER:
         return NoModel(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
+    delay = of.factors.air_delay if is_air else of.factors.water_delay
     return ModelValues(
         f"{of.name} in time",
         {
             phrase: tuple(
-                _time_with_air(of.stack, flow, until, Line(AIR, length, bore))
+                _time_with_air(of.stack, flow, until, Line(AIR, length, bore)) + delay
                 if is_air
-                else elastic.time_to_fill(of.stack, flow, until, length)[0]
+                else elastic.time_to_fill(of.stack, flow, until, length)[0] + delay
                 for until in curve.x
             )
             for phrase, length in tubes.items()
@@ -407,30 +447,35 @@ def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
 def _time_with_air(whole: Stack, flow: float, until: float, line: Line) -> float:
     """Return the seconds of air until the chambers have a pressure, in STEPS steps or so."""
     taken_in = float(whole.pose((until,) * whole.chambers).volumes.sum())
-    return air_time(whole, flow, until, line, taken_in / (flow * 1000 / 60) / STEPS)
+    return elastic.air_time(whole, flow, until, line, taken_in / (flow * 1000 / 60) / STEPS)
 
 
-def _time_to_bend(whole: Stack, chambers: int, angle: float, flow: float) -> ModelValue:
+def _time_to_bend(
+    of: ModelledActuator, chambers: int, angle: float, curve: MeasuredCurve
+) -> ModelValue:
     """Return the seconds until the tip is bent, all the flow in some chambers, no tube."""
+    whole, flow = of.stack, curve.setup.flow_ml_min
+    assert flow is not None
+    delay = of.factors.air_delay if curve.setup.fluid == "air" else of.factors.water_delay
     pose = elastic.pose_bent_by(whole, chambers, angle)
     if pose is None:
         return None
     empty = whole.pose((0.0,) * whole.chambers)
     taken_in = float((pose.volumes - empty.volumes)[:chambers].sum())
-    return taken_in / (flow * 1000 / 60)
+    return taken_in / (flow * 1000 / 60) + delay
 
 
 def _moduli(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    second = of.figure("second moment of area of the plate").value
+    plate = plate_of(of.laminate)
+    if plate is None:
+        return NoModel("the topmost film is not the plain outline: it has tabs or ears")
+    second, _ = second_moments(plate)
 
     def at(pressure: float) -> float:
-        name = f"lateral tip stiffness at {pressure:g} kPa, chambers shut"
-        tip = of.figure(name, (pressure,), quick=False).value
-        height = of.stack.pose((pressure,) * of.stack.chambers).height
+        tip, height = elastic.shut_stiffness(of.stack, pressure)
         return modulus(tip, 1.0, height, second)
 
-    assumed, values = _by_pressure(curve, at)
-    return ModelValues(f"{of.name}, chambers shut", {assumed: values})
+    return ModelValues(f"{of.name}, chambers shut", _by_pressure(curve, at))
 
 
 def _sizes(name: str) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]:
