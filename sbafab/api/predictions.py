@@ -14,6 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
 from sbafab.models.figures import Factors, Prediction, PredictionRequest
+from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import FLUIDS, Line
 from sbafab.models.prediction import predict as predict_design
 from sbafab.models.stack import Motion, Stack
@@ -39,14 +40,16 @@ def predict(
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
-    ``options`` holds fields of ``Factors``: ``press_factor``, ``contact_factor``, ``pocket_loss``
-    mm and ``modulus_mpa``, beside tables of the design. Raises DesignError for what is out of every
+    ``options`` holds the user's own values in place of the calibration's, by field of ``Factors``:
+    ``press_factor``, ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of
+    the design, such as ``models={"calibration": "none"}``. Figures of calibrated models have a 90 %
+    ``interval``. Raises DesignError for what is out of every
     model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
     in balance.
     """
     factors, tables = parted(options, Factors)
     wish = PredictionRequest(
-        tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), Factors(**factors)
+        tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), overrides=factors
     )
     return predict_design(load(source, *changes, **tables), wish, laminate, quick)
 
@@ -96,7 +99,7 @@ def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **opti
     """
     factors, tables = parted(options, Factors)
     design = load(source, *changes, **tables)
-    return stack_of(design, most_pressure=most_pressure, factors=Factors(**factors))
+    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, factors))
 
 
 def motion(

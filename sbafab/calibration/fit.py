@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import tomli_w
 
 from sbafab.calibration.model_values import ModelledActuator, NoModel, model_values
 from sbafab.calibration.posterior import (
@@ -223,3 +224,13 @@ def _calibration(
         inside=sum(point.is_inside for point in points),
         sentences=sentences,
     )
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """Return the text of a calibration's file, its unknowns in words at the top."""
+    lines = ["# Written by sbafab calibrate. Medians, with 90 % intervals in parentheses:"]
+    for unknown in UNKNOWNS:
+        low, high = calibration.bounds(unknown.field)
+        value = unknown.shown(calibration.values[unknown.field])
+        lines.append(f"# {unknown.title} {value} ({low:.3g} to {high:.3g})")
+    return "\n".join(lines) + "\n\n" + tomli_w.dumps(calibration.as_dict())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from sbafab.evidence.records import MeasuredActuator, MeasuredCurve
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import elastic, paper
 from sbafab.models.balloon import Balloon
+from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Factors, Figure, PredictionRequest
 from sbafab.models.formulas import burst_pressure, modulus, second_moments
@@ -186,12 +187,19 @@ def _by_pressure(
     """Return a value at each pressure of a curve, by what is assumed of the pressure where neither
     axis nor set-up gives one: OPEN_PRESSURES.
     """
+
+    def reached(pressure: float) -> ModelValue:
+        try:
+            return value(pressure)
+        except DesignError:
+            return None
+
     if curve.x_name == "pressure_kpa":
-        return {"": tuple(map(value, curve.x))}
+        return {"": tuple(map(reached, curve.x))}
     count = len(curve.y)
     if curve.setup.pressure_kpa is not None:
-        return {"": (value(curve.setup.pressure_kpa),) * count}
-    return {f"{p:g} kPa in the chambers": (value(p),) * count for p in OPEN_PRESSURES}
+        return {"": (reached(curve.setup.pressure_kpa),) * count}
+    return {f"{p:g} kPa in the chambers": (reached(p),) * count for p in OPEN_PRESSURES}
 
 
 def _phrase(*parts: str) -> str:
@@ -282,7 +290,10 @@ def _bent_force(whole: Stack, chambers: int, angle: float, pressure: float) -> M
     x, y, z = pose.tip.tolist()
     across, aside, along = pose.frames[1][-1][:, 2].tolist()
     plate = Plate((x, y, z), (across, aside, along))
-    return whole.pose(_filled(whole, chambers, pressure), plate=plate, near=pose).force
+    try:
+        return whole.pose(_filled(whole, chambers, pressure), plate=plate, near=pose).force
+    except DesignError:
+        return None
 
 
 def _filled(whole: Stack, chambers: int, pressure: float) -> tuple[float, ...]:
@@ -366,8 +377,9 @@ def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues 
     model = elastic.calibrated(elastic.ELASTIC, of.factors).name
     if curve.x_name == "volume_ul":
         # A stroke by its volume is the same for every modulus.
-        slack = balloon.stiffened(1 / of.factors.modulus_ratio)
-        return ModelValues(model, {"": _strokes_by_volume(slack, curve.x)})
+        drawn = replace(of.factors, modulus_ratio=1.0)
+        balloon = balloons_of(of.design, of.laminate, drawn)[0]
+        return ModelValues(model, {"": _strokes_by_volume(balloon, curve.x)})
     series = _by_pressure(curve, lambda p: float(free_shapes(balloon, p).height[0]))
     return ModelValues(model, series)
 
@@ -393,15 +405,23 @@ def _free_volume(balloon: Balloon, pressure: float) -> float:
 
 
 def _energies(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    request = PredictionRequest(curve.x, calibration=of.factors)
-    figures = {
-        figure.name: figure
-        for figure in elastic.free_strokes(of.actuator, request)
-        if isinstance(figure, Figure)
-    }
-    names = [f"pneumatic input work at {pressure:g} kPa, free" for pressure in curve.x]
-    values = tuple(figures[name].value if name in figures else None for name in names)
-    return ModelValues(elastic.calibrated(elastic.ELASTIC, of.factors).name, {"": values})
+    # Energies are proportional to the modulus at equal pressure over modulus.
+    ratio = of.factors.modulus_ratio
+    balloons = balloons_of(of.design, of.laminate, replace(of.factors, modulus_ratio=1.0))
+    values = []
+    for pressure in curve.x:
+        stored = sum(_stored(balloon, pressure / ratio) for balloon in balloons)
+        values.append(ratio * stored * of.design.form.stacks / 1000)
+    return ModelValues(elastic.calibrated(elastic.ELASTIC, of.factors).name, {"": tuple(values)})
+
+
+@lru_cache(maxsize=1024)
+def _stored(balloon: Balloon, pressure: float) -> float:
+    """Return the energy in uJ that the films of a free balloon hold. Raises DesignError."""
+    shape = free_shapes(balloon, pressure)
+    if float(stretch(balloon, shape)[0]) > MOST_STRETCH:
+        raise DesignError(f"at {pressure:g} kPa its films would stretch too far")
+    return float(shape.energy[0])
 
 
 def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:

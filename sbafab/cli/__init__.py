@@ -35,6 +35,7 @@ SUMMARIES = {
     "find": "Find the best design that meets requirements.",
     "record": "Record the results of builds, and report on them.",
     "reproduce": "Compare predictions with measurements.",
+    "calibrate": "Fit the models to measurements.",
     "studio": "Edit a design in the browser.",
     "schema": "Print a JSON schema, by default that of design files.",
 }

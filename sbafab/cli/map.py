@@ -12,8 +12,8 @@ from sbafab.cli import options
 from sbafab.cli.options import PRESSURE, calibration_options, set_option
 from sbafab.cli.printing import print_verdict
 from sbafab.errors import DesignError, OutputError
-from sbafab.models.figures import Factors
 from sbafab.models.formulas import force
+from sbafab.models.intervals import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.stack import stack
 
@@ -63,7 +63,7 @@ def map_(
         raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
     force(pressure, 0.0)  # raises past the burst pressure
     design = load_design(source, assignments, ())
-    actuator = stack(design, most_pressure=pressure, factors=Factors(**factors))
+    actuator = stack(design, most_pressure=pressure, factors=factors_of(design, factors))
     text = map_text(design.name, actuator, form, points)
     if to is None:
         click.echo(text, nl=False)

@@ -184,17 +184,17 @@ def calibration_options(command: Command) -> Command:
     lost = click.option(
         "--pocket-loss",
         type=LENGTH.read,
-        default="0 mm",
         metavar="L",
         help="Measured loss of pocket radius against the drawing, mm or with a unit; for elastic "
-        "models.  [default: 0]",
+        "models.  [default: the calibration's]",
     )
     modulus = click.option(
         "--modulus",
         "modulus_mpa",
         type=MODULUS.read,
         metavar="E",
-        help="Measured Young's modulus of the film, MPa or with a unit.  [default: the film's]",
+        help="Measured Young's modulus of the pressed film, MPa or with a unit.  [default: the "
+        "film's times the calibration's ratio]",
     )
     return lost(modulus(command))
 

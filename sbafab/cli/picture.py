@@ -22,6 +22,7 @@ from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form, near_discs
+from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack import stack
 from sbafab.reports.inflated_picture import (
@@ -149,7 +150,7 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
     with shown_progress(False) as progress:
         pose = write_picture(
             laminate,
-            stack(design, laminate, form=model_form(design)),
+            stack(design, laminate, factors=factors_of(design), form=model_form(design)),
             wish,
             path,
             lambda done, total: progress("frames", done, total),

@@ -35,7 +35,7 @@ from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form
-from sbafab.models.figures import LEFT_OUT, Factors, Figure, Model, Prediction, PredictionRequest
+from sbafab.models.figures import LEFT_OUT, Figure, Model, Prediction, PredictionRequest
 from sbafab.models.formulas import size_phrases
 from sbafab.models.prediction import predict as predicted
 from sbafab.output.artefacts import prediction_json
@@ -81,15 +81,13 @@ FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
 @click.option(
     "--press-factor",
     type=float,
-    default=1.0,
     callback=finite,
     metavar="F",
-    help="Measured ratio of pressed thickness to film thickness.  [default: 1, off]",
+    help="Measured ratio of pressed thickness to film thickness.  [default: the calibration's]",
 )
 @click.option(
     "--contact-factor",
     type=float,
-    default=1.0,
     callback=finite,
     metavar="F",
     help="Measured ratio of force to Eqs. 1-4.  [default: 1, off]",
@@ -130,7 +128,7 @@ def predict(
         return
     _refuse_for_design(design)
     wish = PredictionRequest(
-        pressures or PredictionRequest.pressures_kpa, flow, volumes, Factors(**factors)
+        pressures or PredictionRequest.pressures_kpa, flow, volumes, overrides=factors
     )
     with shown_progress(request.as_json) as progress:
         progress("predicting", 0, 1)

@@ -9,21 +9,17 @@ import click
 
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
-from sbafab.evidence.files import load_evidence, shipped_evidence
+from sbafab.evidence.files import shipped_evidence
 from sbafab.reproduction import page
 from sbafab.reproduction.comparison import as_json as as_document
 from sbafab.reproduction.comparison import compare, table_lines
-from sbafab.results.evidence import from_lab_records
-from sbafab.results.store import Lab
+from sbafab.results.evidence import load_source
 
 if TYPE_CHECKING:
-    from sbafab.evidence.records import Evidence
     from sbafab.reproduction.rows import Row
 
 FOLDER = "reproduction"
 ALL = "all"
-RECORDS = (".sqlite", ".db")
-"""Endings of a lab's build records."""
 
 
 @click.command()
@@ -60,7 +56,7 @@ def reproduce(source: str | None, out: Path, as_json: bool) -> None:
 
 
 def _print_comparison(source: str, as_json: bool) -> None:
-    evidences = _evidences(source)
+    evidences = shipped_evidence() if source == ALL else (load_source(source),)
     curves = [curve for evidence in evidences for curve in compare(evidence)]
     if as_json:
         print_json(as_document(evidences, curves))
@@ -77,14 +73,6 @@ def _print_comparison(source: str, as_json: bool) -> None:
     print_verdict(
         f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
     )
-
-
-def _evidences(source: str) -> tuple[Evidence, ...]:
-    if source == ALL:
-        return shipped_evidence()
-    if Path(source).suffix.lower() in RECORDS:
-        return (from_lab_records(Lab(Path(source))),)
-    return (load_evidence(source),)
 
 
 def _measured(row: Row) -> str:

@@ -145,6 +145,10 @@ def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
     """The table with the drawn outline's content in place of its path."""
     if design.drawing is not None:
         table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
+    models = table.get("models")
+    calibration = design.folder / design.models.calibration
+    if models and calibration.is_file():
+        models["calibration"] = hashlib.sha256(calibration.read_bytes()).hexdigest()
     return table
 
 

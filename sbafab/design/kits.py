@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -234,6 +235,8 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
         design_table = data.get(section, {})
         is_of_films = section == "films" and isinstance(design_table, dict)
         table = without_other_products(kit_table, design_table) if is_of_films else kit_table
+        if section == "models":
+            table = _from_folder(table, kit_path(data.get("kit", DEFAULT), folder).parent, folder)
         # What is no table is refused later, in the words for it.
         filled[section] = (
             _merged(table, design_table) if isinstance(design_table, dict) else design_table
@@ -242,6 +245,14 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     if isinstance(inlet, dict):
         filled["inlet"] = {**inlet_of_kit(kit, inlet, "kit" in data), **inlet}
     return filled
+
+
+def _from_folder(table: Mapping[str, Any], kit_folder: Path, folder: Path) -> Mapping[str, Any]:
+    """The table with a calibration that lies beside the kit named from the design's folder."""
+    name = table.get("calibration")
+    if not isinstance(name, str) or not (kit_folder / name).is_file():
+        return table
+    return {**table, "calibration": os.path.relpath(kit_folder / name, folder or ".")}
 
 
 def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 SCHEMA = "sbafab/calibration@1"
 NONE: Literal["none"] = "none"
 """The name of no calibration: the films as drawn and bought, and no intervals."""
-DEFAULT = "paper"
+FILE = "calibration.toml"
+"""A calibration's copy in the output folder of a design."""
 GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness")
 """Groups of quantities, each with a discrepancy of its own."""
 SHARE = 0.9

@@ -340,6 +340,11 @@ class Prediction:
                 "water_delay_s": _rounded(self.asked.factors.water_delay),
                 "air_delay_s": _rounded(self.asked.factors.air_delay),
                 "calibration": self.asked.factors.calibration,
+                "overrides": {
+                    field: value
+                    for field, value in self.asked.overrides.items()
+                    if value is not None
+                },
             },
             "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],

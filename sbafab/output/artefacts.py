@@ -29,6 +29,8 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
+from sbafab.models.calibrated import FILE as CALIBRATION_FILE
+from sbafab.models.calibrated import NONE, shipped_names
 from sbafab.models.figures import Prediction
 from sbafab.nesting.nest import as_dict
 from sbafab.nesting.records import Nest
@@ -397,6 +399,11 @@ def _design(folder: DesignFolder) -> str:
     if design.kit not in kit_names():
         (folder.path / KIT_FILE).write_bytes(kit_of(design).text)
         design = design.model_copy(update={"kit": KIT_FILE})
+    calibration = design.models.calibration
+    if calibration not in (NONE, *shipped_names()):
+        shutil.copyfile(design.folder / calibration, folder.path / CALIBRATION_FILE)
+        models = design.models.model_copy(update={"calibration": CALIBRATION_FILE})
+        design = design.model_copy(update={"models": models})
     return design_toml(design)
 
 

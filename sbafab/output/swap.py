@@ -195,3 +195,13 @@ def _exchange(a: Path, b: Path) -> bool:
         renameat2(at_cwd, os.fsencode(a.absolute()), at_cwd, os.fsencode(b.absolute()), exchange)
         == 0
     )
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a text file beside an old one and swap it in. Raises OSError."""
+    begun = path.with_name(path.name + BEGUN)
+    try:
+        begun.write_text(text, encoding="utf-8", newline="\n")
+        begun.replace(path)
+    finally:
+        begun.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ import numpy as np
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.design.records import Discs, Slots
 from sbafab.models.figures import REACHED, WIDEST
+from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart, counterparts_of_pose
 from sbafab.models.stack import Stack, stack
@@ -511,7 +512,9 @@ def _stacks(assembled: Assembled) -> dict[str, Stack]:
         if isinstance(placed, PlacedSba) and isinstance(placed.made.design.form.pockets, Discs):
             key = id(placed.made)
             if key not in by_design:
-                by_design[key] = stack(placed.made.design, placed.made.laminate)
+                design = placed.made.design
+                factors = factors_of(design)
+                by_design[key] = stack(design, placed.made.laminate, factors=factors)
             by_part[placed.name] = by_design[key]
     return by_part
 

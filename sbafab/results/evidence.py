@@ -6,9 +6,11 @@ import re
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
+from sbafab.evidence.files import load_evidence
 from sbafab.evidence.records import (
     Evidence,
     MeasuredActuator,
@@ -109,3 +111,17 @@ def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
         number = counts[curve.id]
         renamed.append(curve if number == 1 else replace(curve, id=f"{curve.id}-{number}"))
     return tuple(renamed)
+
+
+RECORDS = (".sqlite", ".db")
+"""Endings of a lab's build records."""
+
+
+def load_source(source: str | Path) -> Evidence:
+    """Return the evidence of a source that ships, of a file (.toml, .csv), or of build records.
+
+    Raises DesignError with one sentence for what is no such source.
+    """
+    if Path(source).suffix.lower() in RECORDS:
+        return from_lab_records(Lab(Path(source)))
+    return load_evidence(source)

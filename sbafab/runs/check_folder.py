@@ -298,12 +298,30 @@ class _PredictionRequest(BaseModel):
     contact_factor: float
     pocket_loss: float
     modulus_mpa: float | None
+    modulus_ratio: float = 1.0
+    water_delay_s: float = 0.0
+    air_delay_s: float = 0.0
+    calibration: str = ""
+    overrides: dict[str, float] = {}
 
 
 class _PredictionFile(BaseModel):
     """The request in ``predict.json``."""
 
     asked: _PredictionRequest
+
+
+def _factors(request: _PredictionRequest) -> Factors:
+    """Return the factors of a prediction without calibration."""
+    return Factors(
+        request.press_factor,
+        request.contact_factor,
+        request.pocket_loss,
+        request.modulus_mpa,
+        request.modulus_ratio,
+        request.water_delay_s,
+        request.air_delay_s,
+    )
 
 
 def _prediction_problems(
@@ -314,10 +332,12 @@ def _prediction_problems(
         return []
     try:
         request = _PredictionFile.model_validate_json((folder / "predict.json").read_bytes()).asked
-        measured = request.pocket_loss, request.modulus_mpa
-        factors = Factors(request.press_factor, request.contact_factor, *measured)
         wish = PredictionRequest(
-            request.pressures_kpa, request.flow_ml_min, request.volumes_ul, factors
+            request.pressures_kpa,
+            request.flow_ml_min,
+            request.volumes_ul,
+            None if request.calibration else _factors(request),
+            request.overrides,
         )
         written = fresh / "prediction"
         written.mkdir()

@@ -28,6 +28,7 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import blocked_force
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
+from sbafab.models.intervals import factors_of
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, counterpart
@@ -232,7 +233,7 @@ class Subject:
         if quantity.name == "mass":
             return film_mass(self.laminate)
         if quantity.name == "height":
-            return self.laminate.thickness
+            return self._actuator.thickness
         value: Any = self._sizes.get(quantity.name)
         if quantity.name == "lumen":
             value = self.design.form.lumen
@@ -254,12 +255,17 @@ class Subject:
         return self._force(quantity.stroke or 0.0, kpa)
 
     @cached_property
+    def factors(self) -> Factors:
+        """The factors of the design's calibration."""
+        return factors_of(self.design)
+
+    @cached_property
     def _actuator(self) -> Actuator:
-        return actuator(self.design, self.laminate, Factors())
+        return actuator(self.design, self.laminate, self.factors)
 
     @cached_property
     def _stack(self) -> Stack:
-        return stack(self.design, self.laminate)
+        return stack(self.design, self.laminate, factors=self.factors)
 
     @property
     def full_stroke(self) -> float:
@@ -271,7 +277,7 @@ class Subject:
     def _stroke(self, kpa: float) -> float:
         if isinstance(self.design.form.pockets, Slots):
             return self.full_stroke
-        kinds = balloons_of(self.design, self.laminate)
+        kinds = balloons_of(self.design, self.laminate, self.factors)
         return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
 
     def _bend(self, kpa: float) -> float:
@@ -286,7 +292,7 @@ class Subject:
             if stroke > first.largest_stroke:
                 return first.largest_stroke - stroke
             return form.pushing * float(force(kpa, first.rate(stroke)))
-        kinds = balloons_of(self.design, self.laminate)
+        kinds = balloons_of(self.design, self.laminate, self.factors)
         push = float(blocked_force(self._stack, kpa, stroke))
         if push <= 0:
             maps = self._stack.maps

@@ -1,0 +1,128 @@
+"""``sbafab calibrate``: the models fitted to measurements, as a file that designs and kits name."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sbafab.calibration.fit import Fit, HeldOutPoint, calibration_text, fit
+from sbafab.cli.options import json_option
+from sbafab.cli.printing import print_json, print_verdict
+from sbafab.cli.progress import shown_progress
+from sbafab.design.files import shown
+from sbafab.design.sections import NAME_PATTERN
+from sbafab.errors import DesignError, OutputError
+from sbafab.models.calibrated import NONE, shipped_names
+from sbafab.models.unknowns import UNKNOWNS
+from sbafab.output.schema_ids import CALIBRATE_SCHEMA
+from sbafab.output.swap import replace_text
+from sbafab.results.evidence import load_source
+
+
+@click.command()
+@click.argument("evidence", nargs=-1)
+@click.option(
+    "--name",
+    default="lab",
+    show_default=True,
+    metavar="NAME",
+    help="Name of the calibration, and of its file, NAME.toml.",
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path(),
+    metavar="FOLDER",
+    help="Folder of the file.  [default: this one]",
+)
+@json_option
+def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) -> None:
+    """Fit the models to measurements.
+
+    EVIDENCE is what reproduce takes: evidence that ships (paper), a file of your own (.toml or
+    .csv), or build records (.sqlite); several are fitted together. By default it is the paper's.
+    The fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and
+    what the models miss beyond that. Each test is then predicted from a fit without it. A design
+    uses the file that is written with models.calibration = "NAME.toml"; a kit likewise.
+    """
+    _check_name(name)
+    sources = [load_source(source) for source in evidence or ("paper",)]
+    with shown_progress(as_json) as progress:
+        fitted = fit(name, sources, progress)
+    path = out / f"{name}.toml"
+    text = calibration_text(fitted.calibration)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        replace_text(path, text)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror}") from None
+    if as_json:
+        print_json(_as_json(fitted, path))
+        return
+    _print(fitted)
+    calibration = fitted.calibration
+    judged = (
+        f"{calibration.inside} of {calibration.points} left-out values in their 90 % intervals"
+        if calibration.points
+        else "one test alone, so that none could be left out"
+    )
+    print_verdict(f"\n{name} calibrated: {judged}. Written to {path}")
+
+
+def _check_name(name: str) -> None:
+    if not re.fullmatch(NAME_PATTERN, name):
+        raise DesignError(
+            f"--name is {shown(name)}; use letters, digits, dot, dash and underscore, such as lab"
+        )
+    if name in (NONE, *shipped_names()):
+        raise DesignError(
+            f"--name is {shown(name)}, which stands for another one; give another name"
+        )
+
+
+def _print(fitted: Fit) -> None:
+    calibration = fitted.calibration
+    click.echo("unknown                              median   90 % interval     prior")
+    for unknown in UNKNOWNS:
+        low, high = calibration.bounds(unknown.field)
+        value = unknown.shown(calibration.values[unknown.field])
+        interval = f"{low:.3g} to {high:.3g}"
+        prior = f"{unknown.shown(unknown.middle)}: {unknown.source}"
+        click.echo(f"{unknown.title:<34}{value:>10}   {interval:<16}  {prior}")
+    click.echo("")
+    for sentence in calibration.sentences:
+        click.echo(f"Not told apart: {sentence}")
+    missed = ", ".join(
+        f"{group} {100 * spread:.0f} %" for group, spread in calibration.discrepancy.items()
+    )
+    click.echo(f"What the models miss beyond that (one standard deviation): {missed}")
+    if fitted.points:
+        click.echo("\nleft out                     measured      predicted   90 % interval")
+        for point in fitted.points:
+            click.echo(_line(point))
+    for curve, reason in fitted.left_out:
+        click.echo(f"Not fitted: {curve}: {reason}")
+
+
+def _line(point: HeldOutPoint) -> str:
+    at = "" if point.place is None else f" at {point.place:g}"
+    interval = f"{point.low:.3g} to {point.high:.3g} {point.unit}".rstrip()
+    outside = "" if point.is_inside else "   outside"
+    return (
+        f"{point.curve + at:<28}{point.measured:>9.3g}{point.median:>15.3g}   {interval}{outside}"
+    )
+
+
+def _as_json(fitted: Fit, path: Path) -> dict[str, Any]:
+    return {
+        "schema": CALIBRATE_SCHEMA,
+        "file": str(path),
+        "calibration": fitted.calibration.as_dict(),
+        "held_out": [{**asdict(point), "inside": point.is_inside} for point in fitted.points],
+        "not_fitted": [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out],
+    }
