@@ -127,6 +127,9 @@ def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
             continue
         words, digits = called[figure.name]
         value = f"{figure.value:.{digits}f} {figure.unit}"
+        if figure.interval is not None:
+            low, high = figure.interval
+            value += f" ({low:.{digits}f} to {high:.{digits}f})"
         if figure.between is not None:
             low, high = figure.between
             value += f" ({low:.{digits}f} to {high:.{digits}f})"

@@ -269,7 +269,9 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
                 previous = head
                 *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
                 yield from (f"  {line}" for line in over)
-                yield f"  {last:{room}}{figure.value:>{VALUE_WIDTH}.4g}  {figure.unit}".rstrip()
+                interval = f"({figure.range})" if figure.interval else ""
+                value = f"{figure.value:>{VALUE_WIDTH}.4g}  {figure.unit:<{unit}}  {interval}"
+                yield f"  {last:{room}}{value}".rstrip()
                 yield from wrapped(figure.aside, width, "    ", "    ") if figure.aside else ()
 
 

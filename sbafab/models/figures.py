@@ -70,6 +70,14 @@ class Figure:
         return self.measured.sentence(is_calibrated(self.model.name))
 
     @property
+    def range(self) -> str:
+        """The 90 % interval without its unit; empty where there is none."""
+        if self.interval is None:
+            return ""
+        low, high = self.interval
+        return f"{low:.3g} to {high:.3g}"
+
+    @property
     def aside(self) -> str:
         """Bounds and measured counterpart in parentheses; empty without either."""
         bounds = ""
@@ -384,9 +392,14 @@ def _rounded(value: float) -> float:
 
 LEFT_OUT = "left out"
 STROKES = ("full stroke", "free stroke at ", "reached diameter")
+CALIBRATED_STROKES = ("free stroke at ", "full stroke", "reached diameter")
 BENDS = ("bend at ", "bend with one chamber")
 RADIUS = 2.5
 """Pocket radius in mm of the actuators whose forces were measured."""
+INTERVAL_NOTE = (
+    "in parentheses the 90 % interval: from the calibration's uncertainty, and from what the model "
+    "missed of the measured curves"
+)
 FULL_NOTE = (
     "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
 )
@@ -418,7 +431,8 @@ def verdict(prediction: Prediction) -> tuple[VerdictLine, ...]:
 def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
     """Yield the main figures with their quantities, each by the model to design with."""
     to_design_with = [figure for figure in prediction.figures if not figure.other]
-    for begins in STROKES:
+    is_calibrated = any(figure.interval is not None for figure in to_design_with)
+    for begins in CALIBRATED_STROKES if is_calibrated else STROKES:
         yield from (("stroke", item) for item in _first(to_design_with, begins))
     for begins in BENDS:
         bend = _first(to_design_with, begins)
@@ -442,13 +456,18 @@ def _first(figures: list[Figure], begins: str) -> list[Figure]:
 
 
 def _shown(figure: Figure) -> str:
-    return f"{figure.value:.4g} {figure.unit}, {figure.name} ({figure.model.name})"
+    """Return value, 90 % interval, name and model of a figure in one line."""
+    if figure.interval is None:
+        return f"{figure.value:.4g} {figure.unit}, {figure.name} ({figure.model.name})"
+    return f"{figure.value:.3g} {figure.unit} ({figure.range}), {figure.name} ({figure.model.name})"
 
 
 def _note(figure: Figure) -> str:
     """Return the measured counterpart, else the interval of measurements, else the validity."""
     if figure.measured or figure.between:
         return figure.aside
+    if figure.interval is not None:
+        return INTERVAL_NOTE
     if figure.model.name.startswith("the paper's full height"):
         return FULL_NOTE
     if figure.model.name.startswith(EQ_4):
@@ -495,8 +514,9 @@ def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Fi
     """Return the figures with those marked as ``other`` that are not to be designed with.
 
     ``to_come`` are beginnings of models whose figures are left out for now. Of one name the first
-    is chosen: the paper's Eq. 4, whose force is nearest to the six that the paper measured at 100
-    kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
+    with an interval is chosen, which comes from a calibrated model. Without a calibration it is the
+    first: the paper's Eq. 4, whose force is nearest to the six that the paper measured at 100 kPa
+    (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
     """
     candidates = tuple(figures)
     return tuple(
@@ -506,7 +526,9 @@ def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Fi
 
 def _is_superseded(subject: Figure, figures: Sequence[Figure], to_come: tuple[str, ...]) -> bool:
     group_figures = [figure for figure in figures if figure.group == subject.group]
-    if next(figure for figure in group_figures if figure.name == subject.name) is not subject:
+    named = [figure for figure in group_figures if figure.name == subject.name]
+    preferred = next((figure for figure in named if figure.interval is not None), named[0])
+    if preferred is not subject:
         return True
     if any(figure.name == subject.name + FREE_SUFFIX for figure in group_figures):
         return True

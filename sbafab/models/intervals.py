@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
-from sbafab.models.calibrated import DESIGN_UNKNOWNS, Calibration, load_calibration
+from sbafab.models.calibrated import DESIGN_UNKNOWNS, SHARE, Calibration, load_calibration
 from sbafab.models.figures import Factors, Figure, LeftOut
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, STACK
 from sbafab.models.unknowns import UNKNOWNS
@@ -72,6 +72,21 @@ class Uncertainty:
         if "modulus_mpa" in values:
             values.setdefault("modulus_ratio", 1.0)
         return replace(factors, calibration=self.calibration.name, **values)
+
+    def interval_of(
+        self, group: str, value_at: Callable[[Factors], float], share: float = SHARE
+    ) -> tuple[float, tuple[float, float]]:
+        """Return a value at the median, and the interval that holds what would be measured with a
+        probability of ``share``; ``value_at`` gives the value with other factors.
+        """
+        value = value_at(self.factors)
+        moved = [
+            (change, value if change == 0 else value_at(factors))
+            for change, factors in self.shifted()
+        ]
+        is_log = min(value, *(each for _, each in moved)) > 0
+        slopes = [_slope(value, each, change, is_log) for change, each in moved]
+        return value, self.calibration.interval(group, value, slopes, is_log, share)
 
     def bounded(
         self, items: Items, evaluated: Callable[[Factors], Items]

@@ -70,7 +70,8 @@ export class Findings {
       const was = before.get(named(figure));
       const change = was === undefined || was === figure.value ? "" : `${figure.value > was ? "+" : "−"}${significant(Math.abs(figure.value - was))}`;
       const beside = figure.measured ? `(${figure.measured.sentence})` : "";
-      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name, beside ? el("small", { class: "beside" }, beside) : null), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
+      const range = figure.interval ? el("small", { class: "beside", title: "90 % interval" }, `90 %: ${figure.interval.map((end) => significant(end)).join(" to ")}`) : null;
+      return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name, range, beside ? el("small", { class: "beside" }, beside) : null), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
     };
     const table = (figures) => {
       const groups = [...new Set(figures.map(({ group }) => group))];
