@@ -23,7 +23,6 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form, near_discs
 from sbafab.models.intervals import factors_of
-from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack import stack
 from sbafab.reports.inflated_picture import (
     MOVING,
@@ -148,9 +147,10 @@ def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
 def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
     laminate = build(design)
     with shown_progress(False) as progress:
+        inflated = stack(design, laminate, factors=factors_of(design), form=model_form(design))
         pose = write_picture(
             laminate,
-            stack(design, laminate, factors=factors_of(design), form=model_form(design)),
+            inflated,
             wish,
             path,
             lambda done, total: progress("frames", done, total),
@@ -161,8 +161,8 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
             f"(the drawn pocket is replaced by a disc of equal area, d = {discs.equal:.4g} mm; its "
             f"inscribed and circumscribed discs have {discs.inner:.4g} and {discs.outer:.4g} mm)"
         )
-    for counterpart in counterparts_of_pose(len(pose.pressures)).values():
-        print_wrapped(f"({counterpart.sentence()})")
+    for sentence in inflated.counterparts.values():
+        print_wrapped(f"({sentence})")
     pressures = ", ".join(f"{pressure:.3g}" for pressure in pose.pressures)
     volumes = ", ".join(f"{volume:.0f}" for volume in pose.volumes)
     print_verdict(

@@ -50,7 +50,9 @@ ELASTIC = Model(
 
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
-    factor_names = [f"calibration {factors.calibration}"] if factors.calibration else []
+    if factors.calibration:
+        return replace(model, name=f"{model.name}, calibration {factors.calibration}")
+    factor_names = []
     if factors.press_factor != 1:
         factor_names.append(f"press factor {factors.press_factor:g}")
     if factors.pocket_loss:

@@ -71,7 +71,14 @@ class Uncertainty:
         values = {field: value for field, value in self.overrides.items() if value is not None}
         if "modulus_mpa" in values:
             values.setdefault("modulus_ratio", 1.0)
-        return replace(factors, calibration=self.calibration.name, **values)
+        label = self.calibration.name
+        if values:
+            label += " but " + ", ".join(
+                f"{field.removesuffix('_mpa').replace('_', ' ')} {value:g}"
+                for field, value in values.items()
+                if field != "modulus_ratio"
+            )
+        return replace(factors, calibration=label, **values)
 
     def interval_of(
         self, group: str, value_at: Callable[[Factors], float], share: float = SHARE

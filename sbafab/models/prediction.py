@@ -502,7 +502,12 @@ def predict(
     return Prediction(
         wish,
         tuple(
-            replace(figure, measured=counterpart(subject.form, figure.name, figure.model.name))
+            replace(
+                figure,
+                measured=counterpart(
+                    subject.form, figure.name, figure.model.name, wish.factors.calibration
+                ),
+            )
             for figure in figures
         ),
         relations,

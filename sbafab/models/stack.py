@@ -155,6 +155,8 @@ class Stack:
     pitch: float
     outline: float
     weight: float | None = 0.0
+    calibration: str = ""
+    """Name of the calibration that its balloons have, if any."""
 
     @property
     def chambers(self) -> int:
@@ -164,7 +166,7 @@ class Stack:
     @property
     def counterparts(self) -> dict[str, str]:
         """Measured counterparts of the "height" and the "bend" of a pose, a clause each."""
-        rows = counterparts_of_pose(self.chambers)
+        rows = counterparts_of_pose(self.chambers, self.calibration)
         return {quantity: row.sentence() for quantity, row in rows.items()}
 
     @property
@@ -462,6 +464,7 @@ def stack(
         flat.thickness * factors.press_factor / len(row),
         reach,
         film_mass(flat) * GRAVITY / len(row) if has_densities else None,
+        factors.calibration,
     )
 
 

@@ -13,7 +13,7 @@ from sbafab.design.records import Discs, Slots
 from sbafab.models.figures import REACHED, WIDEST
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
-from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart, counterparts_of_pose
+from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.inflated import (
     TOUCHING,
@@ -57,7 +57,8 @@ class Clearance(NamedTuple):
 class BentTouch(NamedTuple):
     """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
 
-    It meets it from about ``from_kpa`` on, bent by ``bend`` degrees.
+    It meets it from about ``from_kpa`` on, bent by ``bend`` degrees; ``measured`` is the paper's
+    bend where the model is off by more than a quarter of it.
     """
 
     part: str
@@ -66,6 +67,7 @@ class BentTouch(NamedTuple):
     volume: float
     from_kpa: float
     bend: float
+    measured: str = ""
 
 
 class _Around(NamedTuple):
@@ -107,9 +109,11 @@ def bent_arms(
             if volume > TOUCHING:
                 met.add(part)
                 first = _first(around, part, pressed, pressure)
-                yield BentTouch(
-                    placed.name, part, names, volume, first.pressures[pressed[0]], first.bend
+                start, beside = (
+                    first.pressures[pressed[0]],
+                    arm_stack.counterparts.get("bend", ""),
                 )
+                yield BentTouch(placed.name, part, names, volume, start, first.bend, beside)
                 continue
             if part == placed.part.on:
                 continue
@@ -297,8 +301,8 @@ class AssemblyPrediction(NamedTuple):
         sentences += [
             f"press {bent.chambers} of {bent.part} to less than {bent.from_kpa:.2g} kPa, or move "
             f"{bent.other}: from there on, bent by {bent.bend:.0f} degrees, they meet, and at "
-            f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3 "
-            f"({counterparts_of_pose(SEVERAL)['bend'].sentence()})"
+            f"{self.pressure_kpa:g} kPa they share {bent.volume:.2f} mm3"
+            + (f" ({bent.measured})" if bent.measured else "")
             for bent in self.bent_touches
         ]
         if not self.touches:
@@ -411,7 +415,8 @@ def _arm(
 ) -> Iterator[AssemblyFigure]:
     """Height, reach, bend and load of an actuator with round pockets."""
     for figure in _figures_of_arm(placed, arm_stack, pressure, load_g):
-        beside = counterpart(placed.made.design.form, *_as_predicted(figure.name, pressure))
+        named = _as_predicted(figure.name, pressure)
+        beside = counterpart(placed.made.design.form, *named, arm_stack.calibration)
         yield figure._replace(measured=beside.sentence() if beside else "")
 
 

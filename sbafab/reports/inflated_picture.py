@@ -125,7 +125,7 @@ def write_picture(
 def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureRequest) -> bytes:
     """One pose, with a caption, as PNG."""
     parts = inflated(laminate, stack, pose)
-    (image,) = _images([(pose, parts)], laminate, wish)
+    (image,) = _images([(pose, parts)], laminate, stack.calibration, wish)
     out = BytesIO()
     image.save(out, "PNG", compress_level=9)
     return out.getvalue()
@@ -143,7 +143,7 @@ def animation(
     from PIL import Image
 
     shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
-    images = _images(shown, laminate, wish, progress)
+    images = _images(shown, laminate, stack.calibration, wish, progress)
     out = BytesIO()
     if ending == ".webp":
         images[0].save(
@@ -205,6 +205,7 @@ def _swell(cosine: float) -> float:
 def _images(
     shown: Sequence[tuple[Pose, Sequence[InflatedPart]]],
     laminate: Laminate,
+    calibration: str,
     wish: PictureRequest,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Image]:
@@ -218,7 +219,7 @@ def _images(
     for pose, parts in shown:
         bodies = [LitBody(p.surface, p.normals, _colour(p, pose, most)) for p in parts]
         image = rendered(bodies, view, width, height, GROUND)
-        _write(image, _caption(laminate, pose, moving=len(shown) > 1), view.scale)
+        _write(image, _caption(laminate, pose, calibration, moving=len(shown) > 1), view.scale)
         images.append(image)
         if progress is not None:
             progress(len(images), len(shown))
@@ -235,10 +236,11 @@ def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
     return r, g, b
 
 
-def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
+def _caption(laminate: Laminate, pose: Pose, calibration: str, moving: bool) -> tuple[str, ...]:
     """Return the caption, above it the paper's measured bend or height beside the model's."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
-    model = "elastic stack" + (", ears snipped off" if laminate.registration == "ears" else "")
+    model = "elastic stack" + (f", calibration {calibration}" if calibration else "")
+    model += ", ears snipped off" if laminate.registration == "ears" else ""
     if any(note.startswith("drawn outline") for note in laminate.notes):
         model += ", drawn pockets as discs"
     if moving:
@@ -246,7 +248,7 @@ def _caption(laminate: Laminate, pose: Pose, moving: bool) -> tuple[str, ...]:
     figure = "bend" if pose.bend > 0.5 else "height"
     bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"
     caption = f"{laminate.name} at {pressures} kPa{bent} ({model})"
-    beside = counterparts_of_pose(len(pose.pressures)).get(figure)
+    beside = counterparts_of_pose(len(pose.pressures), calibration).get(figure)
     return (beside.short, caption) if beside else (caption,)
 
 

@@ -306,7 +306,7 @@ class Subject:
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
         """Return the paper's measured value where the model is off by over a quarter, or None."""
         name, model = self._figure(quantity)
-        return counterpart(self.design.form, name, model)
+        return counterpart(self.design.form, name, model, self.factors.calibration)
 
     def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
         """The name of the figure in ``predict``, and that of its model."""

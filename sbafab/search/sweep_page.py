@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
+from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE
 from sbafab.search.sweep_table import Table
@@ -264,8 +265,9 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
 
 def _measured(design: Design, objectives: Sequence[Objective]) -> list[tuple[str, str]]:
     """Return the paper's measured values for figures whose model is off by more than a quarter."""
+    calibration = factors_of(design).calibration
     rows = [
-        (objective.label, counterpart_of_column(design.form, objective.column))
+        (objective.label, counterpart_of_column(design.form, objective.column, calibration))
         for objective in objectives
     ]
     return [(label, row.sentence()) for label, row in rows if row is not None]
