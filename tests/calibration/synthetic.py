@@ -1,0 +1,86 @@
+"""Synthetic labs: curves whose truth is drawn from the priors, on surfaces that are linear in the
+unknowns' coordinates.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbafab.calibration.posterior import (
+    SCALE_MIDDLE,
+    SCALE_SPREAD,
+    SampledCurve,
+    discrepancies,
+    sampled,
+)
+from sbafab.calibration.surface import NODE_COORDINATES, ValueSurface
+from sbafab.models.calibrated import GROUPS
+from sbafab.models.unknowns import UNKNOWNS
+
+Array = NDArray[np.float64]
+ERROR = 0.02
+CURVES = 10
+
+
+class SyntheticLab(NamedTuple):
+    """The true coordinates of the unknowns, and the curves that were measured."""
+
+    truth: Array
+    curves: list[SampledCurve]
+
+
+def surface(rates: Array) -> ValueSurface:
+    """A surface whose logarithms grow by ``rates`` (3, set-ups, points) by coordinate."""
+    grid = np.stack(np.meshgrid(*NODE_COORDINATES, indexing="ij"), -1)
+    return ValueSurface(np.tensordot(grid, rates, axes=([-1], [0])))
+
+
+def lab(number: int) -> SyntheticLab:
+    """The lab of a number: unknowns, discrepancies and errors as the priors have them."""
+    generator = np.random.default_rng(number)
+    truth = np.array([_drawn(unknown, generator) for unknown in UNKNOWNS])
+    scales = SCALE_MIDDLE * np.exp(SCALE_SPREAD * generator.standard_normal(len(GROUPS)))
+    curves = []
+    for count in range(CURVES):
+        points = int(generator.integers(1, 4))
+        group = int(generator.integers(len(GROUPS)))
+        rates = generator.normal(0.0, [[[0.8]], [[2.0]], [[0.8]]], (3, 1, points))
+        plain = SampledCurve(
+            str(count), str(count), group, surface(rates), np.zeros(points),
+            np.full(points, ERROR), -1,
+        )  # fmt: skip
+        values = plain.logarithms(truth[None])[0, 0]
+        missed = discrepancies(scales[group : group + 1], points, generator)[0]
+        noise = ERROR * generator.standard_normal(points)
+        curves.append(plain._replace(measured=values + missed + noise))
+    return SyntheticLab(truth, curves)
+
+
+def _drawn(unknown, generator: np.random.Generator) -> float:  # type: ignore[no-untyped-def]
+    low, high = unknown.coordinate(unknown.least), unknown.coordinate(unknown.most)
+    while True:
+        drawn = generator.normal(unknown.coordinate(unknown.middle), unknown.spread)
+        if low < drawn < high:
+            return float(drawn)
+
+
+def held_out_inside(number: int, steps: int = 1200) -> list[bool]:
+    """Whether each point of a lab's last curve lies in its 90 % interval by a fit to the others."""
+    drawn = lab(number)
+    *fitted, held = drawn.curves
+    posterior = sampled(fitted, number, steps)
+    predicted = posterior.predicted(held, np.random.default_rng(number))
+    low, high = np.quantile(predicted, (0.05, 0.95), axis=0)
+    return [bool(a <= y <= b) for a, y, b in zip(low, held.measured, high, strict=True)]
+
+
+def share_and_error(inside: list[list[bool]]) -> tuple[float, float]:
+    """The share of points inside, and its standard error by labs."""
+    points = sum(map(len, inside))
+    share = sum(map(sum, inside)) / points
+    spread = sum((sum(row) - share * len(row)) ** 2 for row in inside)
+    return share, math.sqrt(spread) / points

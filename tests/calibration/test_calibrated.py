@@ -1,0 +1,150 @@
+"""Calibration files, and the intervals that follow from one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon_map import balloon_map
+from sbafab.models.calibrated import (
+    Calibration,
+    deviations,
+    load_calibration,
+    read_calibration,
+)
+from sbafab.models.figures import Factors
+from sbafab.models.intervals import Uncertainty, calibration_of, factors_of
+from sbafab.models.unknowns import UNKNOWNS
+
+
+@pytest.fixture(scope="module")
+def paper() -> Calibration:
+    calibration = load_calibration("paper")
+    assert calibration is not None
+    return calibration
+
+
+def test_half_widths_of_the_normal_distribution() -> None:
+    assert deviations(0.9) == pytest.approx(1.6448536)
+    assert deviations(0.6826895) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_an_interval_holds_posterior_and_discrepancy(paper: Calibration) -> None:
+    """By hand: a slope of -0.5 by the logarithm of the modulus ratio, and the motion's miss."""
+    variance = 0.25 * paper.covariance[0][0] + paper.discrepancy["motion"] ** 2
+    low, high = paper.interval("motion", 10.0, (-0.5, 0.0, 0.0), is_log=True)
+    assert math.log(high / 10) == pytest.approx(1.6448536 * math.sqrt(variance))
+    assert low * high == pytest.approx(100.0)
+    plain = paper.interval("motion", 10.0, (0.0, 0.0, 0.0), is_log=False)
+    assert plain[1] - 10 == pytest.approx(16.448536 * paper.discrepancy["motion"])
+
+
+def test_correlated_unknowns_take_part_of_each_others_variance(paper: Calibration) -> None:
+    """Slopes along the ridge that the evidence leaves cancel; across it they add up."""
+    ratio, loss = (math.sqrt(paper.covariance[i][i]) for i in (0, 1))
+    along, across = paper.variance((1 / ratio, 1 / loss)), paper.variance((1 / ratio, -1 / loss))
+    assert paper.covariance[0][1] < 0
+    assert along < 2 < across
+
+
+def test_values_lie_within_the_intervals_of_the_unknowns(paper: Calibration) -> None:
+    for unknown in UNKNOWNS:
+        low, high = paper.bounds(unknown.field)
+        assert unknown.least <= low < paper.values[unknown.field] < high <= unknown.most
+
+
+def test_what_the_user_gives_is_exact(paper: Calibration) -> None:
+    given = Uncertainty(paper, {"press_factor": 0.6, "pocket_loss": None})
+    assert given.factors.press_factor == 0.6
+    assert given.factors.pocket_loss == pytest.approx(paper.values["pocket_loss"])
+    changes = [change for change, _ in given.shifted()]
+    assert changes[2] == 0
+    assert min(map(abs, changes[:2])) > 0
+    # A modulus takes the place of film's modulus and ratio both.
+    stiff = Uncertainty(paper, {"modulus_mpa": 25.0})
+    assert (stiff.factors.modulus_ratio, stiff.shifted()[0][0]) == (1.0, 0.0)
+
+
+def test_another_film_has_the_priors_modulus_ratio(paper: Calibration) -> None:
+    films = {"tpe": {"product": "TPU 50", "thickness": 0.05, "modulus": 20.0, "poisson": 0.4}}
+    other = calibration_of(sbafab.load("1dof-5mm", films=films, models={"calibration": "paper"}))
+    assert other is not None
+    assert other.values["modulus_ratio"] == 1.0
+    assert other.covariance[0][0] == pytest.approx(UNKNOWNS[0].spread ** 2)
+    assert other.covariance[0][1] == 0
+    assert other.covariance[1][1] == paper.covariance[1][1]
+
+
+def test_none_leaves_the_film_as_bought() -> None:
+    design = sbafab.load("1dof-5mm", models={"calibration": "none"})
+    assert calibration_of(design) is None
+    assert factors_of(design) == Factors()
+
+
+def test_an_interval_by_a_closed_form(paper: Calibration) -> None:
+    """A value in proportion to the modulus ratio has its variance and the discrepancy's."""
+    value, (low, high) = Uncertainty(paper, {}).interval_of(
+        "force", lambda factors: 3 * factors.modulus_ratio
+    )
+    assert value == pytest.approx(3 * paper.values["modulus_ratio"])
+    spread = math.sqrt(paper.covariance[0][0] + paper.discrepancy["force"] ** 2)
+    assert math.log(high / low) == pytest.approx(2 * 1.6448536 * spread)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"mean": [1.0]}, "mean must be 5 finite numbers"),
+        ({"covariance": [[1.0] * 5] * 5}, "covariance must be symmetric and positive definite"),
+        ({"discrepancy": {"force": -1}}, 'discrepancy."force" must be a number from 0 to 10'),
+        ({"unknowns": ["modulus_ratio"]}, "unknowns must be "),
+        ({"held_out": {"points": 2, "inside": 3}}, "held_out must have points, and inside"),
+        ({"schema": "sbafab/kit@1"}, "schema = 'sbafab/kit@1' must be"),
+        ({"colour": "red"}, "'colour' is no key of a calibration"),
+        ({"mean": [9.0, 0.1, -0.6, -1.0, -3.0]}, "mean of modulus_ratio must be from"),
+    ],
+)
+def test_a_faulty_file_gets_one_sentence(
+    change: dict[str, object], sentence: str, paper: Calibration, tmp_path: Path
+) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text(tomli_w.dumps({**paper.as_dict(), **change}))
+    with pytest.raises(DesignError) as error:
+        read_calibration(path)
+    assert sentence in str(error.value)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_is_read_as_it_was_written(paper: Calibration, tmp_path: Path) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_text(tomli_w.dumps(paper.as_dict()))
+    assert read_calibration(path) == paper
+    design = sbafab.load("1dof-5mm", models={"calibration": "lab.toml"}).placed(tmp_path)
+    assert calibration_of(design) == paper
+
+
+def test_a_name_that_is_none_says_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(DesignError, match='neither "none", nor one that ships'):
+        load_calibration("papers", tmp_path)
+
+
+@pytest.mark.parametrize("ratio", [0.5, 3.0])
+def test_a_map_scales_with_the_modulus(ratio: float) -> None:
+    """Against balloons of the other modulus, inflated."""
+    base = Balloon(neck=1.1, bore=0.35)
+    stiff = balloon_map(base, 20.0).stiffened(ratio)
+    pressures = np.array([2.0, 8.0]) * ratio
+    heights = np.array([0.4, 0.8])
+    shapes = inflate(replace(base, modulus=ratio * base.modulus), pressures, heights, tied=True)
+    assert stiff.most_pressure == 20 * ratio
+    assert stiff.force(pressures, heights) == pytest.approx(shapes.force, rel=0.02)
+    assert stiff.volume(pressures, heights) == pytest.approx(shapes.volume, rel=0.02)

@@ -1,0 +1,110 @@
+"""The posterior of synthetic labs, whose truth is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from sbafab.calibration.posterior import (
+    SHARED,
+    Likelihood,
+    SampledCurve,
+    correlations,
+    discrepancies,
+    log_prior,
+    sampled,
+)
+from sbafab.calibration.surface import NODE_COORDINATES
+from sbafab.models.calibrated import GROUPS
+from sbafab.models.unknowns import UNKNOWNS
+from tests.calibration.synthetic import held_out_inside, lab, share_and_error, surface
+
+
+def curve(rates: np.ndarray, measured: list[float], errors: list[float]) -> SampledCurve:  # type: ignore[type-arg]
+    return SampledCurve("c", "c", 0, surface(rates), np.array(measured), np.array(errors), -1)
+
+
+def coordinates(scale: float) -> np.ndarray:  # type: ignore[type-arg]
+    middle = [unknown.coordinate(unknown.middle) for unknown in UNKNOWNS]
+    return np.array([[*middle, *[math.log(scale)] * len(GROUPS)]])
+
+
+def test_a_surface_is_exact_between_its_nodes_where_it_is_linear() -> None:
+    rates = np.arange(6.0).reshape(3, 1, 2)
+    place = np.array([[nodes[1] * 0.3 + nodes[2] * 0.7 for nodes in NODE_COORDINATES]])
+    assert surface(rates).at(place)[0, 0] == pytest.approx(place[0] @ rates[:, 0])
+
+
+def test_the_likelihood_is_that_of_a_normal_with_shared_discrepancy() -> None:
+    """Two points: the density by hand, from the determinant and the inverse of a 2 x 2 matrix."""
+    scale, errors, residuals = 0.2, (0.05, 0.1), (0.3, -0.1)
+    rates = np.zeros((3, 1, 2))
+    a, d = (scale**2 + error**2 for error in errors)
+    b = SHARED * scale**2
+    det = a * d - b * b
+    x, y = residuals
+    square = (d * x * x - 2 * b * x * y + a * y * y) / det
+    expected = -0.5 * square - 0.5 * math.log(det)
+    value = Likelihood([curve(rates, list(residuals), list(errors))])(coordinates(scale))
+    assert value[0] == pytest.approx(expected)
+
+
+def test_open_set_ups_are_averaged() -> None:
+    """One set-up right, the other far off: the density is half of that of the right one alone."""
+    one, both = np.zeros((3, 1, 1)), np.zeros((3, 2, 1))
+    both[0, 1] = 50.0
+    alone = Likelihood([curve(one, [0.1], [0.1])])(coordinates(0.1))
+    averaged = Likelihood([curve(both, [0.1], [0.1])])(coordinates(0.1))
+    assert averaged[0] == pytest.approx(alone[0] - math.log(2))
+
+
+def test_drawn_discrepancies_have_their_variance_and_share_half_of_it() -> None:
+    drawn = discrepancies(np.full(40000, 0.3), 2, np.random.default_rng(1))
+    assert drawn.std(0) == pytest.approx([0.3, 0.3], rel=0.02)
+    assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(SHARED, abs=0.02)
+
+
+def test_no_unknown_leaves_its_bounds() -> None:
+    place = coordinates(0.1)
+    assert np.isfinite(log_prior(place)[0])
+    place[0, 1] = -0.01
+    assert log_prior(place)[0] == -np.inf
+
+
+def test_a_fit_finds_unknowns_that_curves_tell_apart() -> None:
+    """Three curves, each the logarithm of one unknown, nearly without error."""
+    truth = np.array([UNKNOWNS[0].coordinate(3.0), 0.15, UNKNOWNS[2].coordinate(0.6)])
+    curves = []
+    for axis in range(3):
+        rates = np.zeros((3, 1, 1))
+        rates[axis] = 1.0 if axis != 1 else 10.0
+        value = float(truth[axis] * rates[axis, 0, 0])
+        curves.append(
+            curve(rates, [value], [0.02])._replace(id=str(axis), test=str(axis), group=axis)
+        )
+    posterior = sampled(curves, 3, 1000)
+    spreads = np.sqrt(np.diag(posterior.covariance))[:3]
+    assert (np.abs(posterior.mean[:3] - truth) < 2 * spreads).all()
+    assert spreads[0] < 0.6 * UNKNOWNS[0].spread
+
+
+def test_correlated_unknowns_are_named() -> None:
+    covariance = np.eye(len(UNKNOWNS))
+    covariance[0, 1] = covariance[1, 0] = -0.8
+    (row,) = correlations(covariance, 0.3)
+    assert (row["first"], row["second"]) == ("modulus ratio", "pocket loss")
+    assert row["correlation"] == pytest.approx(-0.8)
+
+
+def test_the_same_curves_give_the_same_samples() -> None:
+    curves = lab(1).curves
+    assert (sampled(curves, 1, 60).samples == sampled(curves, 1, 60).samples).all()
+
+
+@pytest.mark.long
+def test_intervals_of_synthetic_labs_hold_nine_points_in_ten() -> None:
+    """40 labs; 200 gave the figures of docs/validation.md."""
+    share, error = share_and_error([held_out_inside(number) for number in range(40)])
+    assert abs(share - 0.9) < 3 * error + 0.02
