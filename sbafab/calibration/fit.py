@@ -5,7 +5,7 @@ whose points are then predicted.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,8 +22,9 @@ from sbafab.calibration.posterior import (
 )
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS, SHARE, Calibration
+from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration
 from sbafab.models.unknowns import UNKNOWNS, factors_at
+from sbafab.process import Progress
 
 if TYPE_CHECKING:
     from sbafab.evidence.records import Evidence, MeasuredCurve
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 DIGITS = 6
 TOLD_APART = 0.3
 """Correlation from which two unknowns are said not to be told apart well."""
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Fit:
     reason.
     """
 
-    calibration: Calibration
+    calibration: ModelCalibration
     points: tuple[HeldOutPoint, ...]
     left_out: tuple[tuple[str, str], ...]
 
@@ -205,12 +205,12 @@ def _calibration(
     sources: Sequence[Evidence],
     posterior: Posterior,
     points: Sequence[HeldOutPoint],
-) -> Calibration:
+) -> ModelCalibration:
     sentences = tuple(
         f"{row['first']} and {row['second']}: correlation {row['correlation']:.2f}"
         for row in correlations(posterior.covariance, TOLD_APART)
     )
-    return Calibration(
+    return ModelCalibration(
         name=name,
         about=about,
         film=film,
@@ -226,7 +226,7 @@ def _calibration(
     )
 
 
-def calibration_text(calibration: Calibration) -> str:
+def calibration_text(calibration: ModelCalibration) -> str:
     """Return the text of a calibration's file, its unknowns in words at the top."""
     lines = ["# Written by sbafab calibrate. Medians, with 90 % intervals in parentheses:"]
     for unknown in UNKNOWNS:

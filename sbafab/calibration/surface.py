@@ -102,7 +102,7 @@ def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
     A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
     DesignError where no model gives the curve.
     """
-    answer = model_values(curve, factors)
+    answer = model_values(curve, factors, shares_maps=True)
     if isinstance(answer, NoModel):
         raise DesignError(f"{curve.id}: {answer.reason}")
     rows = [

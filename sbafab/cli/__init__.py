@@ -80,6 +80,7 @@ class CommandTable(MutableMapping[str, click.Command]):
 
 COMMANDS = CommandTable()
 EXTRAS = {
+    "calibrate": ("emcee", "sbafab calibrate"),
     "control": ("gymnasium", "an environment of Gymnasium, from Python"),
     "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),

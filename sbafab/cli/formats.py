@@ -413,6 +413,11 @@ def _predict() -> dict[str, Any]:
         "what the paper measured, where validation shows the model to be off by more than a "
         "quarter of it"
     )
+    interval = {
+        **array(number()),
+        "type": ["array", "null"],
+        "description": "90 % interval of what would be measured, where a calibration says so",
+    }
     between = {
         **array(number()),
         "type": ["array", "null"],
@@ -428,6 +433,7 @@ def _predict() -> dict[str, Any]:
         design_with=design_with,
         measured=measured,
         between=between,
+        interval=interval,
     )
     relation = table(
         name=TEXT,

@@ -41,7 +41,7 @@ DESIGN_UNKNOWNS = 3
 
 
 @dataclass(frozen=True)
-class Calibration:
+class ModelCalibration:
     """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``, and
     ``discrepancy``, the relative standard deviation that the models miss, by group.
 
@@ -151,7 +151,7 @@ def shipped_names() -> list[str]:
     return sorted(path.name[:-5] for path in folder.iterdir() if path.name.endswith(".toml"))
 
 
-def load_calibration(name: object, folder: Path | None = None) -> Calibration | None:
+def load_calibration(name: object, folder: Path | None = None) -> ModelCalibration | None:
     """Return the calibration of a name, or of a file in ``folder``; None for "none".
 
     Raises DesignError with one sentence for an unknown name or a faulty file.
@@ -180,13 +180,13 @@ def load_calibration(name: object, folder: Path | None = None) -> Calibration | 
 
 
 @cache
-def _shipped(name: str) -> Calibration:
+def _shipped(name: str) -> ModelCalibration:
     file = resources.files("sbafab.models").joinpath("calibrations", f"{name}.toml")
     with resources.as_file(file) as path:
         return read_calibration(path)
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: Path) -> ModelCalibration:
     """Return the calibration of a file. Raises DesignError with one sentence for a fault in it."""
     tables = read_toml(path)
     try:
@@ -221,7 +221,7 @@ def _check_keys(tables: Mapping[str, Any]) -> None:
         raise DesignError(f"schema = {shown(tables['schema'])} must be {SCHEMA!r}")
 
 
-def _checked(tables: Mapping[str, Any]) -> Calibration:
+def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
     _check_keys(tables)
     fields = [unknown.field for unknown in UNKNOWNS]
     if tables["unknowns"] != fields:
@@ -246,7 +246,7 @@ def _checked(tables: Mapping[str, Any]) -> Calibration:
     points, inside = held.get("points"), held.get("inside")
     if not (isinstance(points, int) and isinstance(inside, int) and 0 <= inside <= points):
         raise DesignError("held_out must have points, and inside, at most as many")
-    return Calibration(
+    return ModelCalibration(
         tables["name"],
         tables["about"],
         tables["film"],

@@ -48,8 +48,8 @@ class Figure:
     ``other``: another model gives the same quantity, and that one is to design with.
     ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
     The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
-    What would be measured lies in the ``interval`` with a probability of 90 %, where a calibration
-    says so.
+    What would be measured lies in the ``interval``, in the same ``unit``, with a probability of
+    90 %, where a calibration says so.
     """
 
     group: str
@@ -345,8 +345,8 @@ class Prediction:
                 "pocket_loss": _rounded(self.asked.factors.pocket_loss),
                 "modulus_mpa": self.asked.factors.modulus_mpa,
                 "modulus_ratio": _rounded(self.asked.factors.modulus_ratio),
-                "water_delay_s": _rounded(self.asked.factors.water_delay),
-                "air_delay_s": _rounded(self.asked.factors.air_delay),
+                "water_delay": _rounded(self.asked.factors.water_delay),
+                "air_delay": _rounded(self.asked.factors.air_delay),
                 "calibration": self.asked.factors.calibration,
                 "overrides": {
                     field: value

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
-from sbafab.models.calibrated import DESIGN_UNKNOWNS, SHARE, Calibration, load_calibration
+from sbafab.models.calibrated import DESIGN_UNKNOWNS, SHARE, ModelCalibration, load_calibration
 from sbafab.models.figures import Factors, Figure, LeftOut
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, STACK
 from sbafab.models.unknowns import UNKNOWNS
@@ -20,7 +20,7 @@ MODULUS_RATIO = next(n for n, unknown in enumerate(UNKNOWNS) if unknown.field ==
 DELAYS = {"water": "water_delay", "air": "air_delay"}
 
 
-def calibration_of(design: Design) -> Calibration | None:
+def calibration_of(design: Design) -> ModelCalibration | None:
     """Return the calibration of a design; for another film than the evidence's its modulus ratio is
     1, as uncertain as the prior has it. Raises DesignError where there is no such calibration.
     """
@@ -44,7 +44,7 @@ class Uncertainty:
     exact, in place of its own.
     """
 
-    calibration: Calibration
+    calibration: ModelCalibration
     overrides: Mapping[str, float | None]
 
     @property

@@ -112,8 +112,8 @@ class Counterpart:
     ``parallel``: it holds for actuators that bend (True), for the others (False), or for all
     (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
     taken, in the unit of ``measured``; ``at`` is the state in which the model gave it, if that is
-    not the one of the measurement. ``calibrated`` is the value with the calibration "paper", None
-    where that is near or changes nothing.
+    not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
+    the unit of ``measured``, None where that is near or changes nothing.
     """
 
     figure: str

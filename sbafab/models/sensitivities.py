@@ -55,7 +55,7 @@ class Sensitivity:
 
     @property
     def stroke(self) -> float:
-        """Relative change of the rise above the flat stack by that of the key: % by 1 %."""
+        """Relative change of the rise above the flat stack, as a ratio to that of the key."""
         rise = self.pose.height - self.pose.pitch * len(self.pose.freedoms)
         return (float(self.rates.tip[2, 0]) - self.flat) * self.value / rise
 

@@ -297,7 +297,7 @@ class Stack:
         return derivatives(self, pose, acting, load.get("sucked", False))
 
     def stiffness(self, pressures: Sequence[float], **load: Any) -> Array:
-        """Return the ``stiffness`` (6, 6) of the tip, as of ``derivatives``."""
+        """Return the stiffness (6, 6) of the tip in N/mm, N and N mm, as of ``derivatives``."""
         return self.derivatives(pressures, **load).stiffness
 
     def reach(

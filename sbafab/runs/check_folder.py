@@ -299,8 +299,8 @@ class _PredictionRequest(BaseModel):
     pocket_loss: float
     modulus_mpa: float | None
     modulus_ratio: float = 1.0
-    water_delay_s: float = 0.0
-    air_delay_s: float = 0.0
+    water_delay: float = 0.0
+    air_delay: float = 0.0
     calibration: str = ""
     overrides: dict[str, float] = {}
 
@@ -319,8 +319,8 @@ def _factors(request: _PredictionRequest) -> Factors:
         request.pocket_loss,
         request.modulus_mpa,
         request.modulus_ratio,
-        request.water_delay_s,
-        request.air_delay_s,
+        request.water_delay,
+        request.air_delay,
     )
 
 

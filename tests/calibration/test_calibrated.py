@@ -15,7 +15,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.calibrated import (
-    Calibration,
+    ModelCalibration,
     deviations,
     load_calibration,
     read_calibration,
@@ -26,7 +26,7 @@ from sbafab.models.unknowns import UNKNOWNS
 
 
 @pytest.fixture(scope="module")
-def paper() -> Calibration:
+def paper() -> ModelCalibration:
     calibration = load_calibration("paper")
     assert calibration is not None
     return calibration
@@ -37,7 +37,7 @@ def test_half_widths_of_the_normal_distribution() -> None:
     assert deviations(0.6826895) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_an_interval_holds_posterior_and_discrepancy(paper: Calibration) -> None:
+def test_an_interval_holds_posterior_and_discrepancy(paper: ModelCalibration) -> None:
     """By hand: a slope of -0.5 by the logarithm of the modulus ratio, and the motion's miss."""
     variance = 0.25 * paper.covariance[0][0] + paper.discrepancy["motion"] ** 2
     low, high = paper.interval("motion", 10.0, (-0.5, 0.0, 0.0), is_log=True)
@@ -47,7 +47,7 @@ def test_an_interval_holds_posterior_and_discrepancy(paper: Calibration) -> None
     assert plain[1] - 10 == pytest.approx(16.448536 * paper.discrepancy["motion"])
 
 
-def test_correlated_unknowns_take_part_of_each_others_variance(paper: Calibration) -> None:
+def test_correlated_unknowns_take_part_of_each_others_variance(paper: ModelCalibration) -> None:
     """Slopes along the ridge that the evidence leaves cancel; across it they add up."""
     ratio, loss = (math.sqrt(paper.covariance[i][i]) for i in (0, 1))
     along, across = paper.variance((1 / ratio, 1 / loss)), paper.variance((1 / ratio, -1 / loss))
@@ -55,13 +55,13 @@ def test_correlated_unknowns_take_part_of_each_others_variance(paper: Calibratio
     assert along < 2 < across
 
 
-def test_values_lie_within_the_intervals_of_the_unknowns(paper: Calibration) -> None:
+def test_values_lie_within_the_intervals_of_the_unknowns(paper: ModelCalibration) -> None:
     for unknown in UNKNOWNS:
         low, high = paper.bounds(unknown.field)
         assert unknown.least <= low < paper.values[unknown.field] < high <= unknown.most
 
 
-def test_what_the_user_gives_is_exact(paper: Calibration) -> None:
+def test_what_the_user_gives_is_exact(paper: ModelCalibration) -> None:
     given = Uncertainty(paper, {"press_factor": 0.6, "pocket_loss": None})
     assert given.factors.press_factor == 0.6
     assert given.factors.pocket_loss == pytest.approx(paper.values["pocket_loss"])
@@ -73,7 +73,7 @@ def test_what_the_user_gives_is_exact(paper: Calibration) -> None:
     assert (stiff.factors.modulus_ratio, stiff.shifted()[0][0]) == (1.0, 0.0)
 
 
-def test_another_film_has_the_priors_modulus_ratio(paper: Calibration) -> None:
+def test_another_film_has_the_priors_modulus_ratio(paper: ModelCalibration) -> None:
     films = {"tpe": {"product": "TPU 50", "thickness": 0.05, "modulus": 20.0, "poisson": 0.4}}
     other = calibration_of(sbafab.load("1dof-5mm", films=films, models={"calibration": "paper"}))
     assert other is not None
@@ -89,7 +89,7 @@ def test_none_leaves_the_film_as_bought() -> None:
     assert factors_of(design) == Factors()
 
 
-def test_an_interval_by_a_closed_form(paper: Calibration) -> None:
+def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
     """A value in proportion to the modulus ratio has its variance and the discrepancy's."""
     value, (low, high) = Uncertainty(paper, {}).interval_of(
         "force", lambda factors: 3 * factors.modulus_ratio
@@ -113,7 +113,7 @@ def test_an_interval_by_a_closed_form(paper: Calibration) -> None:
     ],
 )
 def test_a_faulty_file_gets_one_sentence(
-    change: dict[str, object], sentence: str, paper: Calibration, tmp_path: Path
+    change: dict[str, object], sentence: str, paper: ModelCalibration, tmp_path: Path
 ) -> None:
     path = tmp_path / "lab.toml"
     path.write_text(tomli_w.dumps({**paper.as_dict(), **change}))
@@ -124,7 +124,7 @@ def test_a_faulty_file_gets_one_sentence(
     assert "\n" not in str(error.value)
 
 
-def test_a_file_is_read_as_it_was_written(paper: Calibration, tmp_path: Path) -> None:
+def test_a_file_is_read_as_it_was_written(paper: ModelCalibration, tmp_path: Path) -> None:
     path = tmp_path / "lab.toml"
     path.write_text(tomli_w.dumps(paper.as_dict()))
     assert read_calibration(path) == paper

@@ -92,7 +92,13 @@ def test_a_design_that_names_no_kit_keeps_its_values_and_its_hash() -> None:
     assert resolved(named) == resolved(plain)
     # All keys but those that came later.
     table = resolved(plain)
-    del table["kit"], table["layup"], table["inlet"]["adhesive"], table["acceptance"]
+    del (
+        table["models"],
+        table["kit"],
+        table["layup"],
+        table["inlet"]["adhesive"],
+        table["acceptance"],
+    )
     del table["press"]["minutes_for"], table["press"]["time_constant"]
     del table["films"]["tpe"]["modulus"], table["films"]["tpe"]["poisson"]
     # And those that came with the plate's machine and the underlay: 0.004 was a key.
