@@ -200,6 +200,22 @@ def test_width_at_a_vertex_is_refused(plate_text: str) -> None:
         read_profile(text)
 
 
+@pytest.mark.parametrize("key", ["start_width", "end_width"])
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_width_of_an_old_polyline_is_refused(key: str, everywhere: bool, plate_text: str) -> None:
+    """Group codes 40 and 41: of a vertex, or of the whole for vertices that have none (DXF)."""
+
+    def old(model: Modelspace) -> None:
+        polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)
+        if everywhere:
+            polyline.dxf.set(f"default_{key}", 0.2)
+        else:
+            polyline.vertices[2].dxf.set(key, 0.2)
+
+    with pytest.raises(OutputError, match="has a width"):
+        read_profile(drawn(plate_text, old))
+
+
 def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:
     speck = [(20.0 + x * 1e-4, y * 1e-4) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     text = drawn(
