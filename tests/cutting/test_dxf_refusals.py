@@ -111,7 +111,7 @@ def test_repeated_first_vertex_is_refused(plate_text: str) -> None:
         plate_text,
         lambda model: model.add_lwpolyline(closed_twice, close=True, dxfattribs=OUTER),
     )
-    with pytest.raises(OutputError, match="repeats its vertex"):
+    with pytest.raises(OutputError, match=r"repeats its vertex x 20\.000, y 0\.000"):
         read_profile(text)
 
 

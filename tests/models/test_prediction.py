@@ -60,6 +60,13 @@ def test_the_papers_height_stands_beside_its_own_actuator_alone(three: Predictio
         assert workspace_relation(other).points == ()
 
 
+def test_the_tip_yields_as_the_derivatives_of_the_stack_say(three: Prediction) -> None:
+    # A force of 10 uN aside, and nothing else, against the slope of the equilibrium.
+    slopes = sbafab.stack("3dof-15mm").derivatives((10.0, 10.0, 10.0))
+    found = three.value("lateral tip stiffness at 10 kPa, pressure held")
+    assert found == pytest.approx(1 / slopes.compliance[0, 0], rel=2e-4)
+
+
 def test_3dof_folds_to_9_9_and_pressed_to_8_6(three: Prediction) -> None:
     assert three.value("folded diameter") == pytest.approx(9.9, abs=0.05)
     pressed = sbafab.predict("3dof-15mm", press_factor=0.95 / 1.865)
