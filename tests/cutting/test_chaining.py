@@ -80,6 +80,18 @@ def test_edges_on_one_line_that_meet_at_a_point_are_not_drawn_twice() -> None:
         check_clear([*over.contours, *under.contours])
 
 
+@pytest.mark.parametrize("centre", [1.5, 0.5])
+def test_circles_that_just_touch_are_refused(centre: float) -> None:
+    """Discs of 1 and 0.5 mm, the small one outside (1 + 0.5) or inside (1 - 0.5)."""
+    way = 1 if centre > 1 else -1
+    for overlap in (0.0, 1e-5):
+        small = disc((centre - way * overlap, 0.0), 0.5)
+        with pytest.raises(OutputError, match=r"contours touch or cross at x 1\.000"):
+            check_clear([*disc((0, 0), 1.0).contours, *small.contours])
+    small = disc((centre + way * 1e-4, 0.0), 0.5)
+    check_clear([*disc((0, 0), 1.0).contours, *small.contours])
+
+
 def test_a_copy_outside_its_plate_is_no_hole() -> None:
     holes, plates = row((20.0, 0.0))
     check_clear([*holes, *plates])
