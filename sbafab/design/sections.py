@@ -475,7 +475,7 @@ class Rules(Section):
 class Models(Section):
     """What predictions are made with."""
 
-    calibration: str = Field(default="none", min_length=1, max_length=1000)
+    calibration: str = Field(default="paper", min_length=1, max_length=1000)
     """The calibration of the models: "paper", a file beside the design that sbafab calibrate wrote,
     or "none" for films as drawn and bought, and no intervals."""
 

@@ -10,6 +10,13 @@ from pathlib import Path
 import pytest
 
 import sbafab
+from sbafab.calibration.model_values import (
+    ANSWERS,
+    WITHOUT_MODEL,
+    ModelValues,
+    NoModel,
+    model_values,
+)
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.evidence.files import evidence_csv, load_evidence
@@ -23,13 +30,6 @@ from sbafab.evidence.records import (
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Stack
 from sbafab.reproduction.comparison import compare, table_lines
-from sbafab.calibration.model_values import (
-    ANSWERS,
-    WITHOUT_MODEL,
-    ModelValues,
-    NoModel,
-    model_values,
-)
 from sbafab.results.evidence import from_lab_records
 from sbafab.results.store import Lab
 from tests.site.formats import hold
