@@ -147,7 +147,8 @@ def predict(
             {**prediction_json(design, prediction), "failed": failed, "folder": str(run.folder)}
         )
     else:
-        print_listed("size", size_phrases(design, run.laminate))
+        pressed = prediction.asked.factors.press_factor
+        print_listed("size", size_phrases(design, run.laminate, pressed))
         print_prediction(prediction, verbose)
         if not run.failed:
             details = "" if verbose else " Details: -v"
