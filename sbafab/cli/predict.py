@@ -159,7 +159,8 @@ def predict(
             document["sensitivity"] = [row._asdict() for row in rows]
         print_json({**document, "failed": failed, "folder": str(run.folder)})
     else:
-        print_listed("size", size_phrases(design, run.laminate))
+        pressed = prediction.asked.factors.press_factor
+        print_listed("size", size_phrases(design, run.laminate, pressed))
         print_prediction(prediction, verbose)
         if sensitivity:
             _print_sensitivity(rows, wish.pressures_kpa[0])

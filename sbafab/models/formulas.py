@@ -238,10 +238,11 @@ def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None
     return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
 
 
-def size_phrases(design: Design, laminate: Laminate) -> tuple[str, ...]:
+def size_phrases(design: Design, laminate: Laminate, press_factor: float = 1.0) -> tuple[str, ...]:
     """Return the size in phrases: overall diameter, outline diameter, flat extent, and height.
 
-    Films flow in the press: beside the height stands the paper's measured one.
+    Films flow in the press: ``press_factor`` is their thickness after it over that before. Beside
+    the sum of the films stands the paper's measured height.
     """
     sizes_mm = sizes(design, laminate)
     phrases = []
@@ -255,6 +256,8 @@ def size_phrases(design: Design, laminate: Laminate) -> tuple[str, ...]:
     form = design.form
     flat = "flat, " if form.wrap is not None else ""
     phrases.append(f"{flat}{sizes_mm['width']:.2f} x {sizes_mm['length']:.2f} mm")
-    row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
-    height = f"folded height {laminate.thickness:.3f} mm"
-    return (*phrases, f"{height} {row.brief}" if row else height)
+    height = f"folded height {press_factor * laminate.thickness:.3f} mm"
+    if press_factor == 1:
+        row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
+        height += f" {row.brief}" if row else ""
+    return (*phrases, height)

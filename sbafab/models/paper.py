@@ -314,12 +314,19 @@ def counterpart(form: Form, name: str, model: str, calibration: str = "") -> Cou
     if model.startswith(FLAT_HEIGHT_OF_FILMS) and FACTORS.search(model):
         return None
     row = _counterpart(name, model, form.is_parallel)
-    if row is None or not calibration:
+    return row and _calibrated(row, calibration)
+
+
+def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
+    """Return a row with the value of a calibration (its name, "" for none); None where that is not
+    known to be off.
+    """
+    if not calibration:
         return row
     if calibration == CALIBRATION and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
-    # A calibration changes the elastic models; its intervals say how far they may be off.
-    return None if row.model in (STACK, BALLOON) else row
+    # A calibration changes these models; its intervals say how far they may be off.
+    return None if row.model in (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS) else row
 
 
 CALIBRATION = "paper"
@@ -348,10 +355,7 @@ def counterpart_of_column(form: Form, column: str, calibration: str = "") -> Cou
             re.fullmatch(row.figure, figure)
             or (model.startswith(row.model) and re.fullmatch(row.figure, name))
         ):
-            if not calibration or row.model not in (STACK, BALLOON):
-                return row
-            is_off = calibration == CALIBRATION and row.calibrated is not None
-            return replace(row, gave=row.calibrated or row.gave) if is_off else None
+            return _calibrated(row, calibration)
     return None
 
 
