@@ -25,7 +25,14 @@ def calibration_of(design: Design) -> ModelCalibration | None:
     1, as uncertain as the prior has it. Raises DesignError where there is no such calibration.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
-    if calibration is None or design.films.tpe.product == calibration.film:
+    return None if calibration is None else for_film(calibration, design.films.tpe.product)
+
+
+def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
+    """Return a calibration as it holds for a film; for another one than the evidence's the modulus
+    ratio is 1, as uncertain as the prior has it.
+    """
+    if product == calibration.film:
         return calibration
     mean = list(calibration.mean)
     covariance = [list(row) for row in calibration.covariance]
@@ -81,10 +88,15 @@ class Uncertainty:
         return replace(factors, calibration=label, **values)
 
     def interval_of(
-        self, group: str, value_at: Callable[[Factors], float], share: float = SHARE
+        self,
+        group: str,
+        value_at: Callable[[Factors], float],
+        share: float = SHARE,
+        delay: str = "",
     ) -> tuple[float, tuple[float, float]]:
         """Return a value at the median, and the interval that holds what would be measured with a
-        probability of ``share``; ``value_at`` gives the value with other factors.
+        probability of ``share``; ``value_at`` gives the value with other factors. A time that holds
+        a delay names the delay's field.
         """
         value = value_at(self.factors)
         moved = [
@@ -93,6 +105,7 @@ class Uncertainty:
         ]
         is_log = min(value, *(each for _, each in moved)) > 0
         slopes = [_slope(value, each, change, is_log) for change, each in moved]
+        slopes += self._delay_slopes(value, delay)
         return value, self.calibration.interval(group, value, slopes, is_log, share)
 
     def bounded(
@@ -125,21 +138,24 @@ class Uncertainty:
             _slope(figure.value, value, change, is_log)
             for value, (change, _) in zip(present, moved, strict=True)
         ]
-        slopes += self._delay_slopes(figure)
+        fluid = next((name for name in DELAYS if name in figure.name), "")
+        delay = DELAYS[fluid] if fluid and figure.unit == "s" else ""
+        slopes += self._delay_slopes(figure.value, delay)
         low, high = self.calibration.interval(group, figure.value, slopes, is_log)
         if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
             low = max(low, 0.0)
         return replace(figure, interval=(low, high))
 
-    def _delay_slopes(self, figure: Figure) -> list[float]:
-        """Return slopes of a time's logarithm by the logarithms of the delays."""
-        slopes = []
-        for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]:
-            fluid = unknown.field.removesuffix("_delay")
-            counts = figure.unit == "s" and fluid in figure.name
-            share = self.calibration.values[unknown.field] / figure.value if counts else 0.0
-            slopes.append(0.0 if unknown.field in self._given else share)
-        return slopes
+    def _delay_slopes(self, time: float, delay: str) -> list[float]:
+        """Return slopes of a time's logarithm by the logarithms of the delays, of which it holds
+        one; 0 without one, or where the user gave it.
+        """
+        return [
+            self.calibration.values[unknown.field] / time
+            if unknown.field == delay and unknown.field not in self._given
+            else 0.0
+            for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]
+        ]
 
 
 CLEARANCES = ("room between rims", "clearance between chambers")
