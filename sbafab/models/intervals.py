@@ -103,10 +103,11 @@ class Uncertainty:
             (change, value if change == 0 else value_at(factors))
             for change, factors in self.shifted()
         ]
-        is_log = min(value, *(each for _, each in moved)) > 0
+        is_log = _is_log(value, [each for _, each in moved])
         slopes = [_slope(value, each, change, is_log) for change, each in moved]
         slopes += self._delay_slopes(value, delay)
-        return value, self.calibration.interval(group, value, slopes, is_log, share)
+        low, high = self.calibration.interval(group, value, slopes, is_log, share)
+        return value, (max(low, 0.0) if value >= 0 else low, high)
 
     def bounded(
         self, items: Items, evaluated: Callable[[Factors], Items]
@@ -133,7 +134,7 @@ class Uncertainty:
         present = [value for value in values if value is not None]
         if len(present) < len(values) or not all(map(math.isfinite, present)):
             return figure
-        is_log = figure.value > 0 and min(present) > 0 and not figure.name.startswith(CLEARANCES)
+        is_log = _is_log(figure.value, present) and not figure.name.startswith(CLEARANCES)
         slopes = [
             _slope(figure.value, value, change, is_log)
             for value, (change, _) in zip(present, moved, strict=True)
@@ -165,6 +166,16 @@ def _slope(value: float, moved: float, change: float, is_log: bool) -> float:
     if change == 0:
         return 0.0
     return (math.log(moved / value) if is_log else moved - value) / change
+
+
+def _is_log(value: float, moved: Sequence[float]) -> bool:
+    """Return True where the logarithm of a value is near enough to linear: one that has almost
+    vanished with other factors, such as a force near the end of the stroke, changes by itself.
+    """
+    return min(value, *moved) > 0 and max(moved) < LOG_RANGE * value < LOG_RANGE**2 * min(moved)
+
+
+LOG_RANGE = 3.0
 
 
 def _kind(figure: Figure) -> str:
