@@ -277,7 +277,8 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
     A name that begins like the one above it, up to a comma, has blanks in place of that part.
     """
     unit = max((len(figure.unit) for figure in figures), default=0)
-    room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - 4)
+    spans = max((len(figure.range) + 4 for figure in figures if figure.interval), default=0)
+    room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - spans - 4)
     for group in dict.fromkeys(figure.group for figure in figures):
         for number, model in enumerate(models, start=1):
             members = [f for f in figures if f.group == group and f.model == model]
@@ -285,10 +286,13 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
                 yield f"{group}: {model.name} [{number}]"
             previous = ""
             for figure in members:
-                head, comma, _ = figure.name.partition(", ")
+                head, comma, rest = figure.name.partition(", ")
                 name = figure.name
+                if comma and head != previous and len(name) > room >= len(head):
+                    yield f"  {head},"
+                    previous = head
                 if comma and head == previous:
-                    name = " " * (len(head) + 2) + name.removeprefix(f"{head}, ")
+                    name = " " * max(min(len(head) + 2, room - len(rest)), 2) + rest
                 previous = head
                 *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
                 yield from (f"  {line}" for line in over)

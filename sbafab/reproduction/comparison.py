@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sbafab.calibration.curve_intervals import Ends, curve_intervals, uncertainty_for
 from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.evidence.records import Evidence, MeasuredCurve
+from sbafab.models.calibrated import ModelCalibration
 from sbafab.models.figures import Factors
 from sbafab.output.schema_ids import COMPARISON_SCHEMA
 
-Ends = tuple[float, float]
-"""Least and largest value."""
 Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
 """Intervals of a prediction at the points of a curve; None where there are none."""
 WIDTH = 100
@@ -67,6 +67,24 @@ def compare(
 ) -> list[ComparedCurve]:
     """Return the curves of a source beside the models with a calibration's factors."""
     return [_compared(evidence.id, curve, factors, intervals) for curve in evidence.curves]
+
+
+def compare_calibrated(evidence: Evidence, calibration: ModelCalibration) -> list[ComparedCurve]:
+    """Return the curves of a source beside the calibrated models and their 90 % intervals, which
+    span what the source leaves open.
+    """
+    compared = []
+    for curve in evidence.curves:
+        uncertainty = uncertainty_for(curve, calibration)
+        compared.append(
+            _compared(
+                evidence.id,
+                curve,
+                uncertainty.factors,
+                lambda each, of=uncertainty: curve_intervals(each, of),  # type: ignore[misc]
+            )
+        )
+    return compared
 
 
 def _compared(
