@@ -81,10 +81,15 @@ class Uncertainty:
         return replace(factors, calibration=label, **values)
 
     def interval_of(
-        self, group: str, value_at: Callable[[Factors], float], share: float = SHARE
+        self,
+        group: str,
+        value_at: Callable[[Factors], float],
+        share: float = SHARE,
+        fluid: str = "",
     ) -> tuple[float, tuple[float, float]]:
         """Return a value at the median, and the interval that holds what would be measured with a
-        probability of ``share``; ``value_at`` gives the value with other factors.
+        probability of ``share``; ``value_at`` gives the value with other factors. A time has the
+        delay of its ``fluid`` in it.
         """
         value = value_at(self.factors)
         moved = [
@@ -93,6 +98,7 @@ class Uncertainty:
         ]
         is_log = min(value, *(each for _, each in moved)) > 0
         slopes = [_slope(value, each, change, is_log) for change, each in moved]
+        slopes += self._delay_slopes(value, fluid)
         return value, self.calibration.interval(group, value, slopes, is_log, share)
 
     def bounded(
@@ -125,19 +131,21 @@ class Uncertainty:
             _slope(figure.value, value, change, is_log)
             for value, (change, _) in zip(present, moved, strict=True)
         ]
-        slopes += self._delay_slopes(figure)
+        fluid = next((fluid for fluid in DELAYS if fluid in figure.name), "")
+        slopes += self._delay_slopes(figure.value, fluid if figure.unit == "s" else "")
         low, high = self.calibration.interval(group, figure.value, slopes, is_log)
         if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
             low = max(low, 0.0)
         return replace(figure, interval=(low, high))
 
-    def _delay_slopes(self, figure: Figure) -> list[float]:
-        """Return slopes of a time's logarithm by the logarithms of the delays."""
+    def _delay_slopes(self, value: float, fluid: str) -> list[float]:
+        """Return slopes of a time's logarithm by the logarithms of the delays; all 0 without a
+        fluid.
+        """
         slopes = []
         for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]:
-            fluid = unknown.field.removesuffix("_delay")
-            counts = figure.unit == "s" and fluid in figure.name
-            share = self.calibration.values[unknown.field] / figure.value if counts else 0.0
+            counts = unknown.field == DELAYS.get(fluid)
+            share = self.calibration.values[unknown.field] / value if counts else 0.0
             slopes.append(0.0 if unknown.field in self._given else share)
         return slopes
 
