@@ -22,19 +22,22 @@ def find(
     least: Mapping[str, float] | None = None,
     most: Mapping[str, float] | None = None,
     best: str = "mass",
+    flow_ml_min: float = 35.0,
     **options: Any,
 ) -> FoundDesign:
     """The design that meets requirements and is best in one thing, or the nearest miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
-    20})``: ``least`` and ``most`` are in mm, N, g and kPa. ``options`` holds fields of
-    ``FindRequest``, such as ``tries``, beside tables of the design; ``found.best.values`` are the
-    found keys. Raises DesignError for a quantity that it does not know, with those it does.
+    20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, a ``time`` is with
+    water at ``flow_ml_min``. ``options`` holds fields of ``FindRequest``, such as ``tries``, or
+    ``sure=0.9`` for requirements that must hold with that probability, beside tables of the design;
+    ``found.best.values`` are the found keys, ``found.intervals`` the 90 % intervals. Raises
+    DesignError for a quantity that it does not know, with those it does.
     """
     settings, tables = parted(options, FindRequest)
     at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
-    requirements, goal = read_all(at_least, at_most, best)
+    requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
 
 

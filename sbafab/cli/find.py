@@ -10,7 +10,7 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import json_option, refuse_options, set_option
+from sbafab.cli.options import FLOW, json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
@@ -25,9 +25,22 @@ from sbafab.search.find import (
     write_found,
 )
 from sbafab.search.find import find as search
-from sbafab.search.quantities import RequestedQuantity, shown_value
+from sbafab.search.quantities import (
+    RequestedQuantity,
+    read_sure,
+    shown_interval,
+    shown_value,
+)
 from sbafab.search.quantity_names import quantity_lines
-from sbafab.search.trial import Goal, Requirement, Trial, keys_said, read_all, value_said
+from sbafab.search.trial import (
+    Goal,
+    Requirement,
+    Trial,
+    figure_text,
+    keys_said,
+    read_all,
+    value_said,
+)
 from sbafab.search.vary import read_free
 
 if TYPE_CHECKING:
@@ -52,6 +65,15 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
+def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        return read_sure(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} {error}", ctx, param) from None
+
+
 @click.command()
 @click.argument("source", metavar="[DESIGN]", required=False)
 @click.option(
@@ -66,7 +88,22 @@ def _with_quantities(command: Callable[..., None]) -> Callable[..., None]:
     "most",
     metavar="QUANTITY=VALUE",
     multiple=True,
-    help="At most this much, e.g. overall_diameter=20, mass=0.5 or height=2. Repeatable.",
+    help="At most this much, e.g. overall_diameter=20, mass=0.5 or time=0.5. Repeatable.",
+)
+@click.option(
+    "--sure",
+    callback=_sure,
+    metavar="P",
+    help="Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
+)
+@click.option(
+    "--flow",
+    "flow_ml_min",
+    type=FLOW.read,
+    default="35 ml/min",
+    show_default=True,
+    metavar="Q",
+    help="Flow of water in all, for the time, ml/min or with a unit.",
 )
 @click.option(
     "--best",
@@ -156,7 +193,9 @@ def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequ
 
     Families without the requested quantities are left out. Raises DesignError if none remains.
     """
-    requirements, goal = read_all(options["least"], options["most"], options["best"])
+    requirements, goal = read_all(
+        options["least"], options["most"], options["best"], options["flow_ml_min"]
+    )
     requests: dict[str, FindRequest] = {}
     problems: list[str] = []
     for name in [source] if source else _family_templates():
@@ -175,9 +214,8 @@ def _request(
     assignments = options["assignments"]
     design = load_design(name, assignments)
     free = read_free(design, options["free"], options["fixed"], tuple(changed_keys(assignments)))
-    request = FindRequest(
-        design, requirements, goal, free, options["tries"], options["optuna"], options["storage"]
-    )
+    settings = {name: options[name] for name in ("tries", "optuna", "storage", "sure")}
+    request = FindRequest(design, requirements, goal, free, **settings)
     free_keys(request)  # raises DesignError for keys that cannot vary
     return request
 
@@ -233,7 +271,10 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
         "started_from": origin,
         "tries": result.tries,
         "is_cut_short": result.is_cut_short,
+        "sure": result.problem.sure,
         "best": trial_json(result.best),
+        "intervals": {label: list(ends) for label, ends in result.intervals.items()},
+        "requirements": [_requirement_json(result, row) for row in result.problem.requirements],
         "full_stroke": result.full_stroke,
         "measured": {name: row.as_dict() for name, row in result.measured.items()},
         "missed": result.missed,
@@ -248,6 +289,20 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
         ],
         "front": [trial_json(trial) for trial in result.front],
         "on_front": result.on_front,
+    }
+
+
+def _requirement_json(result: FoundDesign, requirement: Requirement) -> dict[str, Any]:
+    """Return a requirement with the figures of the best design; ``bound`` is null without sure."""
+    label, best = requirement.quantity.label, result.best
+    return {
+        "quantity": label,
+        "unit": requirement.quantity.unit,
+        "sense": "at least" if requirement.at_least else "at most",
+        "limit": requirement.limit,
+        "median": best.value(requirement),
+        "bound": best.judged(requirement) if label in best.intervals else None,
+        "holds": requirement.holds(best.judged(requirement)),
     }
 
 
@@ -286,20 +341,34 @@ def _print_quantities(result: FoundDesign) -> None:
     """Print the required quantities and the goal of the best design."""
     requirements = result.problem.requirements
     for requirement in requirements:
-        value = result.best.value(requirement)
-        figure = f"  {requirement.quantity.label} {shown_value(requirement.quantity, value)}"
-        is_met = requirement.holds(value)
-        print_line(f"{figure}; {requirement.bound}{'' if is_met else ': MISSED'}")
+        value = figure_text(result.problem, result.best, requirement)
+        value += "" if result.problem.sure else _interval_text(result, requirement)
+        is_met = requirement.holds(result.best.judged(requirement))
+        missed = "" if is_met else ": MISSED"
+        print_line(f"  {requirement.quantity.label} {value}; {requirement.bound}{missed}")
         _print_measured(result, requirement.quantity)
     goal = result.problem.goal
     label = goal.label if result.holds else goal.quantity.label
-    print_line(f"  {label}: {shown_value(goal.quantity, result.best.value(goal))}")
+    value = shown_value(goal.quantity, result.best.value(goal)) + _interval_text(result, goal)
+    print_line(f"  {label}: {value}")
     if goal.quantity.label not in [requirement.quantity.label for requirement in requirements]:
         _print_measured(result, goal.quantity)
+    if result.intervals:
+        hint = "" if result.problem.sure else "; --sure 0.9 asks that each requirement holds so"
+        note = f"in parentheses the 90 % interval of what would be measured{hint}"
+        print_wrapped(note, indent="  ")
     strokes = [quantity for quantity in result.problem.quantities if quantity.name == "stroke"]
     is_full = any(quantity.is_full_stroke for quantity in strokes)
     if strokes and not is_full and result.full_stroke is not None:
         print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
+
+
+def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
+    """Return the 90 % interval in parentheses; empty without one."""
+    interval = result.intervals.get(subject.quantity.label)
+    if interval is None or result.best.value(subject) < 0:
+        return ""
+    return f" ({shown_interval(interval)})"
 
 
 def _print_measured(result: FoundDesign, quantity: RequestedQuantity) -> None:
@@ -331,7 +400,7 @@ def _print_miss(result: FoundDesign) -> None:
     missed = {
         requirement.quantity.name
         for requirement in result.problem.requirements
-        if not requirement.holds(result.best.value(requirement))
+        if not requirement.holds(result.best.judged(requirement))
     }
     is_free = any(free.key == "inlet.tab_length" for free in result.free)
     if "overall_diameter" in missed and not is_free:

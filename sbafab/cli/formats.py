@@ -477,7 +477,20 @@ def _find() -> dict[str, Any]:
     figures = {"type": "object", "additionalProperties": number()}
     shown = table(
         keys={"type": "object", "description": "keys of the design that were found"},
-        figures={**figures, "description": "quantities in mm, deg, N, g or a share"},
+        figures={**figures, "description": "quantities in mm, deg, N, N/mm, s, g or a share"},
+    )
+    ends = {**array(number()), "minItems": 2, "maxItems": 2}
+    requirement = table(
+        quantity=TEXT,
+        unit=TEXT,
+        sense={"enum": ["at least", "at most"]},
+        limit=number(),
+        median={**number(), "description": "of the best; force below 0 where it rises less"},
+        bound={
+            **number("null"),
+            "description": "kept with the probability `sure`, and held against the limit",
+        },
+        holds={"type": "boolean"},
     )
     return table(
         schema={"const": ids.FIND_SCHEMA},
@@ -486,7 +499,14 @@ def _find() -> dict[str, Any]:
         started_from=TEXT,
         tries=COUNT,
         is_cut_short={"type": "boolean", "description": "whether more tries might lead further"},
+        sure={**number("null"), "description": "probability with which requirements must hold"},
         best=shown,
+        intervals={
+            "type": "object",
+            "description": "90 % intervals of the best, by quantity, where a calibration says so",
+            "additionalProperties": ends,
+        },
+        requirements=array(requirement),
         full_stroke={**number("null"), "description": "mm, of the best, as predict has it"},
         measured={
             "type": "object",

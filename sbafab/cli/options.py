@@ -15,7 +15,7 @@ from click.shell_completion import CompletionItem
 
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
-from sbafab.design.pressure_units import KILOPASCALS
+from sbafab.design.pressure_units import KILOPASCALS, MILLILITRES_PER_MINUTE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -50,11 +50,7 @@ LENGTH = MeasuredQuantity(
 PRESSURE = MeasuredQuantity("pressure", KILOPASCALS, '6, "6 kPa" or "60 mbar"')
 MODULUS = MeasuredQuantity("modulus", {"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, '10 or "10 MPa"')
 VOLUME = MeasuredQuantity("volume", {"ul": 1.0, "ml": 1000.0, "mm3": 1.0}, '5, 5ul or "0.005 ml"')
-FLOW = MeasuredQuantity(
-    "flow",
-    {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0},
-    '35, "35 ml/min" or "0.6 ml/s"',
-)
+FLOW = MeasuredQuantity("flow", MILLILITRES_PER_MINUTE, '35, "35 ml/min" or "0.6 ml/s"')
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Units of pressure; apart from the other units, so that ``--help`` loads no validation."""
+"""Units of pressure and flow; apart from others, so that ``--help`` loads no validation."""
 
 KILOPASCALS = {
     "kPa": 1.0,
@@ -9,3 +9,5 @@ KILOPASCALS = {
     "psi": 6.894757293168,
 }
 """How many kPa each unit is (psi: NIST SP 811, App. B)."""
+MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0}
+"""How many ml/min each unit is."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +29,19 @@ from sbafab.design.files import (
 from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
-from sbafab.search.quantities import Subject, refuse_unknown_key, shown_value
+from sbafab.search.quantities import (
+    AS_DRAWN,
+    RequestedQuantity,
+    Subject,
+    group_of,
+    refuse_unknown_key,
+    shown_interval,
+    shown_value,
+)
 from sbafab.search.strategies import (
     explore,
     neighbours,
@@ -49,11 +59,14 @@ from sbafab.search.trial import (
     SearchSpace,
     Trial,
     broken_rules,
+    figure_text,
     keys_said,
     misses,
 )
 
 TRIES, LEAST_TRIES = 240, 4
+COUNT = "chamber.count"
+"""Key of the number of chambers side by side."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,8 @@ class FindRequest:
     """Requirements and goal of a search, and the design it starts from.
 
     ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
-    with Optuna; ``storage`` is Optuna's database, in which a search resumes.
+    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, above
+    0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
     """
 
     design: Design
@@ -71,6 +85,7 @@ class FindRequest:
     tries: int = TRIES
     optuna: bool = False
     storage: str | None = None
+    sure: float | None = None
 
 
 @dataclass(frozen=True)
@@ -119,6 +134,23 @@ class FoundDesign:
             if (counterpart := subject.counterpart(quantity)) is not None
         }
 
+    @cached_property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """90 % intervals of what would be measured of the best design, by quantity in its unit,
+        where a calibration says so.
+        """
+        if self.best.laminate is None:
+            return {}
+        intervals = {}
+        for quantity in self.problem.quantities:
+            try:
+                interval = self._subject.interval(quantity)
+            except DesignError:
+                continue
+            if interval is not None:
+                intervals[quantity.label] = interval
+        return intervals
+
     @property
     def full_stroke(self) -> float | None:
         """The full stroke of the best design in mm, as ``predict`` has it; None for drawn ones."""
@@ -129,7 +161,7 @@ class FoundDesign:
         except DesignError:
             return None
 
-    @property
+    @cached_property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
         return Subject(self.problem.design.with_(dict(self.best.values)), self.best.laminate)
@@ -148,12 +180,16 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     quantities = SearchProblem(request.design, request.requirements, request.goal).quantities
     for quantity in quantities:
         refuse_unknown_key(quantity, request.design)
+    if request.sure is not None:
+        _refuse_unsure(request, request.sure)
     keys = {key: value for key, value, _ in keys_of(request.design)}
     names = {quantity.name for quantity in quantities}
     every = request.design.free if request.free is None else request.free
     free = [key for key in every if not key.asked or key.asked in names]
     for requirement in request.requirements:
         _refuse_fixed(requirement, keys, free)
+    for quantity in quantities:
+        _refuse_bend(quantity, request.design, free)
     narrowed = [_within(key, request.requirements) for key in free]
     if not narrowed:
         raise DesignError(
@@ -161,6 +197,29 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
             "--free KEY=LOW:HIGH:STEP"
         )
     return tuple(narrowed)
+
+
+def _refuse_unsure(request: FindRequest, sure: float) -> None:
+    """Raises DesignError for a probability that is none, and for requirements that cannot hold with
+    one.
+    """
+    if not 0.5 < sure < 1:
+        raise DesignError(f"sure = {sure:g} must be above 0.5 and below 1, such as 0.9")
+    design = request.design
+    if uncertainty_of(design) is None:
+        raise DesignError(
+            f"sure = {sure:g} needs a calibration, and models.calibration of {design.name} is "
+            f'"{design.models.calibration}"; name one such as "paper", or leave sure out'
+        )
+    for requirement in request.requirements:
+        quantity = requirement.quantity
+        is_exact = quantity.key is not None or quantity.name in AS_DRAWN
+        if not is_exact and group_of(quantity, design.form) is None:
+            instead = "; ask for stroke@10kPa" if quantity.is_full_stroke else ""
+            raise DesignError(
+                f"sure = {sure:g}: no calibrated model gives {quantity.label} of {design.name}, so "
+                f"that its probability is not known{instead or '; leave sure out'}"
+            )
 
 
 def _refuse_fixed(
@@ -176,6 +235,23 @@ def _refuse_fixed(
             f"{key} = {value:g}, not {requirement.bound}, and the search does not change it; give "
             f"it a range with --free {key}=LOW:HIGH:STEP"
         )
+
+
+def _refuse_bend(quantity: RequestedQuantity, design: Design, free: Sequence[Free]) -> None:
+    """Raises DesignError for a bend of an actuator that does not bend, or of more chambers than
+    leave one empty, where they stay as many as they are.
+    """
+    if quantity.name != "bend":
+        return
+    if not design.form.is_parallel:
+        raise DesignError(f"{design.name} does not bend; only chambers side by side do")
+    stacks = design.form.stacks
+    if quantity.chambers < stacks or COUNT in [each.key for each in free]:
+        return
+    raise DesignError(
+        f"{quantity.label}: {design.name} has {stacks} chambers, of which one must stay empty; ask "
+        f"for at most {stacks - 1}, or for more chambers with --free {COUNT}=LOW:HIGH:STEP"
+    )
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
@@ -207,7 +283,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         raise DesignError(f"tries = {request.tries} must be at least {LEAST_TRIES}")
     if request.storage is not None and not request.optuna:
         raise DesignError("storage is Optuna's; search with optuna = True, or leave it out")
-    problem = SearchProblem(request.design, request.requirements, request.goal)
+    problem = SearchProblem(request.design, request.requirements, request.goal, request.sure)
     space = SearchSpace(problem, free_keys(request), request.tries, progress)
     if request.optuna:
         with_optuna(space, request.storage)
@@ -368,7 +444,7 @@ def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     more = [False, *(requirement.at_least for requirement in sides)]
     while True:
         rows = [
-            [trial.cost, *(trial.value(requirement) for requirement in sides)] for trial in passing
+            [trial.cost, *(trial.judged(requirement) for requirement in sides)] for trial in passing
         ]
         numbers = sorted({first, *front(rows, more)}, key=lambda number: passing[number].rank)
         chosen = _spread(numbers)
@@ -455,15 +531,23 @@ def found_toml(
     tables = {key: value for key, value in data.items() if isinstance(value, dict)}
     limits = []
     for requirement in result.problem.requirements:
-        value = shown_value(requirement.quantity, result.best.value(requirement))
-        limits.append(f"# {requirement.quantity.label} = {value} ({requirement.bound})")
+        value = figure_text(result.problem, result.best, requirement)
+        aside = _interval_text(result, requirement)
+        limits.append(f"# {requirement.quantity.label} = {value} ({requirement.bound}{aside})")
     goal = result.problem.goal
     value = shown_value(goal.quantity, result.best.value(goal))
-    best = f"# {goal.quantity.label} = {value} (the goal)"
+    best = f"# {goal.quantity.label} = {value} (the goal{_interval_text(result, goal)})"
     keys = keys_said(result.best.values)
     measured = [f"# {name}: {value.sentence()}" for name, value in result.measured.items()]
     head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *limits, best, *measured]
     return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
+
+
+def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
+    interval = result.intervals.get(subject.quantity.label)
+    if interval is None or result.best.value(subject) < 0:
+        return ""
+    return f"; 90 % interval {shown_interval(interval)}"
 
 
 def _from_anywhere(data: dict[str, Any], folder: Path, assigned: set[str]) -> None:

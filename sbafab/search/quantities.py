@@ -1,7 +1,9 @@
-"""Quantities of requirements: sizes, mass, yield, stroke, bend, force, and a design's keys.
+"""Quantities of requirements: sizes, mass, yield, stroke, bend, force, stiffness, time, and a
+design's keys.
 
 Each is the figure that ``predict`` has, from the same function: a stroke without a pressure is its
-full stroke, one at a pressure its free stroke; bends and forces are those of the elastic stack.
+full stroke, one at a pressure its free stroke; bends, forces, stiffness and times are those of the
+elastic stack.
 """
 
 from __future__ import annotations
@@ -17,22 +19,37 @@ from typing import Any
 import numpy as np
 
 from sbafab.design.files import key_paths, listed, shown
-from sbafab.design.pressure_units import KILOPASCALS
-from sbafab.design.records import Design, Slots, keys_of
+from sbafab.design.pressure_units import KILOPASCALS, MILLILITRES_PER_MINUTE
+from sbafab.design.records import Design, Form, Slots, keys_of
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
-from sbafab.models.elastic import blocked_force
+from sbafab.models.calibrated import SHARE
+from sbafab.models.elastic import (
+    blocked_force,
+    chamber_count,
+    moved_stack,
+    shut_stiffness,
+    time_to_fill,
+)
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
-from sbafab.models.intervals import factors_of
+from sbafab.models.intervals import DELAYS, GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
-from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, HEIGHTS, Counterpart, counterpart
+from sbafab.models.paper import (
+    FLAT_HEIGHT_OF_FILMS,
+    FULL_KPA,
+    HEIGHTS,
+    WATER_FLOW,
+    Counterpart,
+    counterpart,
+)
 from sbafab.models.paper import STACK as ELASTIC_STACK
+from sbafab.models.pneumatics import seconds
 from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.search.quantity_names import QUANTITIES
@@ -41,15 +58,19 @@ SHARES = np.linspace(0.1, 1.0, 10)
 """Of the pressure asked for: tried until the film would be longer than MOST_STRETCH."""
 USUAL_KPA = 10.0
 _PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
+_CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 AT_PRESSURE = {row.name: row.unit for row in QUANTITIES if "@" in row.written}
 """Units of the quantities that take a pressure."""
+NAMED_AT_PRESSURE = f"{', '.join([*AT_PRESSURE][:-1])} and {[*AT_PRESSURE][-1]}"
 UNPRESSURED = {row.name: row.unit for row in QUANTITIES if row.name not in AT_PRESSURE}
 UNITS = {
     "g": {"g": 1.0, "mg": 0.001, "kg": 1000.0},
     "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
     "deg": {"deg": 1.0},
+    "s": {"s": 1.0, "ms": 0.001},
+    "N/mm": {"N/mm": 1.0, "mN/mm": 0.001, "N/m": 0.001},
 }
-"""Of masses, forces and angles; lengths have those of design files."""
+"""Of masses, forces, angles, times and stiffness; lengths have those of design files."""
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
@@ -57,22 +78,26 @@ ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
 REACHED, WIDEST = "reached_diameter", "inflated_diameter"
 """Inflated round a tube: the lower figure, for a wall that it must reach, and the upper end, for
 one that it must not touch."""
+AS_DRAWN = ("overall_diameter", "outline_diameter", "width", "length", "lumen", "mass", "yield")
+"""Quantities of the drawing and its tolerances; all other names are predicted."""
 HOW = (
-    'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@5kPa", "force@12.5mm@50kPa" '
-    "or chamber.diameter"
+    'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@2chambers@5kPa", '
+    '"force@12.5mm@50kPa" or chamber.diameter'
 )
 
 
 @dataclass(frozen=True)
 class RequestedQuantity:
-    """A quantity by name or dotted key; force and stroke with their pressure in kPa, force with its
-    stroke in mm.
+    """A quantity by name or dotted key; with its pressure in kPa, a force with its stroke in mm, a
+    bend with the number of its pressurised chambers, a time with its flow in ml/min.
     """
 
     name: str
     unit: str
     kpa: float | None = None
     stroke: float | None = None
+    chambers: int = 1
+    flow: float | None = None
 
     @property
     def is_full_stroke(self) -> bool:
@@ -82,7 +107,9 @@ class RequestedQuantity:
     @property
     def label(self) -> str:
         at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
-        return f"{self.name}{at}{f'@{self.kpa:g}kPa' if self.kpa is not None else ''}"
+        at += f"@{self.chambers}chambers" if self.chambers > 1 else ""
+        at += f"@{self.kpa:g}kPa" if self.kpa is not None else ""
+        return f"{self.name}{at}{f'@{self.flow:g}ml/min' if self.flow is not None else ''}"
 
     @property
     def key(self) -> str | None:
@@ -90,14 +117,20 @@ class RequestedQuantity:
         return self.name if "." in self.name else KEYS.get(self.name)
 
 
-def read_quantity(text: str, kpa: float | None = None) -> RequestedQuantity:
-    """The quantity of a text; ``kpa`` counts where it names no pressure. Raises DesignError."""
+def read_quantity(
+    text: str, kpa: float | None = None, flow_ml_min: float = WATER_FLOW
+) -> RequestedQuantity:
+    """Return the quantity of a text; ``kpa`` counts where it names no pressure, ``flow_ml_min``
+    where a time names no flow. Raises DesignError.
+    """
     name, *places = (part.strip() for part in text.split("@"))
     name = name if "." in name else name.replace("-", "_").lower()
     if name in AT_PRESSURE:
         return _with_pressure(name, places, text, kpa)
+    if name == "time":
+        return _with_flow(places, text, flow_ml_min)
     if places:
-        raise DesignError(f"{shown(text)}: only stroke, bend and force take a pressure; {HOW}")
+        raise DesignError(f"{shown(text)}: only {NAMED_AT_PRESSURE} take a pressure; {HOW}")
     if name not in UNPRESSURED and "." not in name:
         names = list(dict.fromkeys(row.name for row in QUANTITIES))
         near = difflib.get_close_matches(name, names, 1)
@@ -116,7 +149,12 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
 def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
     pressure: float | None = None
     stroke: float | None = None
+    chambers = 1
     for place in places:
+        count = _CHAMBERS.fullmatch(place)
+        if count is not None and name == "bend":
+            chambers = int(count[1])
+            continue
         kilopascals = _kilopascals(place)
         if kilopascals is not None:
             if pressure is not None:
@@ -143,7 +181,18 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
-    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke)
+    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke, chambers)
+
+
+def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQuantity:
+    """Return the time to 10 kPa with water at a flow. Raises DesignError."""
+    for place in places:
+        match = _VALUE.fullmatch(place)
+        if len(places) > 1 or match is None or match[2] not in MILLILITRES_PER_MINUTE:
+            raise DesignError(f"{shown(text)}: a time takes one flow, such as time@35ml/min")
+        flow_ml_min = float(match[1]) * MILLILITRES_PER_MINUTE[match[2]]
+    seconds(0.0, flow_ml_min)
+    return RequestedQuantity("time", UNPRESSURED["time"], flow=flow_ml_min)
 
 
 def named_pressure(texts: list[str]) -> float | None:
@@ -209,12 +258,34 @@ def shown_value(quantity: RequestedQuantity, value: float) -> str:
     return f"{value:.4g} {quantity.unit}".rstrip()
 
 
+def shown_interval(interval: tuple[float, float]) -> str:
+    """An interval without its unit; of quantities that are at least 0."""
+    low, high = (max(end, 0.0) for end in interval)
+    return f"{low:.3g} to {high:.3g}"
+
+
+def read_sure(text: str) -> float:
+    """Return a probability from a text such as 0.9 or 90%. Raises ValueError with the end of a
+    sentence.
+    """
+    share = _share(text)
+    if not 0.5 < share < 1:
+        raise ValueError("must be above 0.5 and below 1, such as 0.9 or 90%")
+    return share
+
+
 @dataclass(frozen=True)
 class Subject:
-    """A design whose quantities are evaluated; each is computed once."""
+    """A design whose quantities are evaluated; each is computed once.
+
+    ``given``: factors in place of those of the design's calibration, ``origin`` the subject at the
+    latter, whose stack serves the other factors where it can.
+    """
 
     design: Design
     laminate: Laminate
+    given: Factors | None = None
+    origin: Subject | None = None
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
@@ -230,6 +301,9 @@ class Subject:
             return share_of_good()
         if quantity.name in AT_PRESSURE:
             return self._moved(quantity)
+        if quantity.name == "time":
+            time, _ = time_to_fill(self._stack, quantity.flow or WATER_FLOW, FULL_KPA)
+            return time + self.factors.water_delay
         if quantity.name == "mass":
             return film_mass(self.laminate)
         if quantity.name == "height":
@@ -244,20 +318,57 @@ class Subject:
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
     def _moved(self, quantity: RequestedQuantity) -> float:
-        """A stroke, bend or force."""
+        """Return a stroke, bend, lateral stiffness or force."""
         kpa = quantity.kpa
         if kpa is None:
             return self.full_stroke
         if quantity.name == "stroke":
             return self._stroke(kpa)
         if quantity.name == "bend":
-            return self._bend(kpa)
+            return self._bend(quantity.chambers, kpa)
+        if quantity.name == "lateral_stiffness":
+            return shut_stiffness(self._stack, kpa)[0]
         return self._force(quantity.stroke or 0.0, kpa)
 
     @cached_property
     def factors(self) -> Factors:
-        """The factors of the design's calibration."""
-        return factors_of(self.design)
+        """The factors of the design's calibration, or the given ones."""
+        return self.given or factors_of(self.design)
+
+    @cached_property
+    def uncertainty(self) -> Uncertainty | None:
+        """The calibration of the design; None without one."""
+        return uncertainty_of(self.design)
+
+    @cached_property
+    def _others(self) -> dict[Factors, Subject]:
+        """The design at other factors."""
+        return {}
+
+    def _at(self, factors: Factors) -> Subject:
+        if factors == self.factors:
+            return self
+        return self._others.setdefault(
+            factors, Subject(self.design, self.laminate, factors, origin=self)
+        )
+
+    def interval(
+        self, quantity: RequestedQuantity, share: float = SHARE
+    ) -> tuple[float, float] | None:
+        """Return the interval that holds what would be measured of a quantity with a probability of
+        ``share``; None without a calibration, and where no calibrated model gives it.
+
+        Raises DesignError where the calibration's other factors lead out of the model's range.
+        """
+        group = group_of(quantity, self.design.form)
+        if self.uncertainty is None or group is None:
+            return None
+
+        def value_at(factors: Factors) -> float:
+            return self._at(factors).value(quantity, lambda: math.nan)
+
+        delay = DELAYS["water"] if quantity.name == "time" else ""
+        return self.uncertainty.interval_of(group, value_at, share, delay)[1]
 
     @cached_property
     def _actuator(self) -> Actuator:
@@ -265,6 +376,10 @@ class Subject:
 
     @cached_property
     def _stack(self) -> Stack:
+        if self.origin is not None:
+            moved = moved_stack(self.origin._stack, self.origin.factors, self.factors)
+            if moved is not None:
+                return moved
         return stack(self.design, self.laminate, factors=self.factors)
 
     @property
@@ -280,10 +395,16 @@ class Subject:
         kinds = balloons_of(self.design, self.laminate, self.factors)
         return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
 
-    def _bend(self, kpa: float) -> float:
+    def _bend(self, chambers: int, kpa: float) -> float:
         if not self.design.form.is_parallel:
             raise DesignError(f"{self.design.name} does not bend; only chambers side by side do")
-        return self._stack.pose((kpa, *(0.0,) * (self._stack.chambers - 1))).bend
+        empty = self._stack.chambers - chambers
+        if empty < 1:
+            raise DesignError(
+                f"{self.design.name} has {self._stack.chambers} chambers, and a bend is of at most "
+                f"{self._stack.chambers - 1} of them, the others empty"
+            )
+        return self._stack.pose((*(kpa,) * chambers, *(0.0,) * empty)).bend
 
     def _force(self, stroke: float, kpa: float) -> float:
         form = self.design.form
@@ -309,23 +430,39 @@ class Subject:
         return counterpart(self.design.form, name, model, self.factors.calibration)
 
     def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
-        """The name of the figure in ``predict``, and that of its model."""
+        """Return the name of the figure in ``predict``, and that of its model; empty without."""
         at = f"at {quantity.kpa or 0.0:g} kPa"
+        flow = f"at {quantity.flow or WATER_FLOW:g} ml/min"
         if quantity.name == "height":
-            return "deflated height", FLAT_HEIGHT_OF_FILMS
-        if quantity.name == "bend":
-            return f"bend {at} in one chamber, the others empty", ELASTIC_STACK
-        if isinstance(self.design.form.pockets, Slots):
+            factor = self.factors.press_factor
+            pressed = f" x press factor {factor:g}" if factor != 1 else ""
+            return "deflated height", FLAT_HEIGHT_OF_FILMS + pressed
+        if group_of(quantity, self.design.form) is None:
             return "", ""
-        if quantity.name == "stroke" and not quantity.is_full_stroke:
+        if quantity.name == "stroke":
             return f"free stroke {at}", ELASTIC_BALLOON
-        if quantity.name == "force":
-            # Of the three heights at which forces were measured the nearest.
-            share = (quantity.stroke or 0.0) / self.full_stroke
-            near = min(HEIGHTS, key=lambda height: abs(height - share))
-            where = f"at {100 * near:g} % of full stroke" if near else "flat"
-            return f"blocked force {at}, {where}", ELASTIC_STACK
-        return "", ""
+        names = {
+            "bend": f"bend {at} in {chamber_count(quantity.chambers)}, the others empty",
+            "time": f"time to {FULL_KPA:g} kPa at the pump, water {flow} in all",
+            "lateral_stiffness": f"lateral tip stiffness {at}, chambers shut",
+        }
+        if quantity.name in names:
+            return names[quantity.name], ELASTIC_STACK
+        # Of the three heights at which forces were measured the nearest.
+        share = (quantity.stroke or 0.0) / self.full_stroke
+        near = min(HEIGHTS, key=lambda height: abs(height - share))
+        where = f"at {100 * near:g} % of full stroke" if near else "flat"
+        return f"blocked force {at}, {where}", ELASTIC_STACK
+
+
+def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
+    """Return the group of a quantity's discrepancy; None where no calibrated model gives it."""
+    if quantity.name == "height":
+        return "flat height"
+    is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
+    if not is_moved or quantity.is_full_stroke or isinstance(form.pockets, Slots):
+        return None
+    return GROUP_BY_UNIT.get(quantity.unit, "motion")
 
 
 @lru_cache(maxsize=4096)

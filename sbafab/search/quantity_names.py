@@ -35,8 +35,10 @@ QUANTITIES = (
     QuantityName("yield", "", "share of builds that hold, 0.95 or 95%"),
     QuantityName("stroke", "mm", "full stroke: the paper's, in proportion"),
     QuantityName("stroke@P", "mm", "free stroke at P kPa, elastic balloon"),
-    QuantityName("bend@P", "deg", "with one chamber at P kPa, elastic stack"),
+    QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P"),
     QuantityName("force@H@P", "N", "blocked at the stroke H mm, at P kPa"),
+    QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
+    QuantityName("time", "s", "to 10 kPa with water at --flow"),
 )
 """In the order of the help; names that stand twice take a pressure or none."""
 
@@ -45,7 +47,7 @@ def quantity_lines() -> str:
     """Return the table as lines for the help of a command."""
     width = max(len(quantity.written) for quantity in QUANTITIES)
     rows = [
-        f"{quantity.written:{width}}  {quantity.unit:3}  {quantity.meaning}".rstrip()
+        f"{quantity.written:{width}}  {quantity.unit:4}  {quantity.meaning}".rstrip()
         for quantity in QUANTITIES
     ]
-    return "\n".join([*rows, f"{'KEY':{width}}  {'':3}  any key of the design, chamber.diameter"])
+    return "\n".join([*rows, f"{'KEY':{width}}  {'':4}  any key of the design, chamber.diameter"])

@@ -274,6 +274,7 @@ def _name(search: SearchSpace) -> str:
             f"{design.name} {design_sha256(design)[:12]}",
             *requirements,
             search.problem.goal.label,
+            *([] if search.problem.sure is None else [f"sure {search.problem.sure:g}"]),
             *keys,
         ]
     )

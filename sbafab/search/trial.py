@@ -12,6 +12,7 @@ from sbafab.design.files import shown
 from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models.paper import WATER_FLOW
 from sbafab.output.checked import Checked, limits, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
@@ -71,27 +72,27 @@ class Goal:
         return f"{'most' if self.more else 'least'} {self.quantity.label}"
 
 
-GOOD_IF_MORE = ("stroke", "bend", "force", "yield", "lumen")
+GOOD_IF_MORE = ("stroke", "bend", "force", "lateral_stiffness", "yield", "lumen")
 """Of these as much as can be is best, of all others as little."""
 
 
 def read_all(
-    least: Sequence[str], most: Sequence[str], best: str
+    least: Sequence[str], most: Sequence[str], best: str, flow_ml_min: float = WATER_FLOW
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A bend or a force without a pressure is one at the highest that any of them names; a stroke
-    without one is the full stroke.
+    A bend, force or stiffness without a pressure is one at the highest that any of them names; a
+    stroke without one is the full stroke, a time without a flow is at ``flow_ml_min``.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
-    requirements = tuple(_read(text, at_least, kpa) for text, at_least in pairs)
+    requirements = tuple(_read(text, at_least, kpa, flow_ml_min) for text, at_least in pairs)
     _refuse_contradictions(requirements, [text for text, _ in pairs])
-    quantity = read_quantity(best, kpa)
+    quantity = read_quantity(best, kpa, flow_ml_min)
     return requirements, Goal(quantity, quantity.name in GOOD_IF_MORE)
 
 
-def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
+def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> Requirement:
     option = "--min" if at_least else "--max"
     name, equals, value = text.partition("=")
     if not equals or not value.strip():
@@ -99,7 +100,7 @@ def _read(text: str, at_least: bool, kpa: float | None) -> Requirement:
             f"{option} {shown(text)} is not QUANTITY=VALUE; write for example {option} "
             f"{'stroke@50kPa=25' if at_least else 'overall_diameter=20'}"
         )
-    quantity = safer(read_quantity(name, kpa), at_least)
+    quantity = safer(read_quantity(name, kpa, flow_ml_min), at_least)
     try:
         limit = read_limit(quantity, value)
     except ValueError as error:
@@ -138,7 +139,8 @@ class Trial:
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
     ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
-    says why no such design can be made.
+    says why no such design can be made. ``intervals``, by quantity in its unit, are those whose
+    ends are held against limits, where requirements are to hold with a probability.
     """
 
     values: Mapping[str, Any]
@@ -149,6 +151,7 @@ class Trial:
     mass: float = 0.0
     refused: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
@@ -164,14 +167,34 @@ class Trial:
         """The figure that a requirement or the goal is about, in its unit."""
         return self.figures[requirement.quantity.label]
 
+    def judged(self, requirement: Requirement) -> float:
+        """Return the value that is held against the limit: the end of the interval on its side,
+        where there is one.
+        """
+        return judged(requirement, self.figures, self.intervals)
+
+
+def judged(
+    requirement: Requirement,
+    figures: Mapping[str, float],
+    intervals: Mapping[str, tuple[float, float]],
+) -> float:
+    """Return the value of ``Trial.judged``."""
+    label = requirement.quantity.label
+    return intervals[label][not requirement.at_least] if label in intervals else figures[label]
+
 
 @dataclass(frozen=True)
 class SearchProblem:
-    """Requirements, the goal, and the design whose keys change."""
+    """Requirements, the goal, and the design whose keys change.
+
+    Each requirement on a predicted quantity must hold with the probability ``sure``, if any.
+    """
 
     design: Design
     requirements: tuple[Requirement, ...]
     goal: Goal
+    sure: float | None = None
 
     @property
     def needs_yield(self) -> bool:
@@ -195,17 +218,20 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
             checked = Checked(design, laminate, findings)
             if not checked.failed:
                 refuse_undoable([checked])
-        figures = _figures(problem, Subject(design, laminate), rules)
+        subject = Subject(design, laminate)
+        figures = _figures(problem, subject, rules)
+        intervals = {} if problem.sure is None else _intervals(problem, subject, problem.sure)
     except (DesignError, GeometryError) as error:
         message = " ".join(str(error).split())
         return Trial(values, missed=IMPOSSIBLE, refused=message)
     missed = sum(
-        -min(0.0, requirement.margin(figures[requirement.quantity.label]) + CLOSE)
+        -min(0.0, requirement.margin(judged(requirement, figures, intervals)) + CLOSE)
         for requirement in problem.requirements
     )
     missed += sum(_short(requirement) for requirement in (rules or {}).values())
     cost = problem.goal.cost(figures[problem.goal.quantity.label])
-    return Trial(values, figures, rules, missed, cost, _mass(laminate), laminate=laminate)
+    mass = _mass(laminate)
+    return Trial(values, figures, rules, missed, cost, mass, "", laminate, intervals)
 
 
 def _mass(laminate: Laminate) -> float:
@@ -237,14 +263,39 @@ def _figures(
     }
 
 
+def _intervals(
+    problem: SearchProblem, subject: Subject, sure: float
+) -> dict[str, tuple[float, float]]:
+    """Return the intervals beyond each end of which a measured value lies with a probability of
+    ``1 - sure``.
+    """
+    each = {
+        requirement.quantity.label: subject.interval(requirement.quantity, 2 * sure - 1)
+        for requirement in problem.requirements
+    }
+    return {label: interval for label, interval in each.items() if interval is not None}
+
+
+def figure_text(problem: SearchProblem, trial: Trial, requirement: Requirement) -> str:
+    """Return the figure of a requirement; with a probability, its median and its bound."""
+    quantity = requirement.quantity
+    median = trial.value(requirement)
+    value = shown_value(quantity, median)
+    if problem.sure is None or quantity.label not in trial.intervals or median < 0:
+        return value
+    bound = f"{max(trial.judged(requirement), 0.0):.4g} {quantity.unit}"
+    side = "more" if requirement.at_least else "less"
+    return f"{value} in the median, {bound} or {side} with {100 * problem.sure:g} % probability"
+
+
 def misses(problem: SearchProblem, trial: Trial) -> list[str]:
     """Return what a candidate breaks, a sentence each: requirements, then rules."""
     if trial.refused:
         return [trial.refused]
     broken = [
-        f"{row.quantity.label} {shown_value(row.quantity, trial.value(row))}, not {row.bound}"
+        f"{row.quantity.label} {figure_text(problem, trial, row)}, not {row.bound}"
         for row in problem.requirements
-        if not row.holds(trial.value(row))
+        if not row.holds(trial.judged(row))
     ]
     return [*broken, *broken_rules(trial)]
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import pytest
@@ -15,11 +18,13 @@ import sbafab
 from sbafab.cli import app
 from sbafab.design.records import Free
 from sbafab.errors import DesignError
+from sbafab.models.intervals import calibration_of
+from sbafab.models.unknowns import UNKNOWNS
 from sbafab.search import trial as module
 from sbafab.search.find import FindRequest, find, free_keys
 from sbafab.search.quantities import read_quantity
 from sbafab.search.quantity_names import QUANTITIES
-from sbafab.search.trial import SearchProblem, Trial, read_all
+from sbafab.search.trial import SearchProblem, Trial, figure_text, read_all
 from sbafab.search.vary import read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
@@ -161,6 +166,12 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
         (["--min", "stroke=5", "--max", "stroke=4"], "contradict each other"),
         (["--min", "inflated_diameter=5", "--max", "inflated_diameter=4"], "contradict each other"),
         (["--max", "mass=nan"], "must be a number"),
+        (["--min", "bend=90"], "1dof-5mm does not bend"),
+        (["--max", "time=1", "--flow", "35 l"], "must be a flow"),
+        (["--sure", "0.4"], "must be above 0.5 and below 1"),
+        (["--sure", "90"], "must be a share from 0 to 1"),
+        (["--min", "stroke=5", "--sure", "0.9"], "ask for stroke@10kPa"),
+        (["--set", "models.calibration=none", "--sure", "0.9"], "needs a calibration"),
         (["--max", "mass=-1"], "must be at least 0"),
         (["--min", "yield=95"], "a share from 0 to 1"),
         (["--min", "stroke@50=5"], "'50' has no unit; write 50kPa"),
@@ -283,6 +294,58 @@ def test_what_equals_the_best_is_told_by_its_mass(monkeypatch: pytest.MonkeyPatc
     assert [one.values["stack.balloons"] for one in found.front] == [4, 9]
 
 
+HEIGHTS = (Free("stack.balloons", 2, 20, 1),)
+
+
+@pytest.mark.parametrize("sure", [None, 0.6, 0.9])
+def test_a_requirement_holds_with_a_probability(sure: float | None) -> None:
+    """Heights are lognormal: n films and n - 1 masks, times the press factor and what it misses."""
+    design = sbafab.load("1dof-5mm")
+    found = sbafab.find(design, most={"height": 1.5}, best="stroke", free=HEIGHTS, sure=sure)
+    calibration = calibration_of(design)
+    assert calibration is not None
+    row = [unknown.field for unknown in UNKNOWNS].index("press_factor")
+    missed = calibration.discrepancy["flat height"]
+    deviation = math.sqrt(calibration.covariance[row][row] + missed**2)
+    quantile = NormalDist().inv_cdf(sure or 0.5)
+
+    def height(balloons: int) -> float:
+        films = 2 * balloons * 0.038 + (2 * balloons - 1) * 0.025
+        return films * calibration.factors.press_factor
+
+    bounds = {n: height(n) * math.exp(quantile * deviation) for n in range(2, 21)}
+    most = max(n for n, bound in bounds.items() if bound <= 1.5)
+    assert found.best.values == {"stack.balloons": most}
+    (requirement,) = found.problem.requirements
+    assert found.best.value(requirement) == pytest.approx(height(most))
+    assert found.best.judged(requirement) == pytest.approx(bounds[most], rel=1e-6)
+    low, high = found.intervals["height"]
+    assert math.log(high / low) == pytest.approx(2 * NormalDist().inv_cdf(0.95) * deviation)
+    text = figure_text(found.problem, found.best, requirement)
+    assert ("or less with" in text) == (sure is not None)
+
+
+def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
+    target = tmp_path / "found.toml"
+    asked = ["find", "1dof-5mm", "--max", "height=1.5", "--free", "stack.balloons=3:6:1"]
+    asked += ["--fix", "chamber.diameter"]
+    ended = CliRunner().invoke(app, [*asked, "--sure", "90%", "--to", str(target), "--json"])
+    assert ended.exit_code == 0, ended.output
+    said = json.loads(ended.stdout)
+    (row,) = said["requirements"]
+    assert said["sure"] == 0.9
+    assert row["median"] == said["best"]["figures"]["height"] < row["bound"] < row["limit"]
+    assert row["bound"] < said["intervals"]["height"][1]
+    head = target.read_text().splitlines()[1]
+    assert f"{row['median']:.4g} mm in the median, {row['bound']:.4g} mm or less with 90 %" in head
+    target.unlink()
+    ended = CliRunner().invoke(app, [*asked, "--to", str(target)])
+    low, high = said["intervals"]["height"]
+    assert (
+        f"height {row['median']:.4g} mm ({low:.3g} to {high:.3g}); at most 1.5 mm" in ended.output
+    )
+
+
 def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
     asked += ["--free", "chamber.diameter=5:5.1:0.1"]
@@ -321,6 +384,7 @@ def test_what_cannot_be_made_binds_on_the_way_to_the_goal_alone(
     ("asked", "said"),
     [
         ({"tries": 0}, "at least 4"),
+        ({"sure": 0.5}, "above 0.5 and below 1"),
         ({"storage": "sqlite:///search.db"}, "optuna = True"),
         ({"free": ()}, "no key of 1dof-5mm"),
         ({"free": FREE, "least": {"chamber.diameter": 20}}, "its range is 3 to 12"),

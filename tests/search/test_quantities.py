@@ -31,11 +31,16 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
         ("stroke@0.1MPa", RequestedQuantity("stroke", "mm", 100.0)),
         ("force@12.5mm@50kPa", RequestedQuantity("force", "N", 50.0, 12.5)),
         ("force@50 kPa@0.5 in", RequestedQuantity("force", "N", 50.0, 12.7)),
+        ("bend@2chambers@5kPa", RequestedQuantity("bend", "deg", 5.0, chambers=2)),
+        ("lateral-stiffness@5kPa", RequestedQuantity("lateral_stiffness", "N/mm", 5.0)),
+        ("time", RequestedQuantity("time", "s", flow=35.0)),
+        ("time@0.5ml/s", RequestedQuantity("time", "s", flow=30.0)),
         ("chamber.diameter", RequestedQuantity("chamber.diameter", "")),
     ],
 )
 def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
     assert read_quantity(text) == found
+    assert read_quantity(found.label) == found
 
 
 @pytest.mark.parametrize(
@@ -45,7 +50,11 @@ def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
         ("weight_of_it", "is not a quantity; there are"),
         ("stroke@5mPa", "neither a pressure nor a length"),
         ("force@12.5@50kPa", "12.5kPa or 12.5mm"),
-        ("mass@50kPa", "only stroke, bend and force"),
+        ("mass@50kPa", "only stroke, bend, force and lateral_stiffness"),
+        ("bend@0chambers", "neither a pressure nor a length"),
+        ("force@2chambers@1mm", "neither a pressure nor a length"),
+        ("time@5kPa", "a time takes one flow, such as time@35ml/min"),
+        ("time@0ml/min", "must be from"),
         ("bend@5mm", "only a force takes one"),
         ("force@50kPa", "a force needs a stroke"),
         ("stroke@5mm@50kPa", "only a force takes one"),
@@ -81,6 +90,8 @@ def test_a_bend_without_a_pressure_is_at_the_highest_named() -> None:
         ("force@1mm@5kPa", "500mN", 0.5),
         ("yield", "95%", 0.95),
         ("stroke", "1in", 25.4),
+        ("time", "500ms", 0.5),
+        ("lateral_stiffness@5kPa", "12 N/m", 0.012),
         ("chamber.diameter", "5 mm", 5.0),
     ],
 )
@@ -145,6 +156,35 @@ def test_each_figure_is_the_one_of_predict(diameter: float) -> None:
     force = said.value("blocked force at 8 kPa, at 25 % of full stroke", "elastic stack")
     assert value(f"force@{height!r}mm@8kPa") == pytest.approx(force, rel=1e-7)
     assert value("height") == said.value("deflated height")
+
+
+def test_each_interval_is_the_one_of_predict() -> None:
+    """Also of what only the stack at other factors gives, and with the delay of the water."""
+    design = sbafab.load("3dof-15mm", stack={"balloons": 6})
+    said = sbafab.predict(design, pressures_kpa=[8.0], flow_ml_min=20.0)
+    subject = Subject(design, sbafab.build(design))
+    names = {
+        "stroke@8kPa": "free stroke at 8 kPa",
+        "height": "deflated height",
+        "bend@2chambers@8kPa": "bend at 8 kPa in 2 chambers, the others empty",
+        "lateral_stiffness@8kPa": "lateral tip stiffness at 8 kPa, chambers shut",
+        "time@20ml/min": "time to 10 kPa at the pump, water at 20 ml/min in all",
+    }
+    for text, name in names.items():
+        (figure,) = (one for one in said.figures if one.name == name and one.interval)
+        quantity = read_quantity(text)
+        assert subject.value(quantity, lambda: 1.0) == pytest.approx(figure.value, rel=1e-9), text
+        assert subject.interval(quantity) == pytest.approx(figure.interval, rel=1e-9), text
+        assert (subject.counterpart(quantity) is None) == (figure.measured is None), text
+    for exact in ("mass", "lumen", "stroke"):
+        assert subject.interval(read_quantity(exact)) is None
+    uncalibrated = design.with_({"models.calibration": "none"})
+    assert Subject(uncalibrated, subject.laminate).interval(read_quantity("height")) is None
+
+
+def test_a_bend_leaves_a_chamber_empty() -> None:
+    with pytest.raises(DesignError, match="a bend is of at most 2 of them"):
+        _value("bend@3chambers@5kPa", "3dof-15mm")
 
 
 def test_a_lone_chamber_does_not_bend() -> None:
