@@ -13,7 +13,6 @@ from sbafab.search.quantities import RequestedQuantity, Subject, read_limit, rea
 from sbafab.search.trial import read_all
 from tests.quick import few
 
-
 UNCALIBRATED = {"calibration": "none"}
 """Films as drawn and bought, whose figures are closed forms."""
 
