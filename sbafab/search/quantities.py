@@ -289,7 +289,7 @@ class Subject:
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate)
+        return sizes(self.design, self.laminate, self.factors.press_factor)
 
     @cached_property
     def _keys(self) -> Mapping[str, Any]:
