@@ -56,7 +56,7 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
         def value(factors: Factors) -> float:
             reached = series_with(factors)[phrase][point]
             if reached is None:
-                raise _UnreachedError
+                raise UnreachedError
             return reached
 
         return widened(*uncertainty.interval_of(group, value, delay=delay), errors[point])
@@ -69,7 +69,7 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
         ]
         try:
             ends = [interval(phrase, point) for phrase in phrases]
-        except (_UnreachedError, KeyError):
+        except (UnreachedError, KeyError):
             return None
         return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
 
@@ -87,5 +87,5 @@ def widened(value: float, ends: Ends, error: float) -> Ends:
     return value - span, value + span
 
 
-class _UnreachedError(Exception):
+class UnreachedError(Exception):
     """A state that the actuator does not reach with other factors."""

@@ -126,7 +126,7 @@ def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
                 "",
                 _axis(compared, point),
                 _measured(point),
-                _span(point.model) or "-",
+                span(point.model) or "-",
                 _deviation(point),
                 {None: "-", True: "yes", False: "no"}[point.is_within],
             ).rstrip()
@@ -141,10 +141,11 @@ def _measured(point: ComparedPoint) -> str:
     return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
 
 
-def _span(ends: Ends | None, sign: str = "") -> str:
+def span(ends: Ends | None, sign: str = "", digits: int = 4) -> str:
+    """Return a range as text, or one number where its ends read alike; "" for none."""
     if ends is None:
         return ""
-    low, high = (f"{end:{sign}.4g}" for end in ends)
+    low, high = (f"{end:{sign}.{digits}g}" for end in ends)
     return low if low == high else f"{low} to {high}"
 
 
@@ -152,7 +153,7 @@ def _deviation(point: ComparedPoint) -> str:
     if point.deviation is None:
         return "-"
     if point.measured == 0:
-        return _span(point.deviation, "+")
+        return span(point.deviation, "+")
     low, high = (f"{end / point.measured:+.0%}" for end in point.deviation)
     return low if low == high else f"{low} to {high}"
 
@@ -172,10 +173,13 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
-def as_json(evidences: Sequence[Evidence], curves: Sequence[ComparedCurve]) -> dict[str, Any]:
-    """Return the comparison for programs."""
+def as_json(
+    evidences: Sequence[Evidence], curves: Sequence[ComparedCurve], calibration: str
+) -> dict[str, Any]:
+    """Return the comparison for programs; ``calibration`` is its name."""
     return {
         "schema": COMPARISON_SCHEMA,
+        "calibration": calibration,
         "sources": [
             {
                 "id": evidence.id,
@@ -185,11 +189,12 @@ def as_json(evidences: Sequence[Evidence], curves: Sequence[ComparedCurve]) -> d
             }
             for evidence in evidences
         ],
-        "curves": [_curve_as_json(compared) for compared in curves],
+        "curves": [curve_as_json(compared) for compared in curves],
     }
 
 
-def _curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
+def curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
+    """Return a curve with its points for programs."""
     curve = compared.curve
     return {
         "source": compared.source,
