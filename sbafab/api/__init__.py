@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from sbafab.api.lab import kerf, record, report
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
     from sbafab.api.runs import cut, generate, mesh, nest, press, simulate
-    from sbafab.api.search import find, sweep
+    from sbafab.api.search import compare, find, sweep
 
 __all__ = [
     "Source",
@@ -43,6 +43,7 @@ __all__ = [
     "check",
     "check_folder",
     "checking",
+    "compare",
     "cut",
     "dimensions",
     "drawing",
@@ -75,7 +76,7 @@ MODULES = {
     "lab": ("kerf", "record", "report"),
     "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "runs": ("cut", "generate", "mesh", "nest", "press", "simulate"),
-    "search": ("find", "sweep"),
+    "search": ("compare", "find", "sweep"),
 }
 """The functions by their module, which is loaded when first asked for one of them; ``designs`` has
 the rest.

@@ -1,4 +1,4 @@
-"""Designs found or swept by their predictions."""
+"""Designs found, swept or compared by their predictions."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 
 from sbafab.api.designs import Source, load, parted
 from sbafab.design.files import Change
+from sbafab.design.records import Design
+from sbafab.search.compare import PRESSURES, DesignComparison, load_compared, write_page
+from sbafab.search.compare import compare as run_compare
 from sbafab.search.find import FindRequest, FoundDesign
 from sbafab.search.find import find as run_find
 from sbafab.search.sweep import SweepRequest, SweptDesigns
@@ -39,6 +42,36 @@ def find(
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def compare(
+    first: Source,
+    second: Source,
+    *,
+    pressures_kpa: Sequence[float] = PRESSURES,
+    flow_ml_min: float = 35.0,
+    out: str | Path | None = None,
+) -> DesignComparison:
+    """Compare two designs: keys and rules that differ, and the figures of each with 90 % intervals.
+
+    Each is a design, or the name of a template, a design file, an output folder, or a row of a
+    sweep such as ``"out/1dof-5mm-sweep/sweep.csv:12"``. Figures are at ``pressures_kpa``, times at
+    ``flow_ml_min``. With ``out``, ``out/compare/compare.html`` is written, with pictures of both.
+    Raises DesignError, and OutputError.
+    """
+    designs = [
+        source if isinstance(source, Design) else load_compared(source)
+        for source in (first, second)
+    ]
+    names = [
+        source.name if isinstance(source, Design) else str(source) for source in (first, second)
+    ]
+    comparison = run_compare(
+        designs[0], designs[1], (names[0], names[1]), pressures_kpa, flow_ml_min
+    )
+    if out is not None:
+        write_page(comparison, Path(out))
+    return comparison
 
 
 def sweep(

@@ -33,6 +33,7 @@ SUMMARIES = {
     "simulate": "Inflate a design in an installed simulator.",
     "sweep": "Check and predict variants of a design.",
     "find": "Find the best design that meets requirements.",
+    "compare": "Compare two designs: what differs, what each reaches.",
     "record": "Record the results of builds, and report on them.",
     "reproduce": "Compare predictions with measurements.",
     "calibrate": "Fit the models to measurements.",

@@ -539,6 +539,40 @@ def _find() -> dict[str, Any]:
     )
 
 
+def _compare() -> dict[str, Any]:
+    def two(item: Mapping[str, Any]) -> dict[str, Any]:
+        return {**array(item), "minItems": 2, "maxItems": 2}
+
+    text_or_null = {"type": ["string", "null"]}
+    design = table(name=TEXT, source=TEXT, family=TEXT, design_sha256=TEXT, failed=array(TEXT))
+    rule = table(
+        rule=TEXT,
+        unit=TEXT,
+        verdicts=two(text_or_null),
+        margins={**two(number("null")), "description": "what is left to the limit"},
+    )
+    figure = table(
+        name=TEXT,
+        unit=TEXT,
+        main={"type": "boolean", "description": "whether the command prints it"},
+        differs=YES,
+        values=two(number("null")),
+        intervals={
+            **two({**array(number()), "type": ["array", "null"]}),
+            "description": "90 % intervals, where a calibration says so",
+        },
+        models=two(text_or_null),
+    )
+    found = table(
+        schema={"const": ids.COMPARE_SCHEMA},
+        designs=two(design),
+        keys=array(table(key=TEXT, values=two({}))),
+        rules=array(rule),
+        figures=array(figure),
+    )
+    return and_perhaps(found, folder=TEXT)
+
+
 # All formats.
 
 
@@ -573,6 +607,7 @@ FORMATS: Mapping[str, Format] = {
         _predict,
     ),
     "find": Format(ids.FIND_SCHEMA, "what `find --json` prints", _find),
+    "compare": Format(ids.COMPARE_SCHEMA, "what `compare --json` prints", _compare),
     "run": Format(
         ids.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`", _run
     ),

@@ -131,6 +131,21 @@ def picture_png(laminate: Laminate, stack: Stack, pose: Pose, wish: PictureReque
     return out.getvalue()
 
 
+def pictures_at_one_scale(
+    shown: Sequence[tuple[Laminate, Stack, Pose]], wish: PictureRequest
+) -> list[bytes]:
+    """Return a picture of each actuator with a caption as PNG, all seen from one place."""
+    every = [inflated(laminate, stack, pose) for laminate, stack, pose in shown]
+    surfaces = [part.surface for parts in every for part in parts]
+    pictures = []
+    for (laminate, stack, pose), parts in zip(shown, every, strict=True):
+        (image,) = _images([(pose, parts)], laminate, stack.calibration, wish, within=surfaces)
+        out = BytesIO()
+        image.save(out, "PNG", compress_level=9)
+        pictures.append(out.getvalue())
+    return pictures
+
+
 def animation(
     laminate: Laminate,
     stack: Stack,
@@ -208,11 +223,12 @@ def _images(
     calibration: str,
     wish: PictureRequest,
     progress: Callable[[int, int], None] | None = None,
+    within: Sequence[Surface] = (),
 ) -> list[Image]:
-    """All poses seen from one place at one scale."""
+    """All poses seen from one place at one scale, at which the surfaces ``within`` fit too."""
     width, height = wish.width, wish.height
     box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
-    every = [part.surface for _, parts in shown for part in parts]
+    every = [*within, *(part.surface for _, parts in shown for part in parts)]
     view = view_of(every, wish.elevation, wish.azimuth, box)
     most = max(max(pose.pressures) for pose, _ in shown)
     images = []

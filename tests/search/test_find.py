@@ -341,9 +341,8 @@ def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
     target.unlink()
     ended = CliRunner().invoke(app, [*asked, "--to", str(target)])
     low, high = said["intervals"]["height"]
-    assert (
-        f"height {row['median']:.4g} mm ({low:.3g} to {high:.3g}); at most 1.5 mm" in ended.output
-    )
+    shown = f"{low:.3g} to {high:.3g}"
+    assert f"height {row['median']:.4g} mm ({shown}); at most 1.5 mm" in ended.output
 
 
 def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:

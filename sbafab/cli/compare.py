@@ -1,0 +1,117 @@
+"""``sbafab compare``: two designs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from sbafab.cli.options import (
+    FLOW,
+    PRESSURE,
+    designs_or_folders,
+    json_option,
+    out_option,
+    set_option,
+)
+from sbafab.cli.printing import console, print_json, print_line, print_verdict
+from sbafab.cli.progress import shown_progress
+from sbafab.search.compare import (
+    PAGE,
+    PRESSURES,
+    DesignComparison,
+    load_compared,
+    margin_text,
+    reached_text,
+    value_text,
+    write_page,
+)
+from sbafab.search.compare import compare as compared
+
+
+@click.command()
+@click.argument("first", metavar="A", shell_complete=designs_or_folders)
+@click.argument("second", metavar="B", shell_complete=designs_or_folders)
+@click.option(
+    "--pressure",
+    "pressures",
+    type=PRESSURE.read,
+    multiple=True,
+    metavar="P",
+    help="Pressure of the figures, and the first of them of the pictures, kPa or with a unit. "
+    "Repeatable.  [default: 10]",
+)
+@click.option(
+    "--flow",
+    type=FLOW.read,
+    default="35 ml/min",
+    show_default=True,
+    metavar="Q",
+    help="Flow for the times, ml/min or with a unit.",
+)
+@out_option
+@set_option
+@json_option
+def compare(
+    first: str,
+    second: str,
+    pressures: tuple[float, ...],
+    flow: float,
+    out: Path,
+    assignments: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Compare two designs: what differs, what each reaches.
+
+    A and B are templates, design files, output folders, or rows of a sweep by number, such as
+    out/1dof-5mm-sweep/sweep.csv:12. OUT/compare/compare.html has pictures of both side by side.
+    """
+    designs = [load_compared(source, assignments) for source in (first, second)]
+    with shown_progress(as_json) as progress:
+        comparison = compared(
+            designs[0], designs[1], (first, second), pressures or PRESSURES, flow, progress
+        )
+        folder = write_page(comparison, out)
+    if as_json:
+        print_json({**comparison.as_dict(), "folder": str(folder)})
+        return
+    print_comparison(comparison)
+    keys, rules = len(comparison.keys), len(comparison.rules)
+    figures = sum(pair.differs for pair in comparison.figures)
+    print_verdict(
+        f"{comparison.names[0]} and {comparison.names[1]} differ in {_counted(keys, 'key')}, "
+        f"{_counted(rules, 'rule')} and {_counted(figures, 'figure')}. Written to {folder}: {PAGE}"
+    )
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def print_comparison(comparison: DesignComparison) -> None:
+    """Print keys and rules that differ, and the main figures of both designs."""
+    names = comparison.names
+    _print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
+    _print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
+    main = [
+        (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures))
+        for pair in comparison.figures
+        if pair.is_main
+    ]
+    _print_table("Figures, in parentheses the 90 % interval", names, main)
+
+
+def _print_table(title: str, names: tuple[str, str], rows: Sequence[tuple[str, ...]]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    if not rows:
+        return
+    print_line(title, "bold")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in ("", *names):
+        table.add_column(Text(name))
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console().print(table)

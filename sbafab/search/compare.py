@@ -1,0 +1,403 @@
+"""Two designs compared: keys, rules and predicted figures that differ, and a page with pictures."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import load_design, records
+from sbafab.design.files import Change, override, shown
+from sbafab.design.identity import design_sha256
+from sbafab.design.records import Design, keys_of, validated
+from sbafab.errors import DesignError, OutputError
+from sbafab.models.balloons import has_balloons
+from sbafab.models.drawn_pockets import model_form
+from sbafab.models.figures import Figure, PredictionRequest
+from sbafab.models.intervals import factors_of
+from sbafab.models.prediction import predict
+from sbafab.models.stack import stack
+from sbafab.output.checked import Checked, check
+from sbafab.output.schema_ids import COMPARE_SCHEMA
+from sbafab.output.swap import replace_text
+from sbafab.process import Progress, ignore_progress
+from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
+from sbafab.reports.solid_png import solid_png
+from sbafab.search.measure import RuleMargin, margins
+from sbafab.search.sweep import CSV, JOURNAL
+from sbafab.version import GENERATOR
+
+PRESSURES = (10.0,)
+"""kPa, unless others are asked for."""
+FOLDER, PAGE = "compare", "compare.html"
+TEMPLATE = "compare.html.j2"
+MAIN = re.compile(
+    r"outline diameter|deflated height|mass|reached diameter|free stroke at .*|full stroke"
+    r"|bend at .* in one chamber, .*|blocked force at .*, flat|time to .* at the pump, water .*"
+    r"|lateral tip stiffness .*, chambers shut"
+)
+"""Figures that a reader looks for first."""
+DIGITS = 4
+"""Figures that agree to so many digits do not differ."""
+SIZE = 640, 512
+"""Pixels of a picture."""
+_ROW = re.compile(r"(.+\.csv):(\d+)")
+
+
+@dataclass(frozen=True)
+class ComparedDesign:
+    """One of the two designs: ``source`` is what was given, ``rules`` the worst margin of each,
+    ``figures`` those to design with, and the stack's stiffness, which ``find`` knows.
+    """
+
+    source: str
+    checked: Checked
+    rules: Mapping[str, RuleMargin]
+    figures: tuple[Figure, ...]
+
+    @property
+    def design(self) -> Design:
+        return self.checked.design
+
+    @property
+    def failed(self) -> list[str]:
+        """Names of the rules that fail."""
+        return [rule.rule for rule in self.rules.values() if rule.verdict == "fail"]
+
+
+@dataclass(frozen=True)
+class KeyDifference:
+    """A key that differs, and its two values; None where a design has no such key."""
+
+    key: str
+    values: tuple[Any, Any]
+
+
+@dataclass(frozen=True)
+class RuleDifference:
+    """A rule whose verdict or margin differs; None where a design has no such finding."""
+
+    rule: str
+    margins: tuple[RuleMargin | None, RuleMargin | None]
+
+
+@dataclass(frozen=True)
+class FigurePair:
+    """A figure of both designs, in ``unit``; None where a design has none."""
+
+    name: str
+    unit: str
+    figures: tuple[Figure | None, Figure | None]
+
+    @property
+    def is_main(self) -> bool:
+        """True for figures that a reader looks for first."""
+        return MAIN.fullmatch(self.name) is not None
+
+    @property
+    def differs(self) -> bool:
+        first, second = self.figures
+        if first is None or second is None:
+            return True
+        return f"{first.value:.{DIGITS}g}" != f"{second.value:.{DIGITS}g}"
+
+
+@dataclass(frozen=True)
+class DesignComparison:
+    """Two designs, and what differs between them. Values stand in the order of ``designs``."""
+
+    designs: tuple[ComparedDesign, ComparedDesign]
+    keys: tuple[KeyDifference, ...]
+    rules: tuple[RuleDifference, ...]
+    figures: tuple[FigurePair, ...]
+    pressures_kpa: tuple[float, ...]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of the designs; where they are equal, names of the sources or, last, the sources."""
+        first, second = self.designs
+        names = first.design.name, second.design.name
+        files = Path(first.source).name, Path(second.source).name
+        for pair in (names, files):
+            if pair[0] != pair[1]:
+                return pair
+        return first.source, second.source
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of ``compare --json``."""
+        return {
+            "schema": COMPARE_SCHEMA,
+            "designs": [
+                {
+                    "name": each.design.name,
+                    "source": each.source,
+                    "family": each.design.family,
+                    "design_sha256": design_sha256(each.design),
+                    "failed": each.failed,
+                }
+                for each in self.designs
+            ],
+            "keys": [{"key": row.key, "values": list(row.values)} for row in self.keys],
+            "rules": [_rule_dict(row) for row in self.rules],
+            "figures": [_figure_dict(pair) for pair in self.figures],
+        }
+
+
+def _rule_dict(row: RuleDifference) -> dict[str, Any]:
+    return {
+        "rule": row.rule,
+        "unit": next(margin.unit for margin in row.margins if margin is not None),
+        "verdicts": [margin and margin.verdict for margin in row.margins],
+        "margins": [margin and margin.margin for margin in row.margins],
+    }
+
+
+def _figure_dict(pair: FigurePair) -> dict[str, Any]:
+    each = [figure.as_dict() if figure is not None else None for figure in pair.figures]
+    return {
+        "name": pair.name,
+        "unit": pair.unit,
+        "main": pair.is_main,
+        "differs": pair.differs,
+        "values": [figure and figure["value"] for figure in each],
+        "intervals": [figure and figure["interval"] for figure in each],
+        "models": [figure and figure["model"] for figure in each],
+    }
+
+
+def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:
+    """Return the design of a template, a design file, an output folder, or a row of a sweep such as
+    ``out/1dof-5mm-sweep/sweep.csv:12``. Raises DesignError where there is none.
+    """
+    row = _ROW.fullmatch(str(source))
+    if row is not None and not Path(source).exists():
+        return _swept(Path(row[1]), int(row[2])).with_(*changes)
+    path = Path(source)
+    file = path / "design.toml"
+    try:
+        is_output = path.is_dir() and file.is_file()
+    except (OSError, ValueError):
+        is_output = False
+    return load_design(file if is_output else source, changes)
+
+
+def _swept(table: Path, number: int) -> Design:
+    """Return the design of a row of a sweep by its number, from the journal beside the table."""
+    try:
+        with table.open(encoding="utf-8", newline="") as opened:
+            rows = [row for row in csv.DictReader(opened) if row.get("number") == str(number)]
+        if not rows or not rows[0].get("sha256"):
+            raise DesignError(f"{table} has no design of number {number}")
+        sha256 = rows[0]["sha256"]
+        keys = _journal_keys(table.with_name(JOURNAL), sha256)
+    except (OSError, UnicodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        message = f"{shown(table)} cannot be read: {reason}; name a sweep's {CSV}"
+        raise DesignError(message) from None
+    if keys is None:
+        journal = table.with_name(JOURNAL)
+        raise DesignError(f"{journal} has no design of number {number}; sweep again")
+    design = validated(override({}, [keys]), records(), table.parent)
+    if design_sha256(design) != sha256:
+        raise DesignError(
+            f"number {number} of {table} names files that are not beside it, or another version "
+            "measured it; compare its design file"
+        )
+    return design
+
+
+def _journal_keys(journal: Path, sha256: str) -> dict[str, Any] | None:
+    """Return the keys of a design in a sweep's journal; None where it is not there."""
+    with journal.open(encoding="utf-8") as opened:
+        for line in opened:
+            if sha256 not in line:
+                continue
+            try:
+                row = json.loads(line)["row"]
+                if row["sha256"] == sha256:
+                    return dict(row["keys"])
+            except (ValueError, KeyError, TypeError):
+                continue
+    return None
+
+
+def compare(
+    first: Design,
+    second: Design,
+    sources: tuple[str, str] = ("A", "B"),
+    pressures_kpa: Sequence[float] = PRESSURES,
+    flow_ml_min: float = PredictionRequest.flow_ml_min,
+    progress: Progress = ignore_progress,
+) -> DesignComparison:
+    """Return what differs between two designs. Raises DesignError where one cannot be built, and
+    for pressures (kPa) or a flow out of range.
+    """
+    request = PredictionRequest(tuple(pressures_kpa), flow_ml_min)
+    each = []
+    for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
+        progress(f"predicting {design.name}", number, 2)
+        checked = check(design)
+        prediction = predict(design, request, checked.laminate)
+        figures = tuple(
+            figure
+            for figure in prediction.figures
+            if not figure.other or (figure.interval and MAIN.fullmatch(figure.name))
+        )
+        each.append(ComparedDesign(source, checked, margins(checked.findings), figures))
+    designs = each[0], each[1]
+    return DesignComparison(
+        designs, tuple(_keys(designs)), tuple(_rules(designs)), tuple(_figures(designs)),
+        request.pressures_kpa,
+    )  # fmt: skip
+
+
+Two = tuple[ComparedDesign, ComparedDesign]
+
+
+def _keys(designs: Two) -> Iterable[KeyDifference]:
+    a, b = ({key: value for key, value, _ in keys_of(each.design)} for each in designs)
+    for key in dict.fromkeys([*a, *b]):
+        if key != "name" and a.get(key) != b.get(key):
+            yield KeyDifference(key, (a.get(key), b.get(key)))
+
+
+def _rules(designs: Two) -> Iterable[RuleDifference]:
+    a, b = (each.rules for each in designs)
+    for rule in dict.fromkeys([*a, *b]):
+        first, second = a.get(rule), b.get(rule)
+        if _verdict(first) != _verdict(second):
+            yield RuleDifference(rule, (first, second))
+
+
+def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
+    return None if margin is None else (margin.verdict, margin.margin)
+
+
+def _figures(designs: Two) -> Iterable[FigurePair]:
+    a, b = ({(row.name, row.unit): row for row in each.figures} for each in designs)
+    for name, unit in dict.fromkeys([*a, *b]):
+        yield FigurePair(name, unit, (a.get((name, unit)), b.get((name, unit))))
+
+
+# Words of the table and the page.
+
+
+NOTHING = "-"
+
+
+def value_text(value: object) -> str:
+    """Return the value of a key as people read it."""
+    if value is None:
+        return NOTHING
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def margin_text(margin: RuleMargin | None) -> str:
+    """Return verdict and margin of a rule."""
+    if margin is None:
+        return NOTHING
+    if margin.margin is None:
+        return margin.verdict
+    return f"{margin.verdict}, margin {margin.margin:.3g} {margin.unit}".rstrip()
+
+
+def reached_text(figure: Figure | None) -> str:
+    """Return a figure with its 90 % interval."""
+    if figure is None:
+        return NOTHING
+    return f"{figure.value:.4g}" + (f" ({figure.range})" if figure.range else "")
+
+
+# The page.
+
+
+@dataclass(frozen=True)
+class PicturePair:
+    """Pictures of both designs as data URIs, or the sentence that stands in place of one."""
+
+    title: str
+    pictures: tuple[str, str]
+    notes: tuple[str, str] = ("", "")
+
+
+def write_page(comparison: DesignComparison, out: Path) -> Path:
+    """Write ``out``/compare/compare.html beside an old one, swap it in, and return its folder.
+
+    Raises OutputError where it cannot be written.
+    """
+    page = compare_html(comparison)
+    folder = out / FOLDER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        replace_text(folder / PAGE, page)
+    except OSError as error:
+        raise OutputError(
+            f"{folder / PAGE} cannot be written: {error.strerror or error}; choose another folder "
+            "with -o"
+        ) from None
+    return folder
+
+
+def compare_html(comparison: DesignComparison) -> str:
+    """Return the whole page; style and pictures stand in it, nothing is fetched."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(TEMPLATE).render(
+        names=comparison.names,
+        designs=comparison.designs,
+        hashes=[design_sha256(each.design)[:12] for each in comparison.designs],
+        keys=[(row.key, *map(value_text, row.values)) for row in comparison.keys],
+        rules=[(row.rule, *map(margin_text, row.margins)) for row in comparison.rules],
+        figures=[
+            (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures), pair.differs)
+            for pair in sorted(comparison.figures, key=lambda pair: not pair.is_main)
+        ],
+        pictures=[_flat(comparison), _inflated(comparison)],
+        generator=GENERATOR,
+    )
+
+
+def _flat(comparison: DesignComparison) -> PicturePair:
+    first, second = (_uri(solid_png(each.checked.laminate, *SIZE)) for each in comparison.designs)
+    return PicturePair("Flat", (first, second))
+
+
+def _inflated(comparison: DesignComparison) -> PicturePair:
+    """Return pictures at one scale: chambers side by side with one filled, others with all."""
+    pressure = comparison.pressures_kpa[0]
+    bodies, notes = [], ["", ""]
+    for number, each in enumerate(comparison.designs):
+        design, laminate = each.design, each.checked.laminate
+        form = model_form(design)
+        if not has_balloons(form):
+            notes[number] = WHY
+            continue
+        try:
+            together = stack(design, laminate, factors=factors_of(design), form=form)
+            rest = together.chambers - 1
+            pose = together.pose((pressure, *(0.0,) * rest))
+        except DesignError as error:
+            notes[number] = str(error)
+            continue
+        bodies.append((laminate, together, pose))
+    wish = PictureRequest({}, width=SIZE[0], height=SIZE[1])
+    drawn = map(_uri, pictures_at_one_scale(bodies, wish))
+    first, second = ("" if note else next(drawn) for note in notes)
+    title = f"Inflated at {pressure:g} kPa, of chambers side by side one"
+    return PicturePair(title, (first, second), (notes[0], notes[1]))
+
+
+def _uri(png: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"
