@@ -16,6 +16,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
@@ -456,7 +457,8 @@ def _predict() -> dict[str, Any]:
         left_out=array(of(LeftOut)),
         relations=array(relation),
     )
-    return and_perhaps(found, failed=array(TEXT), folder=TEXT)
+    moved = of(SensitivityRow)
+    return and_perhaps(found, failed=array(TEXT), folder=TEXT, sensitivity=array(moved))
 
 
 def _counterpart() -> dict[str, Any]:
