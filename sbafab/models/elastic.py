@@ -48,10 +48,18 @@ ELASTIC = Model(
 )
 
 
+CALIBRATED_TRUST = (
+    "modulus, pockets, pressed thickness and delays as the calibration has them; what would be "
+    "measured lies in the interval with 90 %. Plates are rigid, carry no shear and no column "
+    "buckles; films lose no energy"
+)
+
+
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
     if factors.calibration:
-        return replace(model, name=f"{model.name}, calibration {factors.calibration}")
+        name = f"{model.name}, calibration {factors.calibration}"
+        return replace(model, name=name, trust=CALIBRATED_TRUST)
     factor_names = []
     if factors.press_factor != 1:
         factor_names.append(f"press factor {factors.press_factor:g}")
