@@ -119,7 +119,7 @@ class DesignComparison:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Names of the designs; where they are equal, names of the sources or, last, the sources."""
+        """Names of the designs; where they are equal those of the sources, or the sources."""
         first, second = self.designs
         names = first.design.name, second.design.name
         files = Path(first.source).name, Path(second.source).name
