@@ -62,6 +62,7 @@ class ComparedDesign:
 
     @property
     def design(self) -> Design:
+        """The design that was checked."""
         return self.checked.design
 
     @property
@@ -101,6 +102,7 @@ class FigurePair:
 
     @property
     def differs(self) -> bool:
+        """True where the values differ in the first DIGITS digits, or one is missing."""
         first, second = self.figures
         if first is None or second is None:
             return True
@@ -119,7 +121,7 @@ class DesignComparison:
 
     @property
     def names(self) -> tuple[str, str]:
-        """Names of the designs; where they are equal those of the sources, or the sources."""
+        """Names of the designs; where they are equal, of the sources, or these as given."""
         first, second = self.designs
         names = first.design.name, second.design.name
         files = Path(first.source).name, Path(second.source).name
@@ -237,6 +239,8 @@ def compare(
     """Return what differs between two designs. Raises DesignError where one cannot be built, and
     for pressures (kPa) or a flow out of range.
     """
+    if not pressures_kpa:
+        raise DesignError("pressures_kpa is empty; a comparison needs one pressure or more")
     request = PredictionRequest(tuple(pressures_kpa), flow_ml_min)
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
@@ -330,11 +334,10 @@ def write_page(comparison: DesignComparison, out: Path) -> Path:
 
     Raises OutputError where it cannot be written.
     """
-    page = compare_html(comparison)
     folder = out / FOLDER
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        replace_text(folder / PAGE, page)
+        replace_text(folder / PAGE, compare_html(comparison))
     except OSError as error:
         raise OutputError(
             f"{folder / PAGE} cannot be written: {error.strerror or error}; choose another folder "

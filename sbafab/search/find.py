@@ -74,8 +74,8 @@ class FindRequest:
     """Requirements and goal of a search, and the design it starts from.
 
     ``free`` are the keys it may change in place of the family's own, if any. ``optuna`` searches
-    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, above
-    0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
+    with Optuna; ``storage`` is Optuna's database, in which a search resumes. With ``sure``, a share
+    above 0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
     """
 
     design: Design

@@ -168,8 +168,8 @@ class Trial:
         return self.figures[requirement.quantity.label]
 
     def judged(self, requirement: Requirement) -> float:
-        """Return the value that is held against the limit: the end of the interval on its side,
-        where there is one.
+        """Return the value that is held against the limit, in its unit: the end of the interval on
+        its side, where there is one.
         """
         return judged(requirement, self.figures, self.intervals)
 

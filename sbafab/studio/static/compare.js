@@ -85,8 +85,12 @@ export function differences(studio) {
   const figures = new Map((reference.prediction?.figures ?? []).map((figure) => [named(figure), figure]));
   const moved = (prediction?.figures ?? []).filter((figure) => { const was = figures.get(named(figure)); return figure.design_with && was && significant(was.value) !== significant(figure.value); });
   if (moved.length) head("Prediction");
-  for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}${figure.measured ? ` (${figure.measured.sentence})` : ""}`, significant(figures.get(named(figure)).value), significant(figure.value));
+  for (const figure of moved) row(`${studio.family === "assembly" ? `${figure.group}: ` : ""}${figure.name}, ${figure.unit}${figure.measured ? ` (${figure.measured.sentence})` : ""}`, reached(figures.get(named(figure))), reached(figure));
   return el("table", { class: "figures" }, el("tbody", {}, ...rows));
+}
+// A figure with its 90 % interval.
+function reached({ value, interval }) {
+  return significant(value) + (interval ? ` (${interval.map((end) => significant(end)).join(" to ")})` : "");
 }
 // What each rule measured; one that measures several things, in their order.
 function verdicts(findings) {
