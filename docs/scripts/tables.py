@@ -1,6 +1,7 @@
 """Tables kept as CSV in docs/measured: read, written, summarised, and each shown whole on a page.
 
-``validation`` holds every figure of the paper beside its prediction, ``sensitivity`` the calibrated
+``validation`` holds every figure of the paper beside its prediction, ``calibrated`` those of the
+calibrated models with their intervals, ``sensitivity`` the calibrated
 forces with one assumption changed, ``balloons`` the elastic balloon beside CalculiX, ``faults`` what
 each rule says of each faulty folder. ``write`` makes the pages, which no sidebar lists.
 """
@@ -77,24 +78,17 @@ SHOWN = (
         "blocked force, 1-DoF, 75 % of stroke",
     ),
     ("3-DoF, 100 kPa, flat", "virtual work on Eq. 4", "blocked force, 3-DoF, flat"),
-    (
-        "3-DoF, 100 kPa, at 75 % of full stroke",
-        "virtual work on Eq. 4",
-        "blocked force, 3-DoF, 75 % of stroke",
-    ),
     ("3-DoF, 100 kPa, flat", "elastic stack", "blocked force, 3-DoF, flat"),
     (
         "3-DoF, 100 kPa, at 75 % of full stroke",
         "elastic stack",
         "blocked force, 3-DoF, 75 % of stroke",
     ),
-    ("3-DoF, 100 kPa, bent by 60 deg", "elastic stack, 2 chambers", "force when bent by 60 deg"),
     (
         "height of the 3-DoF of 15 balloons",
         "elastic stack, 10 kPa in the chambers",
         "height of the 3-DoF",
     ),
-    ("largest bend", "elastic stack, 10 kPa in one chamber", "largest bend"),
     ("largest bend", "elastic stack, 10 kPa in 2 chambers", "largest bend"),
     (
         "time to 10 kPa, water, 35 ml/min",
@@ -102,12 +96,24 @@ SHOWN = (
         "time to fill, water",
     ),
     ("time to 10 kPa, air, 2.5 l/min", "Eq. 4 over flow, squeezed to 10 kPa", "time to fill, air"),
-    (
-        "cantilever modulus, 3-DoF",
-        "E = F l^3 / (3 delta I), elastic stack at 10 kPa, chambers shut",
-        "lateral modulus, 3-DoF",
-    ),
     ("3-DoF of 15 balloons, deflated", "sum of the films", "deflated height of the 3-DoF"),
+)
+CALIBRATED = (
+    # Curve and place of the CSV, and the figure's name in the summary.
+    ("(force-1dof), height share 0", "blocked force, 1-DoF, flat"),
+    ("(force-1dof), height share 0.75", "blocked force, 1-DoF, 75 % of stroke"),
+    ("(force-3dof), height share 0", "blocked force, 3-DoF, flat"),
+    ("(force-3dof), height share 0.75", "blocked force, 3-DoF, 75 % of stroke"),
+    ("(force-bent), bend 60 deg", "force when bent by 60 deg"),
+    ("(flat-height)", "deflated height of the 3-DoF"),
+    ("(full-height)", "height of the 3-DoF"),
+    ("(largest-bend)", "largest bend"),
+    ("(stroke-10mm-water), volume 86 ul", "stroke of a balloon of d = 10, 86 ul of water"),
+    ("(time-water), pressure 10 kPa", "time to fill, water"),
+    ("(time-air), pressure 10 kPa", "time to fill, air"),
+    ("(bend-times), bend 89.7 deg", "time to bend by 89.7 deg, water"),
+    ("(modulus-3dof)", "lateral modulus, 3-DoF"),
+    ("(energy-1kpa), pressure 1 kPa", "pneumatic input work at 1 kPa, d = 10"),
 )
 
 
@@ -124,6 +130,17 @@ def validation_summary() -> Table:
         brief = model.replace("E = F l^3 / (3 delta I), ", "").split(", three chambers")[0]
         rows.append([name, cells[at("paper")], cells[at("predicted")], f"{share} %", brief])
     return Table(["figure", "paper", "predicted", "residual", "model"], rows)
+
+
+def calibrated_summary() -> Table:
+    """Return the paper's main figures beside the calibrated models and their intervals."""
+    every = table("calibrated")
+    shown = ("paper", "calibrated", "90 % interval", "inside")
+    rows = []
+    for ending, name in CALIBRATED:
+        (figure,) = (row[0] for row in every.rows if row[0].endswith(ending))
+        rows.append([name, *(every.cell(figure, column) for column in shown)])
+    return Table(["figure", *shown], rows)
 
 
 def balloons_summary() -> Table:
@@ -161,6 +178,7 @@ def sofa_summary() -> Table:
 
 SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
     ("validation", "summary"): validation_summary,
+    ("calibrated", "summary"): calibrated_summary,
     ("balloons", "summary"): balloons_summary,
     ("faults", "summary"): faults_summary,
     ("sofa", "summary"): sofa_summary,
@@ -169,6 +187,7 @@ SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
 
 TITLES = {
     "validation": ("Every figure of the paper beside its prediction", "validation"),
+    "calibrated": ("The paper's values beside the calibrated models", "validation"),
     "sensitivity": ("Calibrated forces with one assumption changed", "validation"),
     "balloons": ("The elastic balloon beside CalculiX", "prediction"),
     "faults": ("Every fault in every template", "faults"),

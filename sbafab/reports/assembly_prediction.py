@@ -415,9 +415,12 @@ def _arm(
 ) -> Iterator[AssemblyFigure]:
     """Height, reach, bend and load of an actuator with round pockets."""
     for figure in _figures_of_arm(placed, arm_stack, pressure, load_g):
-        named = _as_predicted(figure.name, pressure)
-        beside = counterpart(placed.made.design.form, *named, arm_stack.calibration)
-        yield figure._replace(measured=beside.sentence() if beside else "")
+        name, model = _as_predicted(figure.name, pressure)
+        calibration = arm_stack.calibration
+        beside = counterpart(placed.made.design.form, name, model, calibration)
+        # A calibration has a press factor, with which the flat height is near.
+        is_near = bool(calibration) and model == FLAT_HEIGHT_OF_FILMS
+        yield figure._replace(measured=beside.sentence() if beside and not is_near else "")
 
 
 def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
