@@ -12,7 +12,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.models.figures import Prediction
+from sbafab.models.figures import Figure, Prediction
 from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.solid_png import solid_png
 from sbafab.rules.finding import counted
@@ -22,6 +22,7 @@ PIXELS = (720, 540)
 FIGURES = (
     ("outline diameter", "across", 1),
     ("deflated height", "flat", 2),
+    ("free stroke at 10 kPa", "stroke at 10 kPa", 1),
     ("full stroke", "full stroke", 1),
     ("blocked force at 10 kPa, flat", "blocked force at 10 kPa", 2),
     ("blocked force at 10 kPa, flat, at most", "blocked force at 10 kPa at most", 2),
@@ -33,7 +34,7 @@ FIGURES = (
 
 NUMBERS = (
     ("outline diameter", "inflated diameter"),
-    ("full stroke", "deflated height"),
+    ("free stroke at 10 kPa", "full stroke", "deflated height"),
     (
         "bend at 10 kPa in one chamber, the others empty",
         "blocked force at 10 kPa, flat",
@@ -46,8 +47,9 @@ NUMBERS = (
 HEAD = """# Gallery
 
 Designs that pass every rule, drawn and predicted by the build of this site. Pictures show the flat actuator, heights
-enlarged as stated. How far each number is trusted: [prediction](../prediction.md). *Model / paper 1.58*: on the paper's own actuator the
-model gives 1.58 times the measured value. A range is the interval of a drawn pocket.
+enlarged as stated. How far each number is trusted: [prediction](../prediction.md). *Model / paper 1.33*: on the paper's own actuator the
+model gives 1.33 times the measured value. A range is the 90 % interval of what would be measured, or that of a drawn
+pocket.
 
 ## Templates
 
@@ -92,7 +94,7 @@ def _card(source: str, target: Path) -> str:
     text = path.read_text(encoding="utf-8")
     if isinstance(found, Design):
         prediction = sbafab.predict(found)
-        numbers = list(_numbers(prediction))
+        numbers = list(numbers_of(prediction))
         every = "; ".join(figures_of(prediction, found))
     else:
         assembled = sbafab.assemble(source)
@@ -117,9 +119,9 @@ def _card(source: str, target: Path) -> str:
 """
 
 
-def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
+def numbers_of(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
     """Yield the three numbers of an actuator, each with its interval or the model's known error."""
-    known = {figure.name: figure for figure in prediction.figures}
+    known = _to_design_with(prediction)
     called = {name: (words, digits) for name, words, digits in FIGURES}
     for choices in NUMBERS:
         figure = next((known[name] for name in choices if name in known), None)
@@ -135,6 +137,11 @@ def _numbers(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
             value += f" ({low:.{digits}f} to {high:.{digits}f})"
         aside = "" if figure.measured is None else f" (model / paper {figure.measured.ratio:.2f})"
         yield words, value, aside
+
+
+def _to_design_with(prediction: Prediction) -> dict[str, Figure]:
+    """Return the figures by name, each by the model to design with."""
+    return {figure.name: figure for figure in prediction.figures if not figure.other}
 
 
 def _counts(found: Assembly, assembled: Assembled) -> Iterator[tuple[str, str, str]]:
@@ -158,8 +165,9 @@ def _picture(found: Design | Assembly, source: str) -> bytes:
 def figures_of(found: Prediction, design: Design) -> Iterator[str]:
     """Key figures of a card, each with what the paper measured where the model is far off."""
     yield f"{len(sbafab.build(design).layers)} layers"
+    known = _to_design_with(found)
     for name, called, digits in FIGURES:
-        figure = next((one for one in found.figures if one.name == name), None)
+        figure = known.get(name)
         if figure is not None:
             unit = "degrees" if figure.unit == "deg" else figure.unit
             yield f"{called} {figure.value:.{digits}f} {unit} {figure.aside}".strip()

@@ -12,16 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from docs.scripts.tables import Table
-from sbafab.actuators import build, load_design
+from sbafab.actuators import load_design
 from sbafab.errors import DesignError
 from sbafab.models import paper
-from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
-from sbafab.models.balloons import balloons_of
+from sbafab.models.calibrated import load_calibration
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
 from sbafab.models.stack import Plate, Pose, Stack, stack
-from sbafab.reproduction.rows import FITTED
+from sbafab.reproduction.calibrated import PAPER
 
 COLUMNS = (
     "section",
@@ -35,21 +34,21 @@ COLUMNS = (
     "height, mm",
     "bend, deg",
 )
-OWN_LOSS = 0.18
-"""Pocket loss in mm that makes the flat 3-DoF's force right, in steps of 0.01."""
-STIFFER = 20.0
-"""MPa: twice the paper's modulus."""
 LEAN = 6.0
 """Degrees by which a force sensor might lean."""
 TALLER = 20.0
 """Full height in mm that 25 and 75 % might be of."""
-TOUCHING = 2e-3
-"""mm that stand for a balloon pressed flat."""
-STEPS = 8
-FARTHEST = 0.3
-LITTLE = 1e-3
-"""Steps of the fit: how many, by how much at most, and those that slopes are taken by."""
 MEASURED = (*paper.FORCE_3DOF, *(value for _, value in paper.FORCE_BENT))
+
+
+def calibrated() -> Factors:
+    """Return the factors of the shipped calibration."""
+    calibration = load_calibration(PAPER)
+    assert calibration is not None, "it ships"
+    return calibration.factors
+
+
+CALIBRATED = calibrated()
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class Variant:
     """
 
     name: str
-    factors: Factors = FITTED
+    factors: Factors = CALIBRATED
     neck: float = 0.0
     full: float = paper.FULL_HEIGHT.value
     pushing: int = 2
@@ -70,35 +69,28 @@ class Variant:
     all_push: bool = False
 
 
-def variants(fitted: Factors) -> tuple[Variant, ...]:
-    """What is looked at; ``fitted`` is what all forces of the 1-DoF ask for."""
-    less = replace(FITTED, pocket_loss=OWN_LOSS)
-    return (
-        Variant("calibrated, as above"),
-        Variant("laminate as thick as its films, 1.865 mm", replace(FITTED, press_factor=1.0)),
-        Variant(f"pockets {OWN_LOSS:g} mm smaller, as the flat 3-DoF asks", less),
-        Variant(f"films of {STIFFER:g} MPa", replace(FITTED, modulus_mpa=STIFFER)),
-        Variant(f"both: {OWN_LOSS:g} mm and {STIFFER:g} MPa", replace(less, modulus_mpa=STIFFER)),
-        Variant(
-            f"fitted to the three forces of the 1-DoF: {fitted.pocket_loss:g} mm and "
-            f"{fitted.modulus_mpa:g} MPa",
-            fitted,
-        ),
-        Variant("necks wider by as much as pockets are smaller", neck=FITTED.pocket_loss),
-        Variant(f"25 and 75 % of {TALLER:g} mm", full=TALLER),
-        Variant("bent: one chamber pushes", pushing=1),
-        Variant("bent: the tip slides on the plate", sticks=False),
-        Variant("bent by two chambers, then all three push", all_push=True),
-    )
+FIRST = "calibrated"
+DRAWN_FILM = replace(CALIBRATED, modulus_ratio=1.0)
+VARIANTS = (
+    Variant(FIRST),
+    Variant("laminate as thick as its films, 1.865 mm", replace(CALIBRATED, press_factor=1.0)),
+    Variant("pockets as drawn", replace(CALIBRATED, pocket_loss=0.0)),
+    Variant("films of 10 MPa, as bought", DRAWN_FILM),
+    Variant("necks wider by as much as pockets are smaller", neck=CALIBRATED.pocket_loss),
+    Variant(f"25 and 75 % of {TALLER:g} mm", full=TALLER),
+    Variant("bent: one chamber pushes", pushing=1),
+    Variant("bent: the tip slides on the plate", sticks=False),
+    Variant("bent by two chambers, then all three push", all_push=True),
+)
 
 
-def rows(fitted: Factors) -> Iterator[tuple[str, list[float]]]:
+def rows() -> Iterator[tuple[str, list[float]]]:
     """Of each variant its forces in N (flat, 25 and 75 %; bent by 30, 60 and 90 degrees), height in
     mm and bend in degrees with two chambers, both at 10 kPa; nan where there is no balance.
     """
     design = load_design("3dof-15mm")
     made: dict[tuple[Factors, float], Stack] = {}
-    for one in variants(fitted):
+    for one in VARIANTS:
         key = (one.factors, one.neck)
         if key not in made:
             made[key] = _wider(stack(design, factors=one.factors), one.neck)
@@ -146,36 +138,12 @@ def _free(found: Stack) -> Iterator[float]:
     yield found.pose((full, full, 0.0)).bend
 
 
-def fitted_modulus() -> Factors:
-    """Pocket loss (to 0.01 mm) and modulus (to 1 MPa) that fit all three forces of the 1-DoF best:
-    least squares of their relative errors, by Gauss and Newton.
-    """
-    design = load_design("1dof-5mm")
-    laminate = build(design)
-    full, flat = paper.FULL_HEIGHT.value, paper.FLAT_HEIGHT.value
-    heights = np.maximum(np.array(paper.HEIGHTS) * (full - flat) / paper.BALLOONS, TOUCHING)
-    wanted = np.array([value.value for value in paper.FORCE_1DOF])
-
-    def apart(x: np.ndarray) -> np.ndarray:
-        factors = replace(FITTED, pocket_loss=float(x[0]), modulus_mpa=math.exp(x[1]))
-        one = balloons_of(design, laminate, factors)[0]
-        return np.asarray(inflate(one, paper.FORCE_KPA, heights).force / 1000 / wanted - 1)
-
-    x = np.array([FITTED.pocket_loss, math.log(10.0)])
-    for _ in range(STEPS):
-        off = apart(x)
-        slopes = np.stack([(apart(x + step) - off) / LITTLE for step in LITTLE * np.eye(2)], 1)
-        x = x - np.clip(np.linalg.lstsq(slopes, off)[0], -FARTHEST, FARTHEST)
-    loss, modulus = round(float(x[0]), 2), round(math.exp(x[1]))
-    return replace(FITTED, pocket_loss=loss, modulus_mpa=float(modulus))
-
-
 def table() -> Table:
     """Return docs/measured/sensitivity.csv: the 3-DoF's variants, then the 1-DoF's."""
     wanted = [value.value for value in MEASURED]
     wanted += [paper.FULL_HEIGHT.value, paper.LARGEST_BEND.value]
     lines = [_cells("3-DoF", "**measured**", wanted)]
-    lines += [_cells("3-DoF", name, values) for name, values in rows(fitted_modulus())]
+    lines += [_cells("3-DoF", name, values) for name, values in rows()]
     wanted = [value.value for value in paper.FORCE_1DOF]
     lines.append(_cells("1-DoF, a column of six", "**measured**", wanted))
     lines += [_cells("1-DoF, a column of six", name, values) for name, values in column()]
@@ -192,13 +160,13 @@ def column() -> Iterator[tuple[str, list[float]]]:
     """Forces of a 1-DoF column of six in N: flat, at 25 and at 75 %."""
     design = load_design("1dof-5mm", ("stack.balloons=6",))
     full = paper.FULL_HEIGHT.value * 6 / paper.BALLOONS
-    soft = stack(design, factors=FITTED)
-    stiff = stack(design, factors=replace(FITTED, modulus_mpa=STIFFER))
-    yield "calibrated, as above", _straight(soft, full)
-    yield f"films of {STIFFER:g} MPa", _straight(stiff, full)
+    whole = stack(design, factors=CALIBRATED)
+    soft = stack(design, factors=DRAWN_FILM)
+    yield FIRST, _straight(whole, full)
+    yield "films of 10 MPa, as bought", _straight(soft, full)
     for sticks, words in ((True, "sticks"), (False, "slides")):
         name = f"the plate leans by {LEAN:g} degrees, the tip {words}"
-        yield name, [_straight(soft, full)[0], *_leaning(soft, full, sticks)]
+        yield name, [_straight(whole, full)[0], *_leaning(whole, full, sticks)]
 
 
 def _leaning(found: Stack, full: float, sticks: bool) -> Iterator[float]:

@@ -1,22 +1,33 @@
-"""Writes docs/measured/validation.csv and sensitivity.csv: python -m docs.scripts.validate"""
+"""Writes docs/measured/validation.csv, calibrated.csv and sensitivity.csv:
+python -m docs.scripts.validate
+"""
 
 from __future__ import annotations
 
 from docs.scripts import measured, sensitivity
 from docs.scripts.tables import FOLDER, Table, markdown_rows
+from sbafab.reproduction import calibrated
+from sbafab.reproduction.calibrated import TITLE
 from sbafab.reproduction.page import page
 
 PATH = FOLDER / "validation.csv"
 COLUMNS = ("section", "figure", "paper", "where", "predicted", "residual", "model", "why")
 
 
-def validation() -> Table:
-    """Return every figure of the paper beside its prediction, as `sbafab reproduce` writes them."""
-    return Table(COLUMNS, [row for row in markdown_rows(page()) if len(row) == len(COLUMNS)])
+def validation() -> tuple[Table, Table]:
+    """Return every figure of the paper beside its prediction, and the values beside the calibrated
+    models, as `sbafab reproduce` writes them.
+    """
+    rows = list(markdown_rows(page()))
+    return (
+        Table(COLUMNS, [row for row in rows if row[0] != TITLE and len(row) == len(COLUMNS)]),
+        Table(calibrated.COLUMNS, [row[1:] for row in rows if row[0] == TITLE]),
+    )
 
 
 if __name__ == "__main__":
-    PATH.write_text(validation().csv, encoding="utf-8", newline="\n")
-    text = sensitivity.table().csv
-    PATH.with_name("sensitivity.csv").write_text(text, encoding="utf-8", newline="\n")
+    names = ("validation", "calibrated", "sensitivity")
+    for name, table in zip(names, (*validation(), sensitivity.table()), strict=True):
+        path = PATH.with_name(f"{name}.csv")
+        path.write_text(table.csv, encoding="utf-8", newline="\n")
     measured.main()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -326,8 +327,20 @@ def _chambers(count: int, counts: list[int]) -> str:
 
 
 def _strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    is_whole = curve.setup.chambers in (None, of.design.form.stacks)
+    if is_whole and curve.x_name != "volume_ul" and not of.shares_maps:
+        return _free_strokes(of, curve)
     flat = of.stack.flat_height if curve.quantity == "stroke_mm" else 0.0
     return _risen(of, curve, lambda pose: pose.height - flat)
+
+
+def _free_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues:
+    """Return strokes or heights with one pressure in all chambers, by the balloons themselves."""
+    kinds = Counter(balloons_of(of.design, of.laminate, of.factors))
+    flat = 0.0 if curve.quantity == "stroke_mm" else of.actuator.thickness
+    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
+    series = _by_pressure(curve, lambda p: flat + elastic.free_rise(kinds, p).stroke)
+    return ModelValues(model, series)
 
 
 def _bends(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:

@@ -16,6 +16,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
@@ -281,11 +282,21 @@ def _reproduction() -> dict[str, Any]:
         model=TEXT,
         why=TEXT,
     )
-    found = table(schema={"const": ids.REPRODUCTION_SCHEMA}, rows=array(row))
+    calibrated = table(
+        calibration=TEXT,
+        held_out=table(points=number(), inside=number()),
+        discrepancy={
+            "type": "object",
+            "additionalProperties": number(),
+            "description": "relative standard deviation that the models miss, by group",
+        },
+        curves=array(_compared_curve()),
+    )
+    found = table(schema={"const": ids.REPRODUCTION_SCHEMA}, rows=array(row), calibrated=calibrated)
     return and_perhaps(found, folder=TEXT)
 
 
-def _comparison() -> dict[str, Any]:
+def _compared_curve() -> dict[str, Any]:
     ends = {"type": ["array", "null"], "items": number(), "minItems": 2, "maxItems": 2}
     point = table(
         x=number("null"),
@@ -293,10 +304,10 @@ def _comparison() -> dict[str, Any]:
         error={**number("null"), "description": "standard error"},
         model={**ends, "description": "least and largest over the assumptions"},
         deviation={**ends, "description": "model minus measured"},
-        interval=ends,
+        interval={**ends, "description": "90 % interval of the measured value"},
         within={"type": ["boolean", "null"]},
     )
-    curve = table(
+    return table(
         **dict.fromkeys(("source", "curve", "quantity", "unit", "place", "x_name"), TEXT),
         comparable=YES,
         reason=TEXT,
@@ -306,9 +317,15 @@ def _comparison() -> dict[str, Any]:
         no_model=TEXT,
         points=array(point),
     )
+
+
+def _comparison() -> dict[str, Any]:
     source = table(id=TEXT, citation=TEXT, doi=TEXT, missing=array(TEXT))
     return table(
-        schema={"const": ids.COMPARISON_SCHEMA}, sources=array(source), curves=array(curve)
+        schema={"const": ids.COMPARISON_SCHEMA},
+        calibration={**TEXT, "description": "name of the models' calibration, or none"},
+        sources=array(source),
+        curves=array(_compared_curve()),
     )
 
 
@@ -456,7 +473,8 @@ def _predict() -> dict[str, Any]:
         left_out=array(of(LeftOut)),
         relations=array(relation),
     )
-    return and_perhaps(found, failed=array(TEXT), folder=TEXT)
+    moved = of(SensitivityRow)
+    return and_perhaps(found, failed=array(TEXT), folder=TEXT, sensitivity=array(moved))
 
 
 def _counterpart() -> dict[str, Any]:

@@ -38,6 +38,7 @@ from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import LEFT_OUT, Figure, Model, Prediction, PredictionRequest
 from sbafab.models.formulas import size_phrases
 from sbafab.models.prediction import predict as predicted
+from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
 from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
 from sbafab.reports.assembly_prediction import AssemblyPrediction, as_json, predict_assembly
@@ -46,7 +47,7 @@ from sbafab.runs.run import RunRequest, generate
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
 
-ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa")
+ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
 """Options of the model of elastic balloons alone."""
 FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
 """Options of formulas that need round or oblong pockets."""
@@ -103,6 +104,11 @@ FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
     metavar="G",
     help="Assemblies: mass at the tips, g; the default is the paper's marble.",
 )
+@click.option(
+    "--sensitivity",
+    is_flag=True,
+    help="Add by how much 1 % of a key moves stroke and bend; takes some seconds.",
+)
 @click.option("-v", "--verbose", is_flag=True, help="All figures, with their models and validity.")
 def predict(
     request: Request,
@@ -110,6 +116,7 @@ def predict(
     flow: float,
     volumes: tuple[float, ...],
     load_g: float,
+    sensitivity: bool,
     verbose: bool,
     **factors: Any,
 ) -> None:
@@ -141,14 +148,22 @@ def predict(
             if not request.as_json:
                 print_prediction(prediction, verbose)
             raise
+        rows = []
+        if sensitivity:
+            progress("sensitivity", 0, 1)
+            rows = sensitivity_table(design, wish.pressures_kpa[0])
     failed = sorted({finding.rule for finding in run.findings if finding.verdict == "fail"})
     if request.as_json:
-        print_json(
-            {**prediction_json(design, prediction), "failed": failed, "folder": str(run.folder)}
-        )
+        document = prediction_json(design, prediction)
+        if sensitivity:
+            document["sensitivity"] = [row._asdict() for row in rows]
+        print_json({**document, "failed": failed, "folder": str(run.folder)})
     else:
-        print_listed("size", size_phrases(design, run.laminate))
+        pressed = prediction.asked.factors.press_factor
+        print_listed("size", size_phrases(design, run.laminate, pressed))
         print_prediction(prediction, verbose)
+        if sensitivity:
+            _print_sensitivity(rows, wish.pressures_kpa[0])
         if not run.failed:
             details = "" if verbose else " Details: -v"
             print_verdict(
@@ -161,6 +176,14 @@ def predict(
             "was written. Change the design or waive the rule by name"
         )
         click.get_current_context().exit(RULE_FAILED)
+
+
+def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:
+    """Print by how much 1 % more of each key moves stroke and bend."""
+    print_line(f"\nat {pressure:g} kPa 1 % more of     moves the free stroke    the bend")
+    for row in rows:
+        bend = "" if row.bend is None else f"{row.bend:+.2f} %"
+        print_line(f"{row.key:<26} {row.stroke:>+20.2f} % {bend:>11}".rstrip())
 
 
 def _refuse_for_design(design: Design) -> None:
@@ -254,7 +277,8 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
     A name that begins like the one above it, up to a comma, has blanks in place of that part.
     """
     unit = max((len(figure.unit) for figure in figures), default=0)
-    room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - 4)
+    spans = max((len(figure.range) + 4 for figure in figures if figure.interval), default=0)
+    room = min(NAME_WIDTH, width - VALUE_WIDTH - unit - spans - 4)
     for group in dict.fromkeys(figure.group for figure in figures):
         for number, model in enumerate(models, start=1):
             members = [f for f in figures if f.group == group and f.model == model]
@@ -262,10 +286,13 @@ def figure_lines(figures: Sequence[Figure], models: Sequence[Model], width: int)
                 yield f"{group}: {model.name} [{number}]"
             previous = ""
             for figure in members:
-                head, comma, _ = figure.name.partition(", ")
+                head, comma, rest = figure.name.partition(", ")
                 name = figure.name
+                if comma and head != previous and len(name) > room >= len(head):
+                    yield f"  {head},"
+                    previous = head
                 if comma and head == previous:
-                    name = " " * (len(head) + 2) + name.removeprefix(f"{head}, ")
+                    name = " " * max(min(len(head) + 2, room - len(rest)), 2) + rest
                 previous = head
                 *over, last = textwrap.wrap(name, room, subsequent_indent="  ") or [name]
                 yield from (f"  {line}" for line in over)

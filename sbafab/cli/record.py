@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -337,12 +338,18 @@ def _advice(report: Report) -> Iterable[str]:
             )
     for compared in report.comparisons:
         factor, most = FACTORS.get(compared.quantity, ("", 0.0))
-        ratio = compared.ratio
-        if factor and ratio and ratio <= most and compared.verdict == "differs":
+        value = (compared.ratio or 0.0) * _predicted_factor(compared)
+        if factor and 0 < value <= most and compared.verdict == "differs":
             yield (
-                f"{compared.design}: sbafab predict {factor} {ratio:.3f} uses the measured "
+                f"{compared.design}: sbafab predict {factor} {value:.3f} uses the measured "
                 f"{compared.quantity}"
             )
+
+
+def _predicted_factor(compared: Comparison) -> float:
+    """Return the press factor that a prediction has in it already; 1 without one."""
+    found = re.search(r" x press factor ([\d.]+)", compared.model)
+    return float(found[1]) if found else 1.0
 
 
 def _print_table(title: str, names: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

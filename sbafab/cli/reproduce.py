@@ -10,9 +10,11 @@ import click
 from sbafab.cli.options import json_option, out_option
 from sbafab.cli.printing import print_json, print_verdict
 from sbafab.evidence.files import shipped_evidence
+from sbafab.models.calibrated import load_calibration
 from sbafab.reproduction import page
+from sbafab.reproduction.calibrated import PAPER, TITLE
 from sbafab.reproduction.comparison import as_json as as_document
-from sbafab.reproduction.comparison import compare, table_lines
+from sbafab.reproduction.comparison import compare, compare_calibrated, table_lines
 from sbafab.results.evidence import load_source
 
 if TYPE_CHECKING:
@@ -24,42 +26,63 @@ ALL = "all"
 
 @click.command()
 @click.argument("source", required=False)
+@click.option(
+    "--calibration",
+    metavar="NAME",
+    help="Calibration of the models beside SOURCE: one that ships, a file of calibrate, or none.  "
+    "[default: paper]",
+)
 @out_option
 @json_option
-def reproduce(source: str | None, out: Path, as_json: bool) -> None:
+def reproduce(source: str | None, calibration: str | None, out: Path, as_json: bool) -> None:
     """Compare predictions with measurements.
 
     Without SOURCE: OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for
-    each predicted figure of the paper, with its error bars.
+    each predicted figure of the paper, with its error bars. All values stand beside the models of
+    films as drawn and bought, and those that were calibrated on also beside the calibrated models.
 
     SOURCE is evidence that ships (paper, pneudots, ...), "all" of it, a file of your own (.toml or
     .csv), or the lab's build records (.sqlite): its curves are printed beside the models, and
-    nothing is written. A range of a model spans what the source leaves open.
+    nothing is written. Ranges of model and 90 % interval span what the source leaves open.
     """
     if source is not None:
-        _print_comparison(source, as_json)
+        _print_comparison(source, calibration or PAPER, as_json)
         return
-    sections = page.reproduce(out / FOLDER)
+    if calibration is not None:
+        raise click.UsageError("--calibration goes with a SOURCE")
+    sections, calibrated = page.reproduce(out / FOLDER)
     if as_json:
-        print_json({**page.as_json(sections), "folder": str(out / FOLDER)})
+        document = page.as_json(sections, calibrated)
+        print_json({**document, "folder": str(out / FOLDER)})
         return
     for section, rows in sections.items():
         click.echo(f"\n{section}")
         for row in rows:
             click.echo(f"  {row.figure:<58}{_measured(row):>20}{_predicted(row):>16}  {row.model}")
+    click.echo(f"\n{TITLE}")
+    for line in table_lines(calibrated.curves):
+        click.echo(f"  {line}")
     rows = [row for section in sections.values() for row in section]
     predicted = sum(row.predicted is not None for row in rows)
     print_verdict(
-        f"\nPaper reproduced: {predicted} of {len(rows)} values predicted. Written to "
+        f"\nPaper reproduced: {predicted} of {len(rows)} values predicted; "
+        f"{calibrated.summary}. Written to "
         f"{out / FOLDER}: reproduction.md, reproduction.json, charts"
     )
 
 
-def _print_comparison(source: str, as_json: bool) -> None:
+def _print_comparison(source: str, name: str, as_json: bool) -> None:
+    calibration = load_calibration(name, key="--calibration")
     evidences = shipped_evidence() if source == ALL else (load_source(source),)
-    curves = [curve for evidence in evidences for curve in compare(evidence)]
+    curves = [
+        curve
+        for evidence in evidences
+        for curve in (
+            compare_calibrated(evidence, calibration) if calibration else compare(evidence)
+        )
+    ]
     if as_json:
-        print_json(as_document(evidences, curves))
+        print_json(as_document(evidences, curves, name))
         return
     for evidence in evidences:
         click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))
@@ -70,8 +93,11 @@ def _print_comparison(source: str, as_json: bool) -> None:
         click.echo()
     points = [point for curve in curves for point in curve.points]
     predicted = sum(point.model is not None for point in points)
+    bounded = [point for point in points if point.is_within is not None]
+    inside = sum(point.is_within is True for point in bounded)
     print_verdict(
         f"{source} compared: {predicted} of {len(points)} values in {len(curves)} curves predicted"
+        + (f", {inside} of {len(bounded)} in their 90 % intervals" if bounded else "")
     )
 
 

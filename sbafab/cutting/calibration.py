@@ -584,5 +584,8 @@ def _size(text: str, column: str, where: str) -> float:
         )
     size = float(text.replace(",", "."))
     if not 0 < size <= LONGEST:
-        raise DesignError(f"{where}: {column} is {text[:40]}; it must be a size in mm above 0")
+        raise DesignError(
+            f"{where}: {column} is {text[:40]}; it must be a size in mm, above 0 and at most "
+            f"{LONGEST:g}"
+        )
     return size

@@ -200,7 +200,7 @@ class BalloonMap:
         first = x.astype(np.int_)
         powers = (x - first)[..., None] ** POWERS
         weights = np.zeros_like(powers)
-        bend = rate * p / (p * p + P0 * P0)
+        bend = rate * p / (p * p + self.scale_pressure**2)
         weights[..., 1:] = powers[..., :-1] * POWERS[1:] * bend[..., None]
         weights[..., 2:] -= powers[..., :-2] * POWERS[2:] * POWERS[1:-1] * (rate * rate)[..., None]
         slopes = weights[..., None, :] @ self._polynomials[first]

@@ -151,15 +151,17 @@ def shipped_names() -> list[str]:
     return sorted(path.name[:-5] for path in folder.iterdir() if path.name.endswith(".toml"))
 
 
-def load_calibration(name: object, folder: Path | None = None) -> ModelCalibration | None:
-    """Return the calibration of a name, or of a file in ``folder``; None for "none".
+def load_calibration(
+    name: object, folder: Path | None = None, key: str = "models.calibration"
+) -> ModelCalibration | None:
+    """Return the calibration of a name, or of a file in ``folder``; None for "none". ``key`` is
+    what gives the name.
 
     Raises DesignError with one sentence for an unknown name or a faulty file.
     """
     if not isinstance(name, str):
         raise DesignError(
-            f"models.calibration = {shown(name)} must be a text in quotes: a calibration's name or "
-            "its file"
+            f"{key} = {shown(name)} must be a text in quotes: a calibration's name or its file"
         )
     if name == NONE:
         return None
@@ -172,9 +174,10 @@ def load_calibration(name: object, folder: Path | None = None) -> ModelCalibrati
         is_there = False
     if not is_there:
         raise DesignError(
-            f'models.calibration = {shown(name)} is neither "none", nor one that ships '
-            f"({', '.join(shipped_names())}), nor a file beside the design; sbafab calibrate "
-            "writes one"
+            f'{key} = {shown(name)} is neither "none", nor one that ships '
+            f"({', '.join(shipped_names())}), nor a file"
+            + (" beside the design" if folder else "")
+            + "; sbafab calibrate writes one"
         )
     return read_calibration(path)
 

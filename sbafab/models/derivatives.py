@@ -30,8 +30,8 @@ from sbafab.models.stack_loads import (
 
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
-    from sbafab.models.stack import Pose, Stack
     from sbafab.models.stack_loads import Chain, Load, LoadedEnergy, Springs
+    from sbafab.models.stack_poses import Pose, PosedStack
 
 RIGID = 1e-9
 """Share of the largest compliance below which a motion of the tip counts as impossible."""
@@ -134,7 +134,7 @@ class Linearised(NamedTuple):
 
 
 def derivatives(
-    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
+    stack: PosedStack, pose: Pose, load: Load | None = None, sucked: bool = False
 ) -> Derivatives:
     """Return the derivatives of a pose of a stack under the load that it was found with. Raises
     DesignError for a pose that is about to buckle.
@@ -161,7 +161,7 @@ def derivatives(
 
 
 def linearised(
-    stack: Stack, pose: Pose, load: Load | None = None, sucked: bool = False
+    stack: PosedStack, pose: Pose, load: Load | None = None, sucked: bool = False
 ) -> Linearised:
     """Return a stack linearised about a pose under the load that it was found with."""
     springs = stack.springs(pose.pressures, sucked)
@@ -223,7 +223,9 @@ def tip_motion(plates: Chain, motions: Array) -> Array:
     return np.concatenate([moves, turns], axis=-1).transpose(2, 0, 1)
 
 
-def _swelling(stack: Stack, pose: Pose, springs: Springs, freedoms: Array, sucked: bool) -> Array:
+def _swelling(
+    stack: PosedStack, pose: Pose, springs: Springs, freedoms: Array, sucked: bool
+) -> Array:
     """Return ul of each chamber by its own pressure with all plates held: (chambers,)."""
     slopes = np.stack([kind.volume_slopes(pose.pressures, sucked) for kind in stack.maps])
     table = slopes.reshape(-1, DEGREE + 1).T / RING_POINTS

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -48,10 +48,18 @@ ELASTIC = Model(
 )
 
 
+CALIBRATED_TRUST = (
+    "modulus, pockets, pressed thickness and delays as the calibration has them; what would be "
+    "measured lies in the interval with 90 %. Plates are rigid, carry no shear and no column "
+    "buckles; films lose no energy"
+)
+
+
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
     if factors.calibration:
-        return replace(model, name=f"{model.name}, calibration {factors.calibration}")
+        name = f"{model.name}, calibration {factors.calibration}"
+        return replace(model, name=name, trust=CALIBRATED_TRUST)
     factor_names = []
     if factors.press_factor != 1:
         factor_names.append(f"press factor {factors.press_factor:g}")
@@ -80,14 +88,16 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
     for row, pressure in enumerate(request.pressures_kpa):
         at = f"at {pressure:g} kPa"
         try:
-            stroke, volume, stored = _risen(kinds, pressure, together[row] if together else None)
+            rise = free_rise(kinds, pressure, together[row] if together else None)
         except DesignError as error:
             yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
             continue
-        yield Figure("stroke", f"free stroke {at}", stroke, "mm", model)
-        yield Figure("stroke", f"free height {at}", actuator.thickness + stroke, "mm", model)
-        yield Figure("stroke", f"volume a balloon {at}", volume / actuator.balloons, "ul", model)
-        work = stored * actuator.form.stacks / 1000
+        height = actuator.thickness + rise.stroke
+        volume = rise.volume / actuator.balloons
+        yield Figure("stroke", f"free stroke {at}", rise.stroke, "mm", model)
+        yield Figure("stroke", f"free height {at}", height, "mm", model)
+        yield Figure("stroke", f"volume a balloon {at}", volume, "ul", model)
+        work = rise.energy * actuator.form.stacks / 1000
         yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
 
 
@@ -103,11 +113,21 @@ def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Infl
     ]
 
 
-def _risen(
-    kinds: Counter[Balloon], pressure: float, shapes: Inflated | None
-) -> tuple[float, float, float]:
-    """Return stroke (mm), air (ul) and energy (uJ, to 3 % the integral of p dV) of one stack."""
-    stroke = volume = stored = 0.0
+class Rise(NamedTuple):
+    """Rise of one free stack of balloons: ``stroke`` in mm, ``volume`` in ul, and the ``energy`` in
+    its films in uJ, to 3 % the integral of p dV.
+    """
+
+    stroke: float
+    volume: float
+    energy: float
+
+
+def free_rise(kinds: Counter[Balloon], pressure: float, shapes: Inflated | None = None) -> Rise:
+    """Return the rise of so many balloons of each kind at a pressure in kPa; ``shapes`` are theirs
+    where they are known. Raises DesignError where a film would be stretched too far.
+    """
+    stroke = volume = energy = 0.0
     for kind, count in kinds.items():
         shape = shapes[kind] if shapes else free_shapes(kind, pressure)
         longer = float(stretch(kind, shape)[0])
@@ -118,8 +138,8 @@ def _risen(
             )
         stroke += count * float(shape.height[0])
         volume += count * float(shape.volume[0])
-        stored += count * float(shape.energy[0])
-    return stroke, volume, stored
+        energy += count * float(shape.energy[0])
+    return Rise(stroke, volume, energy)
 
 
 # The elastic stack: forces, bending, time, stiffness.

@@ -175,26 +175,29 @@ def second_moments(region: Region) -> tuple[float, float]:
 # Overall sizes, each with the paper's figure.
 
 
-def sizes(design: Design, laminate: Laminate) -> dict[str, float]:
+def sizes(design: Design, laminate: Laminate, press_factor: float = 1.0) -> dict[str, float]:
     """Return sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
 
     Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
-    that of the films without tabs and ears.
+    that of the films without tabs and ears. ``press_factor`` is the films' thickness after the
+    press over that before; the laminate is in diameters round the tube twice.
     """
+    thickness = laminate.thickness * press_factor
+    thinner = 2 * (laminate.thickness - thickness)
     low_x, low_y, high_x, high_y = laminate.bounds
     sizes_mm = {
-        "thickness": laminate.thickness,
+        "thickness": thickness,
         "width": high_x - low_x,
         "length": high_y - low_y,
     }
     form = design.form
     if form.wrap is not None:
         sizes_mm["pitch"] = form.wrap.pitch
-        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, laminate)
+        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, laminate) - thinner
         reached, inflated = reached_diameter(form, laminate), inflated_diameter(form, laminate)
         if reached is not None and inflated is not None:
-            sizes_mm["reached_diameter"] = reached
-            sizes_mm["inflated_diameter"] = inflated
+            sizes_mm["reached_diameter"] = reached - thinner
+            sizes_mm["inflated_diameter"] = inflated - thinner
     else:
         if not laminate.outline.is_empty:
             sizes_mm["outline_diameter"] = outline_diameter(laminate)
@@ -238,12 +241,13 @@ def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None
     return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
 
 
-def size_phrases(design: Design, laminate: Laminate) -> tuple[str, ...]:
+def size_phrases(design: Design, laminate: Laminate, press_factor: float = 1.0) -> tuple[str, ...]:
     """Return the size in phrases: overall diameter, outline diameter, flat extent, and height.
 
-    Films flow in the press: beside the height stands the paper's measured one.
+    Films flow in the press: ``press_factor`` is their thickness after it over that before. Beside
+    the sum of the films stands the paper's measured height.
     """
-    sizes_mm = sizes(design, laminate)
+    sizes_mm = sizes(design, laminate, press_factor)
     phrases = []
     if "overall_diameter" in sizes_mm:
         over = beyond_the_outline(laminate)
@@ -255,6 +259,8 @@ def size_phrases(design: Design, laminate: Laminate) -> tuple[str, ...]:
     form = design.form
     flat = "flat, " if form.wrap is not None else ""
     phrases.append(f"{flat}{sizes_mm['width']:.2f} x {sizes_mm['length']:.2f} mm")
-    row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
-    height = f"folded height {laminate.thickness:.3f} mm"
-    return (*phrases, f"{height} {row.brief}" if row else height)
+    height = f"folded height {sizes_mm['thickness']:.3f} mm"
+    if press_factor == 1:
+        row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
+        height += f" {row.brief}" if row else ""
+    return (*phrases, height)

@@ -25,7 +25,14 @@ def calibration_of(design: Design) -> ModelCalibration | None:
     1, as uncertain as the prior has it. Raises DesignError where there is no such calibration.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
-    if calibration is None or design.films.tpe.product == calibration.film:
+    return None if calibration is None else for_film(calibration, design.films.tpe.product)
+
+
+def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
+    """Return a calibration as it holds for a film; for another one than the evidence's the modulus
+    ratio is 1, as uncertain as the prior has it.
+    """
+    if product == calibration.film:
         return calibration
     mean = list(calibration.mean)
     covariance = [list(row) for row in calibration.covariance]
@@ -85,21 +92,22 @@ class Uncertainty:
         group: str,
         value_at: Callable[[Factors], float],
         share: float = SHARE,
-        fluid: str = "",
+        delay: str = "",
     ) -> tuple[float, tuple[float, float]]:
         """Return a value at the median, and the interval that holds what would be measured with a
-        probability of ``share``; ``value_at`` gives the value with other factors. A time has the
-        delay of its ``fluid`` in it.
+        probability of ``share``; ``value_at`` gives the value with other factors. A time that holds
+        a delay names the delay's field.
         """
         value = value_at(self.factors)
         moved = [
             (change, value if change == 0 else value_at(factors))
             for change, factors in self.shifted()
         ]
-        is_log = min(value, *(each for _, each in moved)) > 0
+        is_log = _is_log(value, [each for _, each in moved])
         slopes = [_slope(value, each, change, is_log) for change, each in moved]
-        slopes += self._delay_slopes(value, fluid)
-        return value, self.calibration.interval(group, value, slopes, is_log, share)
+        slopes += self._delay_slopes(value, delay)
+        low, high = self.calibration.interval(group, value, slopes, is_log, share)
+        return value, (max(low, 0.0) if value >= 0 else low, high)
 
     def bounded(
         self, items: Items, evaluated: Callable[[Factors], Items]
@@ -126,28 +134,29 @@ class Uncertainty:
         present = [value for value in values if value is not None]
         if len(present) < len(values) or not all(map(math.isfinite, present)):
             return figure
-        is_log = figure.value > 0 and min(present) > 0 and not figure.name.startswith(CLEARANCES)
+        is_log = _is_log(figure.value, present) and not figure.name.startswith(CLEARANCES)
         slopes = [
             _slope(figure.value, value, change, is_log)
             for value, (change, _) in zip(present, moved, strict=True)
         ]
-        fluid = next((fluid for fluid in DELAYS if fluid in figure.name), "")
-        slopes += self._delay_slopes(figure.value, fluid if figure.unit == "s" else "")
+        fluid = next((name for name in DELAYS if name in figure.name), "")
+        delay = DELAYS[fluid] if fluid and figure.unit == "s" else ""
+        slopes += self._delay_slopes(figure.value, delay)
         low, high = self.calibration.interval(group, figure.value, slopes, is_log)
         if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
             low = max(low, 0.0)
         return replace(figure, interval=(low, high))
 
-    def _delay_slopes(self, value: float, fluid: str) -> list[float]:
-        """Return slopes of a time's logarithm by the logarithms of the delays; all 0 without a
-        fluid.
+    def _delay_slopes(self, time: float, delay: str) -> list[float]:
+        """Return slopes of a time's logarithm by the logarithms of the delays, of which it holds
+        one; 0 without one, or where the user gave it.
         """
-        slopes = []
-        for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]:
-            counts = unknown.field == DELAYS.get(fluid)
-            share = self.calibration.values[unknown.field] / value if counts else 0.0
-            slopes.append(0.0 if unknown.field in self._given else share)
-        return slopes
+        return [
+            self.calibration.values[unknown.field] / time
+            if unknown.field == delay and unknown.field not in self._given
+            else 0.0
+            for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]
+        ]
 
 
 CLEARANCES = ("room between rims", "clearance between chambers")
@@ -157,6 +166,16 @@ def _slope(value: float, moved: float, change: float, is_log: bool) -> float:
     if change == 0:
         return 0.0
     return (math.log(moved / value) if is_log else moved - value) / change
+
+
+def _is_log(value: float, moved: Sequence[float]) -> bool:
+    """Return True where the logarithm of a value is near enough to linear: one that has almost
+    vanished with other factors, such as a force near the end of the stroke, changes by itself.
+    """
+    return min(value, *moved) > 0 and max(moved) < LOG_RANGE * value < LOG_RANGE**2 * min(moved)
+
+
+LOG_RANGE = 3.0
 
 
 def _kind(figure: Figure) -> str:

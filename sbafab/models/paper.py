@@ -113,7 +113,8 @@ class Counterpart:
     (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
     taken, in the unit of ``measured``; ``at`` is the state in which the model gave it, if that is
     not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
-    the unit of ``measured``, None where that is near or changes nothing.
+    the unit of ``measured``, None where that is near or changes nothing. A row may be far off with
+    that calibration alone.
     """
 
     figure: str
@@ -201,8 +202,8 @@ def _forces() -> Iterator[Counterpart]:
 
 def _bent_forces() -> Iterator[Counterpart]:
     """Yield bent forces at 100 kPa (Sec. 4.3); the paper does not name the chambers."""
-    gave = {30: (1.667, None), 60: (None, 2.829), 90: (1.194, 2.341)}
-    calibrated = {30: (1.347, None), 60: (None, 1.966), 90: (0.7543, 0.7496)}
+    gave = {30: (1.667, None), 60: (1.433, 2.829), 90: (1.194, 2.341)}
+    calibrated = {30: (1.347, None), 60: (1.050, 1.966), 90: (0.7543, 0.7496)}
     for angle, measured in FORCE_BENT:
         rows = zip(("one chamber", "2 chambers"), gave[angle], calibrated[angle], strict=True)
         for chambers, value, calibrated_value in rows:
@@ -314,12 +315,19 @@ def counterpart(form: Form, name: str, model: str, calibration: str = "") -> Cou
     if model.startswith(FLAT_HEIGHT_OF_FILMS) and FACTORS.search(model):
         return None
     row = _counterpart(name, model, form.is_parallel)
-    if row is None or not calibration:
-        return row
+    return row and _calibrated(row, calibration)
+
+
+def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
+    """Return a row with the value of a calibration (its name, "" for none); None where that is not
+    known to be off.
+    """
+    if not calibration:
+        return row if abs(row.ratio - 1) > MISFIT else None
     if calibration == CALIBRATION and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
-    # A calibration changes the elastic models; its intervals say how far they may be off.
-    return None if row.model in (STACK, BALLOON) else row
+    # A calibration changes these models; its intervals say how far they may be off.
+    return None if row.model in (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS) else row
 
 
 CALIBRATION = "paper"
@@ -348,10 +356,7 @@ def counterpart_of_column(form: Form, column: str, calibration: str = "") -> Cou
             re.fullmatch(row.figure, figure)
             or (model.startswith(row.model) and re.fullmatch(row.figure, name))
         ):
-            if not calibration or row.model not in (STACK, BALLOON):
-                return row
-            is_off = calibration == CALIBRATION and row.calibrated is not None
-            return replace(row, gave=row.calibrated or row.gave) if is_off else None
+            return _calibrated(row, calibration)
     return None
 
 

@@ -18,6 +18,8 @@ from sbafab.errors import DesignError
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from sbafab.models.film_elements import Array
+
 TUBE_DIAMETER = 0.635
 """Inner diameter of Braintree RPT040 in mm (paper, Sec. 2)."""
 TUBE_LENGTH = 150.0
@@ -80,6 +82,24 @@ class Line:
         speed = (2 * head * self.diameter**1.25 / friction) ** (1 / 1.75)
         turbulent = speed * math.pi * self.diameter**2 / 4
         return math.copysign(min(laminar, turbulent), drop)
+
+    def flows(self, sources: Array, chambers: Array) -> tuple[Array, Array]:
+        """Return ``flow`` between pressures of any shape, and its rates by those in chambers."""
+        drops, rates = sources - chambers, np.full(np.shape(chambers), -1.0)
+        if self.fluid.is_gas:
+            drops = drops * (1 + (sources + chambers) / (2 * ATMOSPHERE_KPA))
+            rates = rates - chambers / ATMOSPHERE_KPA
+        heads = np.maximum(np.abs(drops), 1e-300)
+        slope = math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
+        dense = self.fluid.density * 1e-9
+        friction = 0.316 * self.length * dense**0.75 * self.fluid.viscosity**0.25
+        least = math.pi * self.diameter**2 / 4 * (2 * self.diameter**1.25 / friction) ** (1 / 1.75)
+        # Turbulent flow grows more slowly: laminar flow is the less up to one head.
+        is_turbulent = heads > (least / slope) ** (1.75 / 0.75)
+        turbulent = least * np.where(is_turbulent, heads, 1.0) ** (1 / 1.75)
+        flow = np.where(is_turbulent, np.copysign(turbulent, drops), slope * drops)
+        steep = np.where(is_turbulent, turbulent / (1.75 * heads), slope)
+        return flow, steep * rates
 
     def source_pressure(self, flow: float, chamber: float) -> float:
         """Return the pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""

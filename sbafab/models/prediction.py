@@ -614,15 +614,13 @@ def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
     factor = request.factors.press_factor
     pressed = NOMINAL.times("press factor", factor)
-    for name, value in sizes(actuator.design, actuator.laminate).items():
+    for name, value in sizes(actuator.design, actuator.laminate, factor).items():
         shown = name.replace("_", " ")
         if name == "thickness":
-            yield Figure("size", "deflated height", actuator.thickness, "mm", pressed)
+            yield Figure("size", "deflated height", value, "mm", pressed)
         elif name in ROUND_THE_TUBE:
-            # The laminate is in it twice.
-            thinner = 2 * (actuator.laminate.thickness - actuator.thickness)
             model = ROUND_THE_TUBE[name].times("press factor", factor)
-            yield Figure("size", shown, value - thinner, "mm", model)
+            yield Figure("size", shown, value, "mm", model)
         else:
             yield Figure("size", shown, value, "mm", GEOMETRY)
 

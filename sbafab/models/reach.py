@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.models.film_elements import Array
-    from sbafab.models.stack import Pose, Stack
     from sbafab.models.stack_loads import GapPlaces, Load
+    from sbafab.models.stack_poses import Pose, PosedStack
 
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
@@ -60,7 +60,7 @@ class TipTarget(NamedTuple):
     asinh(p / P0).
     """
 
-    stack: Stack
+    stack: PosedStack
     place: Array
     load: Load | None
     most: float
@@ -82,7 +82,7 @@ class Linearisation(NamedTuple):
 
 
 def reach(
-    stack: Stack,
+    stack: PosedStack,
     place: Array,
     load: Load | None,
     arguments: dict[str, Any],

@@ -19,6 +19,7 @@ from sbafab.actuators import build
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, Rates, linearised
 from sbafab.models.figures import Factors
+from sbafab.models.intervals import factors_of
 from sbafab.models.stack import MOST_PRESSURE, NO_LOAD, Pose, Stack, stack
 from sbafab.models.stack_loads import WALL_POINTS, Load, loaded_energy
 
@@ -34,6 +35,8 @@ KEYS = (
     "stack.balloons",
 )
 """Keys whose rates are given unless others are asked for."""
+STRAIGHT = 1e-6
+"""Twice the sine of a turn below which a stack stands straight."""
 SHARE = 0.1
 """Share of a key by which balloons are mapped anew, either way: maps are fitted, and smaller steps
 say more of their errors. Rates by the modulus come within 8 % of the exact ones."""
@@ -59,6 +62,32 @@ class Sensitivity:
         rise = self.pose.height - self.pose.pitch * len(self.pose.freedoms)
         return (float(self.rates.tip[2, 0]) - self.flat) * self.value / rise
 
+    @property
+    def bend(self) -> float | None:
+        """Relative change of the bend, as a ratio to that of the key; None where it stands straight
+        or is bent by half a turn.
+        """
+        turned = self.pose.frames[1][-1]
+        axis = np.array(
+            [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
+        )
+        length = float(np.linalg.norm(axis))
+        if length < STRAIGHT:
+            return None
+        angle = np.arctan2(length / 2, (np.trace(turned) - 1) / 2)
+        return float(self.rates.turn[:, 0] @ axis) / length * self.value / float(angle)
+
+
+class SensitivityRow(NamedTuple):
+    """By how many percent 1 % more of a ``key`` moves the free ``stroke``, and the ``bend`` of one
+    chamber, None where it does not bend; the ratio of the changes.
+    """
+
+    key: str
+    value: float
+    stroke: float
+    bend: float | None
+
 
 class _Held(NamedTuple):
     """A stack with its plates held: the slope (levels, 3) of its energy against given contact
@@ -83,11 +112,12 @@ def sensitivities(
 ) -> list[Sensitivity]:
     """Return the rates of a design's pose at pressures (kPa, one a chamber) by each of ``keys``.
 
-    ``load`` are keyword arguments of ``Stack.pose`` beside pressures. By lengths of pockets and
+    ``factors`` are by default those of the design's calibration; ``load`` are keyword arguments of
+    ``Stack.pose`` beside pressures. By lengths of pockets and
     rims, contacts of rims that open or close are smoothed over that step. Raises
     DesignError for keys that are no single number, and as ``Stack.pose`` does.
     """
-    factors = factors or Factors()
+    factors = factors or factors_of(design)
 
     def made(key: str = "", value: float = 0.0) -> Stack:
         other = design.with_({key: value}) if key else design
@@ -111,6 +141,23 @@ def sensitivities(
             around = whole, made(key, value - step), made(key, value + step)
             rows.append(_by_key(key, value, around, at, pose, load, step))
     return rows
+
+
+def sensitivity_table(design: Design, pressure: float) -> list[SensitivityRow]:
+    """Return a row a key of KEYS for a pressure in kPa in all chambers, and in one for the bend.
+
+    Raises DesignError for pockets that are not round.
+    """
+    chambers = len(build(design).chambers)
+    free = sensitivities(design, (pressure,) * chambers)
+    bends: list[float | None] = [None] * len(free)
+    if chambers > 1:
+        bent = sensitivities(design, (pressure, *(0.0,) * (chambers - 1)))
+        bends = [row.bend for row in bent]
+    return [
+        SensitivityRow(row.key, row.value, row.stroke, bend)
+        for row, bend in zip(free, bends, strict=True)
+    ]
 
 
 def _acting(whole: Stack, load: dict[str, Any]) -> Load | None:

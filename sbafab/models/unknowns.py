@@ -55,8 +55,8 @@ UNKNOWNS = (
         0.6,
         0.8,
         10.0,
-        "thin polyurethane films are one to four times as stiff at small strain as in the long "
-        "pull of a data sheet; pressing may add to that",
+        "assumed, from half of the film's stated modulus to four times it: that is of a long pull, "
+        "and films stretch little here",
     ),
     Unknown(
         "pocket_loss",
@@ -67,7 +67,7 @@ UNKNOWNS = (
         0.2,
         0.0,
         0.6,
-        "molten film creeps under the mask, which overhangs the bond by 0.5 mm (Sec. 2)",
+        "assumed: molten film creeps under the mask, which overhangs the bond by 0.5 mm (Sec. 2)",
     ),
     Unknown(
         "press_factor",
@@ -78,7 +78,7 @@ UNKNOWNS = (
         0.35,
         0.3,
         1.0,
-        "films flow in the press; between no flow and a third of the thickness left",
+        "assumed: films flow in the press, from not at all to a third of the thickness left",
     ),
     Unknown(
         "water_delay",
@@ -89,7 +89,7 @@ UNKNOWNS = (
         1.0,
         0.001,
         2.0,
-        "a syringe pump reaches its flow in some tenths of a second",
+        "assumed: a syringe pump takes some tenths of a second to reach its flow",
     ),
     Unknown(
         "air_delay",
@@ -100,7 +100,7 @@ UNKNOWNS = (
         0.8,
         0.001,
         0.5,
-        "pneumatic valves open in 5 to 50 ms",
+        "assumed: pneumatic valves take 5 to 50 ms to open",
     ),
 )
 """In the order of a calibration's mean and covariance."""

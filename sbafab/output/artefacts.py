@@ -30,7 +30,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
-from sbafab.models.calibrated import NONE, shipped_names
+from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction
 from sbafab.nesting.nest import as_dict
 from sbafab.nesting.records import Nest
@@ -401,6 +401,7 @@ def _design(folder: DesignFolder) -> str:
         design = design.model_copy(update={"kit": KIT_FILE})
     calibration = design.models.calibration
     if calibration not in (NONE, *shipped_names()):
+        load_calibration(calibration, design.folder)  # Says what is wrong with it, if anything.
         shutil.copyfile(design.folder / calibration, folder.path / CALIBRATION_FILE)
         models = design.models.model_copy(update={"calibration": CALIBRATION_FILE})
         design = design.model_copy(update={"models": models})

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from sbafab.calibration.curve_intervals import Ends, curve_intervals, uncertainty_for
 from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.evidence.records import Evidence, MeasuredCurve
+from sbafab.models.calibrated import ModelCalibration
 from sbafab.models.figures import Factors
 from sbafab.output.schema_ids import COMPARISON_SCHEMA
 
-Ends = tuple[float, float]
-"""Least and largest value."""
 Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
 """Intervals of a prediction at the points of a curve; None where there are none."""
 WIDTH = 100
@@ -69,6 +69,24 @@ def compare(
     return [_compared(evidence.id, curve, factors, intervals) for curve in evidence.curves]
 
 
+def compare_calibrated(evidence: Evidence, calibration: ModelCalibration) -> list[ComparedCurve]:
+    """Return the curves of a source beside the calibrated models and their 90 % intervals, which
+    span what the source leaves open.
+    """
+    compared = []
+    for curve in evidence.curves:
+        uncertainty = uncertainty_for(curve, calibration)
+        compared.append(
+            _compared(
+                evidence.id,
+                curve,
+                uncertainty.factors,
+                lambda each, of=uncertainty: curve_intervals(each, of),  # type: ignore[misc]
+            )
+        )
+    return compared
+
+
 def _compared(
     source: str, curve: MeasuredCurve, factors: Factors | None, intervals: Intervals | None
 ) -> ComparedCurve:
@@ -108,7 +126,7 @@ def table_lines(curves: Sequence[ComparedCurve]) -> Iterator[str]:
                 "",
                 _axis(compared, point),
                 _measured(point),
-                _span(point.model) or "-",
+                span(point.model) or "-",
                 _deviation(point),
                 {None: "-", True: "yes", False: "no"}[point.is_within],
             ).rstrip()
@@ -123,10 +141,11 @@ def _measured(point: ComparedPoint) -> str:
     return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
 
 
-def _span(ends: Ends | None, sign: str = "") -> str:
+def span(ends: Ends | None, sign: str = "", digits: int = 4) -> str:
+    """Return a range as text, or one number where its ends read alike; "" for none."""
     if ends is None:
         return ""
-    low, high = (f"{end:{sign}.4g}" for end in ends)
+    low, high = (f"{end:{sign}.{digits}g}" for end in ends)
     return low if low == high else f"{low} to {high}"
 
 
@@ -134,7 +153,7 @@ def _deviation(point: ComparedPoint) -> str:
     if point.deviation is None:
         return "-"
     if point.measured == 0:
-        return _span(point.deviation, "+")
+        return span(point.deviation, "+")
     low, high = (f"{end / point.measured:+.0%}" for end in point.deviation)
     return low if low == high else f"{low} to {high}"
 
@@ -154,10 +173,13 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
-def as_json(evidences: Sequence[Evidence], curves: Sequence[ComparedCurve]) -> dict[str, Any]:
-    """Return the comparison for programs."""
+def as_json(
+    evidences: Sequence[Evidence], curves: Sequence[ComparedCurve], calibration: str
+) -> dict[str, Any]:
+    """Return the comparison for programs; ``calibration`` is its name."""
     return {
         "schema": COMPARISON_SCHEMA,
+        "calibration": calibration,
         "sources": [
             {
                 "id": evidence.id,
@@ -167,11 +189,12 @@ def as_json(evidences: Sequence[Evidence], curves: Sequence[ComparedCurve]) -> d
             }
             for evidence in evidences
         ],
-        "curves": [_curve_as_json(compared) for compared in curves],
+        "curves": [curve_as_json(compared) for compared in curves],
     }
 
 
-def _curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
+def curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
+    """Return a curve with its points for programs."""
     curve = compared.curve
     return {
         "source": compared.source,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +10,17 @@ from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
 from sbafab.output.schema_ids import REPRODUCTION_SCHEMA
 from sbafab.reports.charts import relation_svg
-from sbafab.reproduction import rows
+from sbafab.reproduction import calibrated, rows
+from sbafab.reproduction.calibrated import CalibratedPaper
 from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
 
-Written by `sbafab reproduce`. But for the section "Calibrated on the 1-DoF" no constant of a model
-is fitted. Where a number is itself a measurement of the paper (handling time, full height), the row
-says so. The residual is prediction minus paper; in parentheses, how many of the paper's own errors
-that is, where it gives one. A reason that we have not tested says "likely". Models and their
-ranges are in
+Written by `sbafab reproduce`. But for the section "Calibrated on the paper" no constant of a model
+is fitted: films are as drawn and bought, as with `--set models.calibration=none`. Where a number is
+itself a measurement of the paper (handling time, full height), the row says so. The residual is
+prediction minus paper; in parentheses, how many of the paper's own errors that is, where it gives
+one. A reason that we have not tested says "likely". Models and their ranges are in
 [prediction.md](prediction.md), the paper's inputs (films, widths, temperatures, errors of cutting
 and pins) in [paper.md](paper.md).
 
@@ -28,31 +28,10 @@ Forces of Eqs. 1-4 count their stroke from nothing, as the paper does; those of 
 count it from the flat height, so that flat and full height mean the same for force and bending.
 """
 
-CALIBRATED = """The models are given two numbers. The pocket's radius is taken {loss:g} mm smaller
-than drawn, which makes the force of the flat 1-DoF actuator right: that row is *fitted*, all
-others are *held out*. And the laminate is as thick as the paper measured it when flat, {press:g}
-of its films (the row of the deflated 3-DoF above): 0.95 mm, from which strokes and the height
-count. The modulus stays the paper's 10 MPa. Flat is the state to fit: neither the film's modulus
-nor a column that buckles has a part in it. Molten TPE that creeps under the mask is the likely
-cause of the loss. `sbafab predict 3dof-15mm --pocket-loss {loss:g} --press-factor {press:g}` gives
-the same forces and bends.
+FACTORS = """## What single factors would take
 
-Of the held-out rows 10 % in force, 5 % in height, 6 degrees in bend and 0.08 s in the water's time
-were aimed at.
-
-* **Met:** {met}.
-* **Missed:** {missed}.
-
-The time has no tubes in it, where the rows above need 150 mm of them: pockets as drawn with such
-tubes, and smaller pockets with the sensor at the actuator, both give the measured time. The forces
-speak for the smaller ones.
-"""
-
-FACTORS = """## What a calibration would take
-
-`sbafab predict` has factors, all off unless given. The table says what the paper's own figures
-would make of them. None is a default: the factor on the force is another one at every height and
-for every actuator, so that one number would only move the residuals about.
+What the paper's own figures would make of one factor on a model without a calibration: on the
+force it is another one at every height and for every actuator.
 
 | factor | from | value |
 |---|---|---|
@@ -60,7 +39,7 @@ for every actuator, so that one number would only move the residuals about.
 
 
 def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
-    """All rows, by section."""
+    """All rows of the models without a calibration, by section."""
     return {
         "Making": list(rows.process()),
         "Sizes": list(rows.sizes(three)),
@@ -69,7 +48,6 @@ def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
         "Force": list(rows.forces(single, three)),
         "Time and bending": list(rows.motion(three)),
         "Stiffness and power": list(rows.stiffness(single, three)),
-        "Calibrated on the 1-DoF": list(rows.calibrated()),
         "Figures of the paper's own simulations": list(rows.simulators()),
     }
 
@@ -77,36 +55,20 @@ def tables(single: Prediction, three: Prediction) -> dict[str, list[Row]]:
 def page() -> str:
     """The text of the page."""
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    return page_of(tables(single, three), single, three)
+    return page_of(tables(single, three), calibrated.calibrated_paper(), single, three)
 
 
-def page_of(sections: dict[str, list[Row]], single: Prediction, three: Prediction) -> str:
+def page_of(
+    sections: dict[str, list[Row]],
+    by_calibration: CalibratedPaper,
+    single: Prediction,
+    three: Prediction,
+) -> str:
     """Return the page of rows that are computed already."""
-    parts = [HEAD]
+    parts = [HEAD, *calibrated.lines(by_calibration)]
     for title, lines in sections.items():
-        first, *lines_below = table(title, lines)
-        parts.append(first)
-        if title.startswith("Calibrated"):
-            parts.append(calibrated_said(lines))
-        parts += lines_below
+        parts += table(title, lines)
     return "\n".join([*parts, FACTORS + "\n".join(rows.factors(single, three)), ""])
-
-
-def calibrated_said(lines: Sequence[Row]) -> str:
-    """Return the fitted values, and which of the held-out rows are as near as aimed at."""
-    factors = rows.FITTED
-    names: dict[bool, list[str]] = {True: [], False: []}
-    for row in lines:
-        name, _, role = row.figure.rpartition(" (")
-        if rows.HELD_OUT in role and row.predicted is not None:
-            assumed = row.model.split(" in ")[-1] if row.measured.unit == "deg" else ""
-            miss = abs(row.predicted - row.measured.value)
-            is_met = miss <= rows.aim(row.measured)
-            names[is_met].append(f"{name} ({assumed})" if assumed else name)
-    met, missed = ("; ".join(names[kind]) or "none" for kind in (True, False))
-    return CALIBRATED.format(
-        loss=factors.pocket_loss, press=factors.press_factor, met=met, missed=missed
-    )
 
 
 def charts(single: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
@@ -132,16 +94,17 @@ def charts(single: Prediction, three: Prediction) -> list[tuple[str, Relation]]:
 # The reproduction as files: page, table for programs, charts.
 
 
-def reproduce(folder: Path) -> dict[str, list[Row]]:
-    """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder.
+def reproduce(folder: Path) -> tuple[dict[str, list[Row]], CalibratedPaper]:
+    """All rows, as ``reproduction.md`` and ``reproduction.json`` with charts in a folder, and the
+    values beside the calibrated models.
 
     Raises OutputError where the folder cannot be written.
     """
     single, three = predicted("1dof-5mm"), predicted("3dof-15mm")
-    sections = tables(single, three)
+    sections, by_calibration = tables(single, three), calibrated.calibrated_paper()
     files = {
-        "reproduction.md": page_of(sections, single, three),
-        "reproduction.json": json.dumps(as_json(sections), indent=1) + "\n",
+        "reproduction.md": page_of(sections, by_calibration, single, three),
+        "reproduction.json": json.dumps(as_json(sections, by_calibration), indent=1) + "\n",
     }
     for name, relation in charts(single, three):
         files[f"{name}.svg"] = relation_svg(name, relation)
@@ -151,10 +114,10 @@ def reproduce(folder: Path) -> dict[str, list[Row]]:
             (folder / file).write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror}") from None
-    return sections
+    return sections, by_calibration
 
 
-def as_json(sections: dict[str, list[Row]]) -> dict[str, Any]:
+def as_json(sections: dict[str, list[Row]], by_calibration: CalibratedPaper) -> dict[str, Any]:
     """Return the contents of ``reproduction.json``."""
     return {
         "schema": REPRODUCTION_SCHEMA,
@@ -173,4 +136,5 @@ def as_json(sections: dict[str, list[Row]]) -> dict[str, Any]:
             for section, rows in sections.items()
             for row in rows
         ],
+        "calibrated": calibrated.as_json(by_calibration),
     }

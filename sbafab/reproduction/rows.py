@@ -242,9 +242,6 @@ def simulators() -> Iterator[Row]:
 
 
 STACK = "elastic stack"
-FITTED = Factors(press_factor=0.509, pocket_loss=0.28)
-"""The pocket loss that makes the 1-DoF actuator's force right when flat, in steps of 0.01 mm; the
-press factor is the measured flat height over the nominal. ``predict`` given both says the same."""
 ENERGY_BALLOONS = 6
 """Of the actuator whose energy was measured (Sec. 7)."""
 AVERAGED = (
@@ -478,151 +475,20 @@ def stiffness(single: Prediction, three: Prediction) -> Iterator[Row]:
     )
 
 
-CALIBRATED_WHY = {
-    "1-DoF": (
-        "the one figure that is fitted: no column buckles when flat, and the film's modulus hardly "
-        "counts",
-        "high: a column of six balloons is not stable here at 25 and 75 % where its tip may slide "
-        "on the sensor, one of ten not even where it sticks; but one that has slid away keeps a "
-        "tenth, so that it likely gave way in part. The paper says that the 3-DoF is less likely "
-        "to buckle, and gives no number of balloons",
-        "high: as at 25 %, and as the 3-DoF",
-    ),
-    "3-DoF": (
-        "low: a chamber of the 3-DoF was measured to push 1.1 times as hard as the 1-DoF; likely "
-        "its pockets lost 0.1 mm less",
-        "near: films touch the plates there over most of the pocket, which the model has",
-        "high: the film is likely stiffer than 10 MPa where 100 kPa stretch it, and then bulges "
-        "and touches less: with 20 MPa it is right to 4 %, and the height at 10 kPa is not",
-    ),
-}
-
-
-def calibrated() -> Iterator[Row]:
-    """Yield rows of the elastic models, pocket loss fitted to the 1-DoF's force when flat."""
-    predictions = {}
-    for name, template, measured in (
-        ("1-DoF", "1dof-5mm", paper.FORCE_1DOF),
-        ("3-DoF", "3dof-15mm", paper.FORCE_3DOF),
-    ):
-        predictions[name] = predicted(template, FITTED)
-        for at, value, why in zip(heights(), measured, CALIBRATED_WHY[name], strict=True):
-            role = "fitted" if (name, at) == ("1-DoF", "flat") else HELD_OUT
-            yield Row(
-                f"{name}, 100 kPa, {at} ({role})",
-                value,
-                _named(predictions[name], f"blocked force at 100 kPa, {at}"),
-                CALIBRATED,
-                why,
-            )
-    yield from _calibrated_bent(predictions["3-DoF"])
-    yield from _calibrated_motion(stack(load_design("3dof-15mm"), factors=FITTED))
-
-
-HELD_OUT = "held out"
-CALIBRATED = f"{STACK}, calibrated"
-
-
-def _calibrated_bent(prediction: Prediction) -> Iterator[Row]:
-    chambers = "2 chambers"
-    whys = {
-        30: "low: the paper does not say which chambers push, nor how the sensor holds the tip; "
-        "where it slides, 6 % low, and where the third chamber pushes too, 22 % high",
-        60: "high: as at 30 degrees; a tip that slides gives way, and one chamber has half of this",
-        90: "low: two chambers hardly bend so far, and every assumption counts; pockets 0.1 mm "
-        "less reduced push 8 times, one chamber 5 times as hard",
-    }
-    for angle, value in paper.FORCE_BENT:
-        yield Row(
-            f"3-DoF, 100 kPa, bent by {angle} deg ({HELD_OUT})",
-            value,
-            _named(prediction, f"force at 100 kPa in {chambers}, bent by {angle} deg"),
-            f"{CALIBRATED}, {chambers}",
-            whys[angle],
-        )
-
-
-def aim(measured: paper.Measured) -> float:
-    """Return the aimed-at deviation of a held-out figure, in its unit."""
-    within = {"N": 0.1 * measured.value, "mm": 0.05 * measured.value, "deg": 6.0, "s": 0.08}
-    return within[measured.unit]
-
-
-def _calibrated_motion(three: Stack) -> Iterator[Row]:
-    """Yield rows at 10 kPa in the chambers, tubes left out: the paper speaks of the SBA's internal
-    pressure.
-    """
-    full = paper.FULL_KPA
-    time, pose = time_to_fill(three, paper.WATER_FLOW, full, length=1e-3)
-    with_tubes = [
-        time_to_fill(three, paper.WATER_FLOW, full, length)[0] for length in (50.0, 150.0)
-    ]
-    yield Row(
-        f"height of the 3-DoF of 15 balloons ({HELD_OUT})",
-        paper.FULL_HEIGHT,
-        pose.height,
-        f"{CALIBRATED}, {full:g} kPa in the chambers",
-        "high, by little more than the 5 % aimed at, with the measured flat height; " + WORKSPACE,
-    )
-    yield Row(
-        f"time to 10 kPa, water, 35 ml/min ({HELD_OUT})",
-        paper.WATER_TIME,
-        time,
-        f"{CALIBRATED}, {full:g} kPa in the chambers, no tubes",
-        "within the 0.08 s aimed at: the pump stops at the SBA's internal pressure (Sec. 7); "
-        f"{AVERAGED}. If "
-        f"the sensor sat at the pump it would be {with_tubes[0]:.2f} s with 50 mm of tube, "
-        f"{with_tubes[1]:.2f} s with 150",
-    )
-    for chambers, words, why in (
-        (
-            2,
-            "2 chambers",
-            "within the 6 degrees aimed at; the paper does not say which chambers, nor at which "
-            "pressure",
-        ),
-        (
-            1,
-            "one chamber",
-            "high, though rims that touch on the inner side take 8 degrees off; the paper does not "
-            "say which chambers, nor at which pressure",
-        ),
-    ):
-        bend = three.pose((full,) * chambers + (0.0,) * (3 - chambers)).bend
-        model = f"{CALIBRATED}, {full:g} kPa in {words}"
-        yield Row(f"largest bend ({HELD_OUT})", paper.LARGEST_BEND, bend, model, why)
-
-
 def fuller() -> Iterator[Row]:
     """Strokes of Fig. 7a, which the paper gives as Eq. 4 and the largest error up to a volume."""
-    for factors, of in ((Factors(), "elastic balloon"), (FITTED, "elastic balloon, calibrated")):
-        why = (
-            "Eq. 4 with the largest error that the paper gives up to this volume"
-            if factors == Factors()
-            else "high: the calibration makes this worse than the pocket as drawn; the film's "
-            "pocket loss is fitted to a force of d = 5"
+    design = load_design("1dof-10mm")
+    (balloon,) = set(balloons_of(design, build(design), Factors()))
+    shapes = free_shapes(balloon, np.geomspace(0.01, 20.0, 60))
+    for fluid, volume, error in paper.VALID:
+        expected = float(printed.stroke(volume, paper.VALID_RADIUS))
+        yield Row(
+            f"stroke of a balloon of d = 10 with {volume:g} ul of {fluid}, Fig. 7a",
+            paper.Measured(round(expected, 3), error.value, "mm", "Sec. 4.2"),
+            float(np.interp(volume, shapes.volume, shapes.height)),
+            "elastic balloon",
+            "Eq. 4 with the largest error that the paper gives up to this volume",
         )
-        design = load_design("1dof-10mm")
-        (balloon,) = set(balloons_of(design, build(design), factors))
-        shapes = free_shapes(balloon, np.geomspace(0.01, 20.0, 60))
-        for fluid, volume, error in paper.VALID:
-            expected = float(printed.stroke(volume, paper.VALID_RADIUS))
-            yield Row(
-                f"stroke of a balloon of d = 10 with {volume:g} ul of {fluid}, Fig. 7a",
-                paper.Measured(round(expected, 3), error.value, "mm", "Sec. 4.2"),
-                float(np.interp(volume, shapes.volume, shapes.height)),
-                of,
-                why,
-            )
-
-
-def _named(prediction: Prediction, name: str) -> float:
-    (value,) = [
-        figure.value
-        for figure in prediction.figures
-        if figure.name == name and figure.model.name.startswith(STACK)
-    ]
-    return value
 
 
 def factors(single: Prediction, three: Prediction) -> Iterator[str]:

@@ -37,7 +37,7 @@ from sbafab.models.elastic import (
 )
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
-from sbafab.models.intervals import GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
+from sbafab.models.intervals import DELAYS, GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import (
@@ -289,7 +289,7 @@ class Subject:
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate)
+        return sizes(self.design, self.laminate, self.factors.press_factor)
 
     @cached_property
     def _keys(self) -> Mapping[str, Any]:
@@ -367,8 +367,8 @@ class Subject:
         def value_at(factors: Factors) -> float:
             return self._at(factors).value(quantity, lambda: math.nan)
 
-        fluid = "water" if quantity.name == "time" else ""
-        return self.uncertainty.interval_of(group, value_at, share, fluid)[1]
+        delay = DELAYS["water"] if quantity.name == "time" else ""
+        return self.uncertainty.interval_of(group, value_at, share, delay)[1]
 
     @cached_property
     def _actuator(self) -> Actuator:

@@ -58,17 +58,16 @@ def _table_reads_well(out: str) -> None:
     lines = out.partition("Figures to design with")[2].splitlines()
     heads = [place for place, line in enumerate(lines) if line.startswith("force: ")]
     assert [lines[place].partition(" [")[0] for place in heads] == [
+        "force: elastic stack, calibration paper",
         "force: virtual work on Eq. 4",
-        "force: elastic stack",
-        "force: elastic stack",
         "force: virtual work on Eqs. 1-3",
     ]
-    first, second = (" ".join(lines[heads[0] + row].split()) for row in (1, 2))
+    first, second = (" ".join(lines[heads[1] + row].split()) for row in (1, 2))
     assert first == "blocked force at 10 kPa, flat 0.3927 N"
     assert second.startswith("at 25 % of full stroke")
     # Above the heading of other models each quantity stands once.
     others = lines.index("Alternative models: design with the figures above")
-    assert heads[1] < others < heads[2]
+    assert heads[0] < others < heads[1]
     above = [line[:58] for line in lines[:others] if line.startswith("  ")]
     assert sum("10 kPa, flat" in line for line in above) == 1
     assert "constant curvature" not in "".join(lines[:others])

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from sbafab.cli import main
+from sbafab.models.calibrated import load_calibration
 from sbafab.reports.traveller.page import record_text
 from tests.site.formats import hold
 
@@ -86,7 +87,9 @@ def test_from_the_first_record_to_the_report(
     assert shares["method", "channel-pin"] == shares["kit", "paper"] == (3, 3)
     [height] = (c for c in said["measured"] if c["quantity"] == "height_mm")
     assert height["mean"] == pytest.approx(0.5)
-    assert height["predicted"] == pytest.approx(FLAT)
+    paper = load_calibration("paper")
+    assert paper is not None
+    assert height["predicted"] == pytest.approx(FLAT * paper.values["press_factor"])
     assert height["high"] - 0.5 == pytest.approx(4.30265 * 0.02 / 3**0.5, rel=1e-4)
     assert height["verdict"] == "differs"
     advice = f"1dof-5mm: sbafab predict --press-factor {0.5 / FLAT:.3f} uses the measured"

@@ -368,6 +368,7 @@ def test_a_table_that_reads_one_way_only_is_read(tmp_path: Path, name: str) -> N
         ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;19;9\n", "one cell a column"),
         ("feature;axis;nominal_mm;measured_mm\nA outer;x;20;1.019,9\n", "not a number"),
         (f"{HEADER}A outer,x,20,-19.9\n", "above 0"),
+        (f"{HEADER}A outer,x,20,10000.1\n", "10000.1; .* above 0 and at most 10000"),
         (f"{HEADER}A outer,z,20,19.9\n", "axis must be x or y"),
         (f"{HEADER}A,x,20,19.9\n", "feature must end in outer, window or piece"),
     ],

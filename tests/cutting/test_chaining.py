@@ -10,7 +10,7 @@ from sbafab.cutting.chaining import JOINED, check_clear, closed_loops, nested_re
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line, Point
-from sbafab.geometry.region import disc, rectangle, stadium
+from sbafab.geometry.region import disc, polygon, rectangle, stadium
 
 # A square of 1 mm whose last corner is cut off by three edges of half a micrometre each.
 TINY = 0.0005
@@ -69,6 +69,27 @@ def test_what_holds_for_one_copy_is_not_said_of_one_that_lies_otherwise() -> Non
         holes, plates = row(moved)
         with pytest.raises(OutputError, match=r"contours touch or cross at x 4[5-9]\."):
             check_clear([*holes, *plates])
+
+
+def test_edges_on_one_line_that_meet_at_a_point_are_not_drawn_twice() -> None:
+    left, right = (polygon([(x, 0.0), (x + 1.0, 0.0), (x + 0.5, 1.0)]) for x in (0.0, 1.0))
+    with pytest.raises(OutputError, match=r"contours touch or cross at x 1\.000, y 0\.000"):
+        check_clear([*left.contours, *right.contours])
+    over, under = rectangle((0.0, 0.0), (2.0, 1.0)), rectangle((1.0, -1.0), (3.0, 0.0))
+    with pytest.raises(OutputError, match=r"edge drawn twice at x [12]\.000, y 0\.000"):
+        check_clear([*over.contours, *under.contours])
+
+
+@pytest.mark.parametrize("centre", [1.5, 0.5])
+def test_circles_that_just_touch_are_refused(centre: float) -> None:
+    """Discs of 1 and 0.5 mm, the small one outside (1 + 0.5) or inside (1 - 0.5)."""
+    way = 1 if centre > 1 else -1
+    for overlap in (0.0, 1e-5):
+        small = disc((centre - way * overlap, 0.0), 0.5)
+        with pytest.raises(OutputError, match=r"contours touch or cross at x 1\.000"):
+            check_clear([*disc((0, 0), 1.0).contours, *small.contours])
+    small = disc((centre + way * 1e-4, 0.0), 0.5)
+    check_clear([*disc((0, 0), 1.0).contours, *small.contours])
 
 
 def test_a_copy_outside_its_plate_is_no_hole() -> None:

@@ -85,6 +85,21 @@ def test_it_fits_its_film_and_is_engraved_in_the_waste_alone(folder: Path) -> No
         assert line.distance(parts) > 0.5
 
 
+def test_the_arrow_points_along_x_on_the_middle_of_its_title(folder: Path) -> None:
+    model = ezdxf.readfile(folder / "coupon.dxf").modelspace()
+    strokes = [
+        [(x, y) for x, y, *_ in stroke.get_points()]
+        for stroke in model.query('LWPOLYLINE[layer=="ENGRAVE"]')
+    ]
+    # Nothing else of the lettering is 8 mm long.
+    [stem] = [s for s in strokes if shapely.LineString(s).length == pytest.approx(8.0)]
+    (start, y), (tip, also_y) = stem
+    assert (tip - start, also_y) == (pytest.approx(8.0), y)
+    title = [p for stroke in strokes for p in stroke if p[1] < 10 and p[0] < start - 0.5]
+    heights = [height for _, height in title]
+    assert (min(heights) + max(heights)) / 2 == pytest.approx(y, abs=0.01)
+
+
 def test_nothing_is_written_over(folder: Path) -> None:
     with pytest.raises(DesignError, match="exists"):
         write_coupon(folder, "sbafab 0")

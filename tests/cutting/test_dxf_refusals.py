@@ -111,7 +111,7 @@ def test_repeated_first_vertex_is_refused(plate_text: str) -> None:
         plate_text,
         lambda model: model.add_lwpolyline(closed_twice, close=True, dxfattribs=OUTER),
     )
-    with pytest.raises(OutputError, match="repeats its vertex"):
+    with pytest.raises(OutputError, match=r"repeats its vertex x 20\.000, y 0\.000"):
         read_profile(text)
 
 
@@ -198,6 +198,22 @@ def test_width_at_a_vertex_is_refused(plate_text: str) -> None:
     )
     with pytest.raises(OutputError, match="has a width"):
         read_profile(text)
+
+
+@pytest.mark.parametrize("key", ["start_width", "end_width"])
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_width_of_an_old_polyline_is_refused(key: str, everywhere: bool, plate_text: str) -> None:
+    """Group codes 40 and 41: of a vertex, or of the whole for vertices that have none (DXF)."""
+
+    def old(model: Modelspace) -> None:
+        polyline = model.add_polyline2d(SQUARE, close=True, dxfattribs=OUTER)
+        if everywhere:
+            polyline.dxf.set(f"default_{key}", 0.2)
+        else:
+            polyline.vertices[2].dxf.set(key, 0.2)
+
+    with pytest.raises(OutputError, match="has a width"):
+        read_profile(drawn(plate_text, old))
 
 
 def test_contour_that_encloses_nothing_is_refused(plate_text: str) -> None:

@@ -40,7 +40,7 @@ THREE = MeasuredActuator("3dof-15mm")
 
 @pytest.fixture(scope="module")
 def three() -> Stack:
-    return sbafab.stack("3dof-15mm")
+    return sbafab.stack("3dof-15mm", "models.calibration=none")
 
 
 def curve(
@@ -151,7 +151,7 @@ def test_times_are_volume_over_flow_without_a_tube(three: Stack) -> None:
 
 
 def test_work_is_the_integral_of_pressure_over_volume() -> None:
-    single = sbafab.stack("1dof-5mm")
+    single = sbafab.stack("1dof-5mm", "models.calibration=none")
     pressures = [0.001, *(k / 50 for k in range(1, 51))]
     volumes = [float(single.pose((p,)).volumes.sum()) for p in pressures]
     pairs = list(zip(pressures, volumes, strict=True))

@@ -63,13 +63,16 @@ def test_what_the_paper_measured_of_its_film_holds_for_no_other() -> None:
 def test_the_elastic_balloon_takes_the_films_own_numbers() -> None:
     """Shapes hang on p / E and on t alone: twice the modulus and the pressure, the same stroke."""
     same = ("films.tpe.product=A", "films.tpe.thickness=0.038", "films.tpe.poisson=0.2")
-    papers = predict(load_design("1dof-5mm"), PredictionRequest(pressures_kpa=(3.0,)))
+    uncalibrated = "models.calibration=none"
+    papers = predict(
+        load_design("1dof-5mm", (uncalibrated,)), PredictionRequest(pressures_kpa=(3.0,))
+    )
     alike = predict(
-        load_design("1dof-5mm", (*same, "films.tpe.modulus=10")),
+        load_design("1dof-5mm", (*same, uncalibrated, "films.tpe.modulus=10")),
         PredictionRequest(pressures_kpa=(3.0,)),
     )
     twice = predict(
-        load_design("1dof-5mm", (*same, "films.tpe.modulus=20")),
+        load_design("1dof-5mm", (*same, uncalibrated, "films.tpe.modulus=20")),
         PredictionRequest(pressures_kpa=(6.0,)),
     )
     stroke = papers.value("free stroke at 3 kPa")

@@ -27,7 +27,7 @@ TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
 
 @pytest.fixture(scope="module")
 def three() -> Prediction:
-    return sbafab.predict("3dof-15mm")
+    return sbafab.predict("3dof-15mm", "models.calibration=none")
 
 
 def test_3dof_takes_0_935_s_of_water(three: Prediction) -> None:
@@ -60,6 +60,13 @@ def test_the_papers_height_stands_beside_its_own_actuator_alone(three: Predictio
         assert workspace_relation(other).points == ()
 
 
+def test_the_tip_yields_as_the_derivatives_of_the_stack_say(three: Prediction) -> None:
+    # A force of 10 uN aside, and nothing else, against the slope of the equilibrium.
+    slopes = sbafab.stack("3dof-15mm").derivatives((10.0, 10.0, 10.0))
+    found = three.value("lateral tip stiffness at 10 kPa, pressure held")
+    assert found == pytest.approx(1 / slopes.compliance[0, 0], rel=2e-4)
+
+
 def test_3dof_folds_to_9_9_and_pressed_to_8_6(three: Prediction) -> None:
     assert three.value("folded diameter") == pytest.approx(9.9, abs=0.05)
     pressed = sbafab.predict("3dof-15mm", press_factor=0.95 / 1.865)
@@ -78,7 +85,7 @@ def test_3dof_bends_by_the_difference_of_its_chambers(three: Prediction) -> None
 
 
 def test_radial_is_15_33_flat_and_about_28_inflated() -> None:
-    found = sbafab.predict("radial-15mm")
+    found = sbafab.predict("radial-15mm", "models.calibration=none")
     assert found.value("deflated diameter") == pytest.approx(15.328)
     assert found.value("inflated diameter") == pytest.approx(28.06, abs=0.005)
     # The diameter of a full balloon's lens lies a little below the cylinder's.
@@ -163,8 +170,10 @@ def test_what_is_out_of_range_says_the_range(asked: dict[str, object], said: str
 
 
 def test_calibration_is_named_wherever_it_counts() -> None:
-    plain = sbafab.predict("3dof-15mm")
-    found = sbafab.predict("3dof-15mm", press_factor=0.5, contact_factor=2.0)
+    plain = sbafab.predict("3dof-15mm", "models.calibration=none")
+    found = sbafab.predict(
+        "3dof-15mm", "models.calibration=none", press_factor=0.5, contact_factor=2.0
+    )
     elastic = [one for one in found.figures if one.model.name.startswith("elastic")]
     # Its plates are thinner, so that it may bend farther or less far, and it knows of no contact
     # factor.
@@ -203,7 +212,7 @@ def test_every_figure_and_curve_says_model_and_trust(name: str) -> None:
 @pytest.mark.parametrize("count", few(range(2, 9), 3))
 def test_lobes_from_2_to_8(count: int) -> None:
     # Widely spaced lobes, or the tabs of eight would meet.
-    changes = f"chamber.count={count}", "chamber.axis_radius=10"
+    changes = f"chamber.count={count}", "chamber.axis_radius=10", "models.calibration=none"
     found = sbafab.predict("3dof-15mm", *changes, quick=True)
     names = [figure.name for figure in found.figures] + [left.name for left in found.left_out]
     assert sum(name.startswith("bend with") for name in names) == count - 1
@@ -407,12 +416,12 @@ def test_an_unknown_figure_is_a_key_error(three: Prediction) -> None:
 
 def test_free_strokes_agree_with_a_stack_in_calculix() -> None:
     # docs/simulation.md: 15 balloons of d = 5, a quarter, 19.35 mm at 6 kPa.
-    found = sbafab.predict("3dof-15mm", pressures_kpa=(6.0,))
+    found = sbafab.predict("3dof-15mm", "models.calibration=none", pressures_kpa=(6.0,))
     assert found.value("free stroke at 6 kPa") == pytest.approx(19.35, rel=0.03)
 
 
 def test_a_film_that_would_stretch_too_far_is_left_out() -> None:
-    found = sbafab.predict("1dof-5mm", pressures_kpa=(100.0,))
+    found = sbafab.predict("1dof-5mm", "models.calibration=none", pressures_kpa=(100.0,))
     (left,) = (left for left in found.left_out if left.name.startswith("free stroke"))
     assert "23 % longer" in left.reason
 
@@ -429,16 +438,17 @@ def test_flat_the_stack_pushes_with_its_pockets(three: Prediction) -> None:
     # Films that cannot stretch touch all over: p pi l^2 a chamber, less what they need to turn.
     flat = three.value("blocked force at 100 kPa, flat", "elastic stack")
     assert 0.9 * 3 * 100e-3 * math.pi * 2.5**2 < flat < 3 * 100e-3 * math.pi * 2.5**2
-    one = sbafab.predict("1dof-5mm").value("blocked force at 100 kPa, flat", "elastic stack")
-    assert flat == pytest.approx(3 * one)
+    one = sbafab.predict("1dof-5mm", "models.calibration=none")
+    alone = one.value("blocked force at 100 kPa, flat", "elastic stack")
+    assert flat == pytest.approx(3 * alone)
 
 
 def test_calibration_by_pocket_and_modulus_is_named() -> None:
-    found = sbafab.predict("1dof-5mm", pocket_loss=0.3, modulus_mpa=20.0)
+    found = sbafab.predict("1dof-5mm", "models.calibration=none", pocket_loss=0.3, modulus_mpa=20.0)
     models = {figure.model.name for figure in found.figures if "elastic" in figure.model.name}
     assert models
     assert all("pocket loss 0.3 mm, E = 20 MPa" in name for name in models)
-    plain = sbafab.predict("1dof-5mm")
+    plain = sbafab.predict("1dof-5mm", "models.calibration=none")
     name = "free stroke at 10 kPa"
     assert found.value(name) < plain.value(name)
     assert found.value("full stroke") == plain.value("full stroke")
@@ -459,7 +469,7 @@ def test_the_work_of_the_air_is_its_integral_over_the_volume() -> None:
 
     It is told by what films store; wrinkles, whose stress follows the tension, put that off by 3 %.
     """
-    found = sbafab.predict("1dof-10mm", pressures_kpa=(1.0,))
+    found = sbafab.predict("1dof-10mm", "models.calibration=none", pressures_kpa=(1.0,))
     design = sbafab.load("1dof-10mm")
     pressures = np.geomspace(1e-3, 1.0, 60)
     volumes = inflate(balloons_of(design, build(design))[0], pressures).volume

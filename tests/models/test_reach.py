@@ -68,7 +68,8 @@ def test_stacks_with_fewer_and_more_chambers_reach_their_places(count: int) -> N
     assert missed(stack, 5, {"tip_load": (0.0, 0.002, -0.002)}) == 0
 
 
-def test_a_path_is_followed_from_pose_to_pose(three: Stack) -> None:
+def test_a_path_is_followed_from_pose_to_pose() -> None:
+    three = sbafab.stack("3dof-15mm", "models.calibration=none")
     load = LOADS["both"]
     turns = np.linspace(0.0, 2 * np.pi, 13)
     pose = three.reach((6.0, 0.0, 15.0), most_pressure=MOST, **load)

@@ -18,7 +18,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 @pytest.fixture(scope="module")
 def three() -> Stack:
-    return sbafab.stack("3dof-15mm")
+    return sbafab.stack("3dof-15mm", "models.calibration=none")
 
 
 def bend(three: Stack, chambers: int, pressure: float = 5.0) -> float:

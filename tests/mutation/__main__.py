@@ -171,7 +171,9 @@ def main() -> int:
     asked.add_argument("rooms", nargs="+", metavar="ROOM=COUNT", help="how many of each room")
     asked.add_argument("--seed", type=int, default=29, help="which are drawn [29]")
     asked.add_argument("--start", type=int, default=0, help="number of the first one [0]")
-    asked.add_argument("--own", action="store_true", help="only the tests that name the module")
+    reach = asked.add_mutually_exclusive_group()
+    reach.add_argument("--own", action="store_true", help="only the tests that name the module")
+    reach.add_argument("--room", action="store_true", help="only the tests of the module's room")
     given = asked.parse_args()
     left = 0
     with tempfile.TemporaryDirectory() as place:
@@ -187,7 +189,8 @@ def main() -> int:
                 target.write_text(changed(source, mutant), encoding="utf-8")
                 own = likely(home, room, mutant)
                 shown = [own, (f"tests/{room}",), *((one,) for one in NEIGHBOURS.get(room, ()))]
-                seen = any(is_seen(home, tests) for tests in (shown[:1] if given.own else shown))
+                most = 1 if given.own else 2 if given.room else None
+                seen = any(is_seen(home, tests) for tests in shown[:most])
                 target.write_text(source, encoding="utf-8")
                 if not seen:
                     survived.append(mutant)

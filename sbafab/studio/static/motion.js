@@ -155,7 +155,7 @@ export class Motion extends PoseView {
     this.values.replaceChildren(...rows.flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)]));
     const beside = measured(stack);
     if (!pose.stable) this.say(`The straight column is unstable: it would buckle. ${beside}`, true);
-    else this.say(`${beside} Elastic films, static air, not calibrated on a built actuator. Fill time is that of the fullest chamber at this flow, without the resistance of a tube (see Supply). Walls are drawn as arcs of the film's length.`, false);
+    else this.say(`${beside} Elastic films, static air, by the design's calibration. Fill time is that of the fullest chamber at this flow, without the resistance of a tube (see Supply). Walls are drawn as arcs of the film's length.`, false);
   }
 
   plots() {

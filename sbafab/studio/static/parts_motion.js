@@ -12,7 +12,7 @@ const RESTS = 2500;
 // kPa at which a part stands when it is first shown, and the most that a grip is given.
 const FIRST = 5, FIRST_GRIP = 10, MOST_GRIP = 110;
 const TRUST = {
-  stack: "Each actuator is an elastic stack, not calibrated on a built one; the parts that it carries move with its tip, without weight.",
+  stack: "Each actuator is an elastic stack with its design's calibration; the parts that it carries move with its tip, without weight.",
   grip: "Grips are lenses of inextensible film, equally high at any pressure.",
   all: "Contact between parts is ignored here; contacts and loads on the tips are under Prediction. Supply tubes, and lines through a moving arm, are left out.",
 };

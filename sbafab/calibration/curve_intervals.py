@@ -1,0 +1,91 @@
+"""The 90 % intervals that a calibration predicts at the points of a measured curve."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING
+
+from sbafab.calibration.fit import GROUP_OF, delay_of, film_of, relative_errors
+from sbafab.calibration.model_values import ModelValue, NoModel, model_values
+from sbafab.errors import DesignError
+from sbafab.models.calibrated import SHARE, deviations
+from sbafab.models.intervals import Uncertainty, for_film
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from sbafab.evidence.records import MeasuredCurve
+    from sbafab.models.calibrated import ModelCalibration
+    from sbafab.models.figures import Factors
+
+Ends = tuple[float, float]
+"""Least and largest value."""
+
+
+def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
+    """Return a calibration as it holds for the film of the actuator that was measured."""
+    try:
+        product = film_of(curve) if curve.actuator.is_described else calibration.film
+    except DesignError:
+        product = calibration.film
+    return Uncertainty(for_film(calibration, product), {})
+
+
+def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:
+    """Return the interval that holds the measured value at each point of a curve, in its unit, over
+    all that its source leaves open; None where the calibration does not cover its quantity. It
+    counts the calibration's uncertainty, what the models miss and the error of the measurement.
+
+    A point has none where an assumption that reaches it at the median fails to with factors one
+    standard deviation away.
+    """
+    group = GROUP_OF.get(curve.quantity)
+    if group is None or isinstance(model_values(curve, uncertainty.factors), NoModel):
+        return None
+
+    @cache
+    def series_with(factors: Factors) -> Mapping[str, tuple[ModelValue, ...]]:
+        answer = model_values(curve, factors)
+        return {} if isinstance(answer, NoModel) else answer.series
+
+    delay = delay_of(curve) if curve.quantity == "time_s" else ""
+    errors = relative_errors(curve).tolist()
+
+    def interval(phrase: str, point: int) -> Ends:
+        def value(factors: Factors) -> float:
+            reached = series_with(factors)[phrase][point]
+            if reached is None:
+                raise UnreachedError
+            return reached
+
+        return widened(*uncertainty.interval_of(group, value, delay=delay), errors[point])
+
+    def union(point: int) -> Ends | None:
+        phrases = [
+            phrase
+            for phrase, values in series_with(uncertainty.factors).items()
+            if values[point] is not None
+        ]
+        try:
+            ends = [interval(phrase, point) for phrase in phrases]
+        except (UnreachedError, KeyError):
+            return None
+        return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+
+    return [union(point) for point in range(len(curve.y))]
+
+
+def widened(value: float, ends: Ends, error: float) -> Ends:
+    """Return an interval with a relative standard error added to it as an independent one."""
+    low, high = ends
+    half = deviations(SHARE) * error
+    if low > 0:
+        span = math.hypot(math.log(high / value), half)
+        return value * math.exp(-span), value * math.exp(span)
+    span = math.hypot(high - value, half * abs(value))
+    return value - span, value + span
+
+
+class UnreachedError(Exception):
+    """A state that the actuator does not reach with other factors."""

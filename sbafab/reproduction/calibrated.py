@@ -1,0 +1,143 @@
+"""The paper's values beside the calibrated models, with their 90 % intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from sbafab.evidence.files import load_evidence
+from sbafab.evidence.records import MeasuredCurve
+from sbafab.models.calibrated import ModelCalibration, load_calibration
+from sbafab.models.unknowns import UNKNOWNS
+from sbafab.reproduction.comparison import (
+    ComparedCurve,
+    ComparedPoint,
+    compare_calibrated,
+    curve_as_json,
+    span,
+)
+
+PAPER = "paper"
+"""Name of the calibration, and of the evidence, whose values stand side by side."""
+TITLE = "Calibrated on the paper"
+COLUMNS = ("figure", "paper", "where", "calibrated", "90 % interval", "inside", "left open")
+NOT_ADOPTED = (
+    "Not adopted, because the paper's text gives too little to fit them: a film that stiffens with "
+    "stretch, a column that buckles or tilts under its load, hysteresis (4.2 of 45.3 mJ at 10 kPa) "
+    "and losses in valves beyond a delay."
+)
+
+
+class CalibratedPaper(NamedTuple):
+    """The shipped calibration, and the paper's curves that it covers."""
+
+    calibration: ModelCalibration
+    curves: tuple[ComparedCurve, ...]
+
+    @property
+    def points(self) -> list[ComparedPoint]:
+        """The points that have an interval."""
+        return [
+            point for curve in self.curves for point in curve.points if point.is_within is not None
+        ]
+
+    @property
+    def summary(self) -> str:
+        """The number of values that lie in their intervals."""
+        inside = sum(point.is_within is True for point in self.points)
+        return f"{inside} of {len(self.points)} in the 90 % intervals of the calibration"
+
+
+def calibrated_paper() -> CalibratedPaper:
+    """Return the paper's comparable curves beside the models calibrated on them."""
+    calibration = load_calibration(PAPER)
+    assert calibration is not None, "it ships"
+    curves = compare_calibrated(load_evidence(PAPER), calibration)
+    return CalibratedPaper(
+        calibration,
+        tuple(
+            compared
+            for compared in curves
+            if compared.curve.comparable
+            and any(point.interval is not None for point in compared.points)
+        ),
+    )
+
+
+def rows(paper: CalibratedPaper) -> Iterator[list[str]]:
+    """Yield the cells of a value of the paper, by COLUMNS."""
+    for compared in paper.curves:
+        for point in compared.points:
+            unit = compared.curve.y_unit
+            yield [
+                _figure(compared.curve, point),
+                f"{_number(point)} {unit}".rstrip(),
+                compared.curve.place,
+                f"{span(point.model)} {unit}".rstrip(),
+                span(point.interval, digits=3),
+                {True: "yes", False: "no", None: "-"}[point.is_within],
+                "; ".join(compared.assumptions),
+            ]
+
+
+def _figure(curve: MeasuredCurve, point: ComparedPoint) -> str:
+    name = f"{curve.y_name} ({curve.id})"
+    if point.x is None:
+        return name
+    axis = curve.x_name.removesuffix(f"_{curve.x_unit.lower()}").replace("_", " ")
+    return f"{name}, {axis} {point.x:g} {curve.x_unit}".rstrip()
+
+
+def _number(point: ComparedPoint) -> str:
+    return f"{point.measured:g}" + (f" +- {point.error:.2g}" if point.error else "")
+
+
+def lines(paper: CalibratedPaper) -> Iterator[str]:
+    """Yield the section of the page: what was fitted and how well it holds, then the table."""
+    yield f"## {TITLE}\n"
+    yield from sentences(paper)
+    yield ""
+    yield "| " + " | ".join(COLUMNS) + " |"
+    yield "|" + "---|" * len(COLUMNS)
+    for cells in rows(paper):
+        yield "| " + " | ".join(cells) + " |"
+    yield ""
+
+
+def sentences(paper: CalibratedPaper) -> Iterator[str]:
+    """Yield what a calibration was fitted to, its values, and what they leave unknown."""
+    calibration = paper.calibration
+    yield (
+        f"The calibration `{calibration.name}`, the default of predictions, is fitted to the "
+        "values of this table by\n`sbafab calibrate paper`, so that the table is no test of it. "
+        "The test: with one experiment left out\nafter the other, "
+        f"{calibration.inside} of {calibration.points} values lay in the 90 % intervals "
+        "that the others gave.\nModel and interval span what the paper leaves open; an interval "
+        "counts the uncertainty of the\ncalibration, what the models miss, and the error of the "
+        "measurement.\n"
+    )
+    for unknown in UNKNOWNS:
+        low, high = calibration.bounds(unknown.field)
+        yield (
+            f"* {unknown.title}: {unknown.shown(calibration.values[unknown.field])} "
+            f"({low:.3g} to {high:.3g}); prior about {unknown.shown(unknown.middle)}: "
+            f"{unknown.source}"
+        )
+    missed = ", ".join(
+        f"{group} {100 * spread:.0f} %" for group, spread in calibration.discrepancy.items()
+    )
+    apart = "; ".join(calibration.sentences) or "nothing"
+    yield f"\nThe evidence cannot tell apart: {apart}."
+    yield f"What the models miss beyond that, one standard deviation: {missed}."
+    yield NOT_ADOPTED
+
+
+def as_json(paper: CalibratedPaper) -> dict[str, Any]:
+    """Return the section for programs."""
+    calibration = paper.calibration
+    return {
+        "calibration": calibration.name,
+        "held_out": {"points": calibration.points, "inside": calibration.inside},
+        "discrepancy": dict(calibration.discrepancy),
+        "curves": [curve_as_json(compared) for compared in paper.curves],
+    }

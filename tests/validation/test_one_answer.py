@@ -1,0 +1,160 @@
+"""One figure of one design has one value and one interval, whichever part of the program is asked.
+
+The parts hold their figures each in its own way: ``predict`` in records and in JSON, ``find`` as
+quantities, the studio in answers of its jobs, the gallery in words, and the comparison with
+measured curves in series.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+import sbafab
+from docs.scripts.gallery import FIGURES, figures_of, numbers_of
+from sbafab.calibration.model_values import ModelValues, model_values
+from sbafab.evidence.records import MeasuredActuator, MeasuredCurve, Setup
+from sbafab.models.figures import Figure, Prediction
+from sbafab.models.intervals import factors_of
+from sbafab.search.quantities import Subject, read_quantity
+from sbafab.studio.jobs import elastic, motion
+from tests.cli.test_predict_command import run as run_predict
+from tests.studio.worked import job
+
+NAME = "3dof-15mm"
+ONE_ANSWER = 1e-6
+"""Relative difference that is left to rounding: JSON holds seven digits."""
+
+
+class Case(NamedTuple):
+    """A figure by its name in ``predict``, as a quantity of ``find``, and as a measured curve."""
+
+    figure: str
+    quantity: str
+    curve: MeasuredCurve
+
+
+def _curve(quantity: str, setup: Setup, x_name: str = "", x: tuple[float, ...] = ()) -> Any:
+    return MeasuredCurve("one", quantity, "bench", (1.0,), x_name, x, MeasuredActuator(NAME), setup)
+
+
+CASES = {
+    "force": Case(
+        "blocked force at 100 kPa, flat",
+        "force@0mm@100kPa",
+        _curve("force_n", Setup(pressure_kpa=100.0, tip="held"), "stroke_mm", (0.0,)),
+    ),
+    "bend": Case(
+        "bend at 10 kPa in one chamber, the others empty",
+        "bend@10kPa",
+        _curve("bend_deg", Setup(chambers=1), "pressure_kpa", (10.0,)),
+    ),
+    "stroke": Case(
+        "free stroke at 10 kPa",
+        "stroke@10kPa",
+        _curve("stroke_mm", Setup(), "pressure_kpa", (10.0,)),
+    ),
+}
+ELASTIC = ("elastic stack", "elastic balloon")
+
+
+@pytest.fixture(scope="module")
+def prediction() -> Prediction:
+    return sbafab.predict(NAME)
+
+
+def _figure(prediction: Prediction, name: str) -> Figure:
+    """Return the figure to design with, which is that of an elastic model."""
+    (figure,) = (one for one in prediction.figures if one.name == name and not one.other)
+    assert figure.model.name.startswith(ELASTIC)
+    return figure
+
+
+def _row(figures: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    (row,) = (one for one in figures if one["name"] == name and one["design_with"])
+    return row
+
+
+def _near(figure: Figure) -> Any:
+    return pytest.approx(figure.value, rel=ONE_ANSWER)
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> None:
+    design = sbafab.load(NAME)
+    subject = Subject(design, sbafab.build(design))
+    value = subject.value(read_quantity(case.quantity), lambda: 1.0)
+    assert value == _near(_figure(prediction, case.figure))
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction) -> None:
+    answer = model_values(case.curve, factors_of(sbafab.load(NAME)))
+    assert isinstance(answer, ModelValues)
+    figure = _figure(prediction, case.figure)
+    assert answer.model == figure.model.name
+    assert answer.series == {"": (_near(figure),)}
+    # Without the factors it is another figure.
+    assert model_values(case.curve) != answer
+
+
+def test_a_height_is_the_stroke_above_the_flat_one(prediction: Prediction) -> None:
+    of = replace(CASES["stroke"].curve, quantity="height_mm")
+    answer = model_values(of, factors_of(sbafab.load(NAME)))
+    assert isinstance(answer, ModelValues)
+    height = _figure(prediction, "free height at 10 kPa")
+    assert answer.series == {"": (_near(height),)}
+    flat = next(one for one in prediction.figures if one.name == "deflated height")
+    stroke = _figure(prediction, CASES["stroke"].figure)
+    assert height.value == pytest.approx(flat.value + stroke.value, rel=1e-12)
+
+
+def test_the_studio_and_json_have_it_with_its_interval(
+    prediction: Prediction, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (answer,) = elastic(job(tmp_path, sbafab.template(NAME)), lambda: None)
+    code, out, _ = run_predict([NAME, "--json", "-o", str(tmp_path)], capsys)
+    assert code == 0
+    for figures in (answer["figures"], json.loads(out)["figures"]):
+        for case in CASES.values():
+            figure = _figure(prediction, case.figure)
+            row = _row(figures, case.figure)
+            assert row["value"] == _near(figure)
+            assert figure.interval is not None
+            assert row["interval"] == pytest.approx(figure.interval, rel=ONE_ANSWER)
+            assert row["model"] == figure.model.title
+
+
+def test_the_studio_moves_the_same_stack(prediction: Prediction, tmp_path: Path) -> None:
+    """To the places that its numbers are sent with."""
+    asked = {**job(tmp_path, sbafab.template(NAME)), "pose": {"pressures": [10.0, 0.0, 0.0]}}
+    (pose,) = motion(asked, lambda: None)
+    bend = _figure(prediction, CASES["bend"].figure).value
+    assert pose["bend"] == pytest.approx(bend, rel=1e-3)
+    stack = sbafab.stack(NAME)
+    assert stack.pose((10.0, 0.0, 0.0)).bend == pytest.approx(bend, rel=ONE_ANSWER)
+
+
+def test_the_gallery_shows_it_with_its_interval(prediction: Prediction) -> None:
+    """To the decimals of a card, and with the decimals of its interval."""
+    shown = {words: (value, aside) for words, value, aside in numbers_of(prediction)}
+    known = {one.name: one for one in prediction.figures if not one.other}
+    held = 0
+    for name, words, digits in FIGURES:
+        figure = known.get(name)
+        if words not in shown or figure is None or figure.interval is None:
+            continue
+        held += 1
+        numbers = [float(number) for number in re.findall(r"[\d.]+", shown[words][0])]
+        expected = (figure.value, *figure.interval)
+        assert numbers == pytest.approx(expected, abs=0.5 * 10.0**-digits * (1 + 1e-9))
+    assert held == 2
+    card = list(figures_of(prediction, sbafab.load(NAME)))
+    for name, words, digits in FIGURES:
+        if name in known:
+            assert any(line.startswith(f"{words} {known[name].value:.{digits}f} ") for line in card)
