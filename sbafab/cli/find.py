@@ -353,8 +353,9 @@ def _print_quantities(result: FoundDesign) -> None:
     print_line(f"  {label}: {value}")
     if goal.quantity.label not in [requirement.quantity.label for requirement in requirements]:
         _print_measured(result, goal.quantity)
-    if result.intervals:
-        hint = "" if result.problem.sure else "; --sure 0.9 asks that each requirement holds so"
+    is_sure = result.problem.sure is not None
+    if goal.quantity.label in result.intervals or (result.intervals and not is_sure):
+        hint = "" if is_sure else "; --sure 0.9 asks that each requirement holds so"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
         print_wrapped(note, indent="  ")
     strokes = [quantity for quantity in result.problem.quantities if quantity.name == "stroke"]
