@@ -9,13 +9,19 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.cli import options
-from sbafab.cli.options import PRESSURE, calibration_options, set_option
+from sbafab.cli.options import PRESSURE, calibration_options, refuse_options, set_option
 from sbafab.cli.printing import print_verdict
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.formulas import force
 from sbafab.models.intervals import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.stack import stack
+from sbafab.simulators.mujoco.joint_chain import chain_text
+
+MUJOCO = "xml"
+"""Ending of a MuJoCo model."""
+MODEL_PRESSURE = 10.0
+"""kPa in each chamber of a MuJoCo model, unless others are given."""
 
 
 @click.command(name="map")
@@ -25,7 +31,8 @@ from sbafab.models.stack import stack
     "--to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="Write FILE.csv, FILE.json or FILE.py.  [default: CSV on standard output]",
+    help="Write FILE.csv, FILE.json, FILE.py, FILE.xml (MuJoCo) or FILE.urdf.  [default: CSV on "
+    "standard output]",
 )
 @click.option(
     "--pressure",
@@ -43,6 +50,11 @@ from sbafab.models.stack import stack
     metavar="N",
     help="Number of pressures, and of heights, in CSV and JSON.",
 )
+@click.option(
+    "--pressures",
+    metavar="P,P,...",
+    help="Pressures that the .xml file is for, one a chamber.  [default: 10 kPa in each]",
+)
 @calibration_options
 def map_(
     source: str,
@@ -50,21 +62,30 @@ def map_(
     to: Path | None,
     pressure: float,
     points: int,
+    pressures: str | None,
     **factors: Any,
 ) -> None:
     """Map force and volume of the balloons.
 
-    The map covers all pressures and heights, for use in other programs.
+    The map covers all pressures and heights, for use in other programs. FILE.xml is a MuJoCo model
+    of the stack about its pose at the given pressures, FILE.urdf its kinematic chain.
     """
     form = "csv" if to is None else to.suffix.removeprefix(".")
-    if form not in FORMATS:
-        raise DesignError(f"{to} must end with .{', .'.join(FORMATS)}, which sets the format")
+    formats = (*FORMATS, MUJOCO)
+    if form not in formats:
+        raise DesignError(f"{to} must end with .{', .'.join(formats)}, which sets the format")
+    if form != MUJOCO:
+        refuse_options("is for a MuJoCo model; give --to FILE.xml, or leave it out", "pressures")
     if pressure <= 0:
         raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
     force(pressure, 0.0)  # raises past the burst pressure
     design = load_design(source, assignments, ())
     actuator = stack(design, most_pressure=pressure, factors=factors_of(design, factors))
-    text = map_text(design.name, actuator, form, points)
+    if form == MUJOCO:
+        each = _listed(pressures, actuator.chambers)
+        text = chain_text(design.name, actuator, each)
+    else:
+        text = map_text(design.name, actuator, form, points)
     if to is None:
         click.echo(text, nl=False)
         return
@@ -73,3 +94,16 @@ def map_(
     except OSError as error:
         raise OutputError(f"{to} cannot be written: {error.strerror}") from None
     print_verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}")
+
+
+def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
+    """Return pressures in kPa, one a chamber. Raises BadParameter, DesignError."""
+    if pressures is None:
+        return (MODEL_PRESSURE,) * chambers
+    each = tuple(PRESSURE.read(text) for text in pressures.split(","))
+    if len(each) != chambers:
+        raise DesignError(
+            f"--pressures has {len(each)} values and the design {chambers} chambers; give one a "
+            "chamber, with commas between them, such as 10,0,0"
+        )
+    return each

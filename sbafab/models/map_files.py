@@ -1,4 +1,5 @@
-"""The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies.
+"""The balloons of a design as files for other programs: CSV, JSON, and Python that takes numpy arrays
+and needs no package.
 
 Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
+from sbafab.models.joint_chain import urdf_text
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
@@ -22,13 +24,15 @@ if TYPE_CHECKING:
 SCHEMA = "sbafab/balloon-map@1"
 POINTS = 31
 COLUMNS = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potential_uj")
-FORMATS = ("csv", "json", "py")
+FORMATS = ("csv", "json", "py", "urdf")
 
 
 def map_text(name: str, stack: Stack, form: str, points: int = POINTS) -> str:
     """Return the text of a file of one of FORMATS."""
     if form == "py":
         return _python(name, stack)
+    if form == "urdf":
+        return urdf_text(name, stack)
     if form == "json":
         return json.dumps(_record(name, stack, points), indent=1) + "\n"
     return _csv(stack, points)
@@ -103,7 +107,8 @@ PYTHON = '''"""The balloons of {name}, as sbafab maps them. Plain Python, no imp
 force(p, h), volume(p, h), stiffness(p, h) of one balloon at a pressure p (kPa) and a height h (mm,
 what it has risen by): mN on the plates, ul, mN/mm. Below 0 the plates pull. All three come from one
 potential W, so force = -dW/dh, volume = -dW/dp and dvolume/dh = dforce/dp. balloon is one of
-BALLOONS; LEVELS says which one each level of a chamber has, bottom to top.
+BALLOONS; LEVELS says which one each level of a chamber has, bottom to top. p, h or both may be
+numpy arrays, of shapes that numpy broadcasts.
 """
 
 import math
@@ -117,7 +122,7 @@ BALLOONS = {balloons}
 
 
 def _weights(u, order):
-    found = []
+    weights = []
     for row in PIECES:
         coefficients = list(row)
         for _ in range(order):
@@ -125,12 +130,14 @@ def _weights(u, order):
         value = 0.0
         for c in reversed(coefficients):
             value = value * u + c
-        found.append(value)
-    return found
+        weights.append(value)
+    return weights
 
 
 def _spline(balloon, p, h, by_p, by_h):
     b = BALLOONS[balloon]
+    if hasattr(p, "shape") or hasattr(h, "shape"):
+        return _array_spline(b, p, h, by_p, by_h)
     if not (0.0 <= p <= b["most_pressure"] and 0.0 <= h <= b["most_height"]):
         most = (b["most_pressure"], b["most_height"])
         raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
@@ -143,6 +150,25 @@ def _spline(balloon, p, h, by_p, by_h):
     rows = b["coefficients"][i : i + {count}]
     return rate * sum(
         a * sum(w * c for w, c in zip(along, row[j : j + {count}])) for a, row in zip(across, rows)
+    )
+
+
+def _array_spline(b, p, h, by_p, by_h):
+    import numpy as np
+
+    p, h = np.broadcast_arrays(np.asarray(p, float), np.asarray(h, float))
+    most = (b["most_pressure"], b["most_height"])
+    if not ((p >= 0) & (p <= most[0]) & (h >= 0) & (h <= most[1])).all():
+        raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
+    each = SPANS_P / math.asinh(most[0] / P0)
+    x = np.minimum(np.arcsinh(p / P0) * each, SPANS_P * (1 - 1e-12))
+    y = np.minimum(h * SPANS_H / most[1], SPANS_H * (1 - 1e-12))
+    i, j = x.astype(int), y.astype(int)
+    across, along = _weights(x - i, by_p), _weights(y - j, by_h)
+    rate = (each / np.hypot(p, P0)) ** by_p * (SPANS_H / most[1]) ** by_h
+    table = np.array(b["coefficients"])
+    return rate * sum(
+        a * w * table[i + k, j + n] for k, a in enumerate(across) for n, w in enumerate(along)
     )
 
 

@@ -1,0 +1,215 @@
+"""A stack as rigid plates on springs (MJCF), linearised about its pose at given pressures."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.errors import DesignError
+from sbafab.models.derivatives import Linearised, linearised
+from sbafab.models.joint_chain import (
+    JOINTS,
+    UPPER,
+    axis_of,
+    document,
+    joint_values,
+    number,
+    numbers,
+    plate_mass,
+)
+from sbafab.models.stack_loads import plate_chain
+
+if TYPE_CHECKING:
+    from sbafab.models.film_elements import Array
+    from sbafab.models.stack import Pose, Stack
+
+ACCURACY = 0.02
+"""Largest error of the tip's place, as a share of the stack's length."""
+RANGES = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+"""kPa about the given pressures that are tried, largest first."""
+DT, SETTLING = 0.002, 0.05
+"""s: a step, and the time constant of each level, by dampers as of no actuator."""
+MASS = 1e-5
+"""kg of a plate that stands in where a density is not known."""
+FREEDOMS = (("rise",), ("tilt_x", "tilt_x_upper"), ("tilt_y", "tilt_y_upper"))
+"""Joints that add up to each freedom of a level."""
+SPRINGS = ("rise", "tilt_x", "tilt_y")
+POSE = "pressed"
+
+
+def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
+    """Return a stack as MJCF, in mm, kg and s, which settles in its pose at pressures (kPa, one a
+    chamber) from any start. Control of a chamber is by how many kPa it is above its pressure.
+
+    Raises DesignError where the stack has no stable pose there.
+    """
+    pose = stack.pose(pressures)
+    at = linearised(stack, pose)
+    if np.linalg.eigvalsh(at.matrices).min() <= 0:
+        raise DesignError(
+            f"the pose at {_listed(pose.pressures)} kPa is about to buckle, so that no springs "
+            "hold it; give other --pressures"
+        )
+    span = valid_range(stack, pose, at)
+    root = ET.Element("mujoco", {"model": name})
+    ET.SubElement(root, "compiler", {"angle": "radian"})
+    option = {"timestep": number(DT), "gravity": "0 0 0", "integrator": "implicit"}
+    ET.SubElement(ET.SubElement(root, "option", option), "flag", {"contact": "disable"})
+    height = pose.height
+    centre = {"center": numbers((0, 0, height / 2)), "extent": number(max(height, 5.0))}
+    ET.SubElement(root, "statistic", centre)
+    _add_plates(ET.SubElement(root, "worldbody"), stack)
+    _add_mirrors(ET.SubElement(root, "equality"), len(stack.levels))
+    tendons = ET.SubElement(root, "tendon")
+    _add_springs(tendons, at)
+    _add_chambers(tendons, at)
+    if span:
+        _add_controls(ET.SubElement(root, "actuator"), stack, pose, span)
+    key = {"name": POSE, "qpos": numbers(joint_values(at.freedoms).ravel())}
+    ET.SubElement(ET.SubElement(root, "keyframe"), "key", key)
+    return document(root, _note(name, stack, pose, span))
+
+
+def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
+    """Return by how many kPa pressures may differ from a pose's, each alone or all together, with
+    the linear tip within ACCURACY of the stack's; 0 where that is less than the last of RANGES.
+    """
+    p = np.asarray(pose.pressures)
+    each = np.concatenate([np.eye(stack.chambers), np.ones((1, stack.chambers))])
+    ways = np.concatenate([each, -each])
+    for span in RANGES:
+        ends = np.clip(p + span * ways, 0.0, stack.most_pressure)
+        if all(_is_close(stack, pose, at, end) for end in ends):
+            return span
+    return 0.0
+
+
+def _is_close(stack: Stack, pose: Pose, at: Linearised, pressures: Array) -> bool:
+    pulls = np.einsum("clf,c->lf", at.filling, pressures - pose.pressures)
+    moves = np.linalg.solve(at.matrices, pulls[..., None])[..., 0]
+    tip = plate_chain(at.freedoms + moves, stack.pitch).places[-1]
+    try:
+        exact = stack.pose(tuple(pressures.tolist()), near=pose).tip
+    except DesignError:
+        return False
+    return float(np.linalg.norm(tip - exact)) <= ACCURACY * length_of(pose)
+
+
+def length_of(pose: Pose) -> float:
+    """Return the length of a pose's middle line in mm."""
+    return float((pose.freedoms[:, 0] + pose.pitch).sum())
+
+
+def _add_plates(world: ET.Element, stack: Stack) -> None:
+    """Add two bodies a level: what is between its halves, then its upper plate."""
+    mass = plate_mass(stack) or MASS
+    size = numbers((stack.outline, stack.pitch / 4))
+    shape = {"type": "cylinder", "size": size, "contype": "0", "conaffinity": "0", "mass": "0"}
+    paint = {"rgba": "0.35 0.60 0.85 1"}
+    ET.SubElement(world, "geom", {"name": "base", **shape, "rgba": "0.4 0.4 0.4 1"})
+    across = mass / 2 * stack.outline**2
+    inertial = {
+        "pos": "0 0 0",
+        "mass": number(mass / 2),
+        "diaginertia": numbers((across / 4, across / 4, across / 2)),
+    }
+    body = world
+    for level in range(1, len(stack.levels) + 1):
+        for title, joints, place in (
+            (f"level{level}", JOINTS[:3], 0.0),
+            (f"plate{level}", JOINTS[3:], stack.pitch),
+        ):
+            body = ET.SubElement(body, "body", {"name": title, "pos": numbers((0, 0, place))})
+            ET.SubElement(body, "inertial", inertial)
+            for joint in joints:
+                kind = "slide" if joint == "rise" else "hinge"
+                parts = {"name": f"level{level}_{joint}", "type": kind, "axis": axis_of(joint)}
+                ET.SubElement(body, "joint", parts)
+        ET.SubElement(body, "geom", {**shape, **paint})
+    ET.SubElement(body, "site", {"name": "tip"})
+
+
+def _add_mirrors(equality: ET.Element, levels: int) -> None:
+    for level in range(1, levels + 1):
+        for joint in (joint for joint in JOINTS if joint.endswith(UPPER)):
+            upper = f"level{level}_{joint}"
+            names = {"joint1": upper, "joint2": upper.removesuffix(UPPER)}
+            ET.SubElement(equality, "joint", {**names, "polycoef": "0 1 0 0 0"})
+
+
+def _add_springs(tendons: ET.Element, at: Linearised) -> None:
+    """Add three springs a level, whose energy is q H q / 2 for the second derivatives H = L D L^T
+    by its freedoms: D are stiffnesses, and L says of which freedoms each spring's length is.
+    """
+    lower = np.linalg.cholesky(at.matrices)
+    roots = np.diagonal(lower, axis1=1, axis2=2)
+    for level, (columns, stiffnesses) in enumerate(
+        zip(lower / roots[:, None], roots**2, strict=True), start=1
+    ):
+        lengths = at.freedoms[level - 1] @ columns
+        for spring, ways, stiffness, length in zip(
+            SPRINGS, columns.T, stiffnesses, lengths, strict=True
+        ):
+            parts = {
+                "name": f"level{level}_{spring}",
+                "stiffness": number(stiffness),
+                "damping": number(stiffness * SETTLING),
+                "springlength": number(length),
+            }
+            _add_joints(ET.SubElement(tendons, "fixed", parts), level, ways)
+
+
+def _add_joints(tendon: ET.Element, level: int, ways: Array) -> None:
+    """Add the joints of one level to a tendon's length, by its freedoms (3,)."""
+    # What is left by rounding alone does not count.
+    least = 1e-9 * float(np.abs(ways).max())
+    for joints, way in zip(FREEDOMS, ways.tolist(), strict=True):
+        for joint in joints if abs(way) > least else ():
+            parts = {"joint": f"level{level}_{joint}", "coef": number(way)}
+            ET.SubElement(tendon, "joint", parts)
+
+
+def _add_chambers(tendons: ET.Element, at: Linearised) -> None:
+    """Add a tendon a chamber: its length grows as the chamber's volume does, in ul."""
+    for chamber, rates in enumerate(at.filling, start=1):
+        tendon = ET.SubElement(tendons, "fixed", {"name": f"chamber{chamber}"})
+        for level, ways in enumerate(rates, start=1):
+            _add_joints(tendon, level, ways)
+
+
+def _add_controls(actuator: ET.Element, stack: Stack, pose: Pose, span: float) -> None:
+    for chamber, pressure in enumerate(pose.pressures, start=1):
+        ends = np.clip((pressure - span, pressure + span), 0.0, stack.most_pressure) - pressure
+        parts = {"name": f"chamber{chamber}", "tendon": f"chamber{chamber}"}
+        parts |= {"ctrllimited": "true", "ctrlrange": numbers(ends)}
+        ET.SubElement(actuator, "motor", parts)
+
+
+def _listed(pressures: Sequence[float]) -> str:
+    return ", ".join(f"{pressure:g}" for pressure in pressures)
+
+
+def _note(name: str, stack: Stack, pose: Pose, span: float) -> str:
+    share = f"{100 * ACCURACY:g} %"
+    valid = (
+        f"ctrl of a chamber is by how many kPa it is above that. Within {span:g} kPa, each chamber\n"
+        f"alone or all together, the tip settles within {share} of the stack's length\n"
+        f"({length_of(pose):.4g} mm) of the elastic stack's place."
+        if span
+        else f"Balloons change so much with pressure there that no range of them is within {share}\n"
+        "of the stack's length, and there are no controls."
+    )
+    mass = "the films'" if stack.weight is not None else f"{MASS:g} kg, for a film has no density"
+    return f"""\
+{name}: rigid plates on springs for MuJoCo, for {_listed(pose.pressures)} kPa in its chambers.
+Units: mm, kg, s; so force mN, pressure kPa, volume ul.
+It settles there, with the tip at {numbers(np.round(pose.tip, 4))} mm and bent by
+{pose.bend:.1f} degrees; so it starts in the key "{POSE}", else flat.
+{valid}
+Springs are the elastic stack's second derivatives at that pose, for small motions and loads about
+it; rims that meet or part are not in it. The length of tendon chamber<i> grows with its volume.
+A plate's mass is {mass}. Dampers settle each level in some {SETTLING:g} s,
+as no actuator does: states at rest alone mean something. Not in it: gravity, contact."""
