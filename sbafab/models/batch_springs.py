@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_poses import PosedStack
 
-BY_PRESSURE = (PIECES, SLOPES, CURVES)
+BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
+BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
 """Splines' weights by pressure: of values, first and second derivatives."""
 LEAST_PIVOT = 1e-12
 """Pivot, as a share of the largest, below which a matrix counts as indefinite."""
@@ -85,7 +86,7 @@ class BatchSprings:
 
     def weights(self, pressures: Array, orders: int) -> Array:
         """Return the splines' weights at pressures (chambers, n) of values and of derivatives by
-        pressure: (coefficients, orders, chambers, n).
+        pressure: (orders, coefficients, chambers, n).
         """
         x, rate = self.kind._scaled(pressures)
         first = x.astype(np.int_)
@@ -94,43 +95,42 @@ class BatchSprings:
         powers[1] = (x - first).ravel()
         for k in range(2, DEGREE + 1):
             np.multiply(powers[k - 1], powers[1], out=powers[k])
-        each = [
-            (table @ powers[: table.shape[1]]).reshape(-1, *x.shape)
-            for table in BY_PRESSURE[:orders]
-        ]
+        each = (BY_PRESSURE[:orders].reshape(-1, DEGREE + 1) @ powers).reshape(orders, -1, x.size)
         if orders > 1:
+            rate = rate.ravel()
             if orders > 2:
-                bend = pressures / (pressures**2 + self.kind.scale_pressure**2)
-                each[2] = rate * (each[2] * rate - each[1] * bend)
-            each[1] = each[1] * rate
-        whole = np.zeros((PRESSURE_SPANS + DEGREE, orders, x.size))
-        begin = first.ravel() * (orders * x.size) + np.arange(x.size)
-        flat = whole.reshape(-1)
-        for order in range(orders):
-            for j in range(DEGREE + 1):
-                flat[begin + (j * orders + order) * x.size] = each[order][j].ravel()
-        return whole.reshape(-1, orders, *x.shape)
+                p = pressures.ravel()
+                each[2] *= rate * rate
+                each[2] -= each[1] * (rate * p / (p * p + self.kind.scale_pressure**2))
+            each[1] *= rate
+        whole = np.zeros((orders, PRESSURE_SPANS + DEGREE, x.size))
+        places = first.ravel() * x.size + np.arange(x.size)
+        where = places + (np.arange(DEGREE + 1) * x.size)[:, None]
+        for one, weights in zip(whole, each, strict=True):
+            one.reshape(-1)[where] = weights
+        return whole.reshape(orders, -1, *x.shape)
 
     def at(self, weights: Array, freedoms: Array) -> SpringBatch:
         """Return the springs at pressures of ``weights`` and freedoms (3, n)."""
-        orders, chambers, count = weights.shape[1:]
+        orders, _, chambers, count = weights.shape
         points = chambers * RING_POINTS
         gaps = self.meet @ freedoms
         after = gaps[:points] + 1.0
         piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
         u = after - piece
         low, high = int(piece.min()), int(piece.max()) + 1
-        size = orders * chambers * count
+        size = chambers * count
         part = self.table[:, low:high].reshape(-1, self.table.shape[2])
-        rows = (part @ weights.reshape(-1, size)).reshape(DEGREE + 1, -1)
+        # (orders, powers, pieces x chambers x n)
+        rows = (part @ weights.reshape(orders, -1, size)).reshape(orders, DEGREE + 1, -1)
         piece -= low
         piece *= size
         begin = piece.reshape(chambers, RING_POINTS, count)
         begin += np.arange(chambers * count).reshape(chambers, 1, count)
-        where = piece + (np.arange(orders) * (chambers * count))[:, None, None]
-        value = rows[DEGREE].take(where)
-        first, second = value[:2] * 0.0, np.zeros_like(u)
-        spare = np.empty_like(value)
+        value, ahead = np.empty((2, orders, points, count))
+        for one, table in zip(value, rows, strict=True):
+            table[DEGREE].take(piece, out=one, mode="clip")
+        first, second = np.zeros((min(orders, 2), points, count)), np.zeros_like(u)
         for k in range(DEGREE - 1, -1, -1):
             if k < DEGREE - 2:
                 second *= u
@@ -138,8 +138,10 @@ class BatchSprings:
                 second += first[0]
                 first *= u
             first += value[:2]
+            for one, table in zip(ahead, rows, strict=True):
+                table[k].take(piece, out=one, mode="clip")
             value *= u
-            value += rows[k].take(where, out=spare, mode="clip")
+            value += ahead
         energy = value[0].sum(0)
         gradient = self.tilts.reshape(chambers, 3, points).sum(0) @ first[0]
         matrix = self.squares @ (2 * second)

@@ -35,8 +35,10 @@ POSE_STEPS, MOTION_STEPS = 40, 16
 """Most of Newton's steps of a pose and of a motion before a state is solved alone."""
 RESIDUAL = 1e-7
 """Residual in mN (or mN mm) that counts as none."""
-POSE_ERROR, MOTION_ERROR = 1e-9, 1e-7
-"""Error (mm, rad) at which a pose ends, and that of a step of a motion."""
+POSE_ERROR = 1e-9
+"""Error (mm, rad) at which a pose ends."""
+MOTION_ERRORS = np.array([[1e-6], [1e-5]])
+"""Errors at which a step of a motion ends: mm and rad, and the share of a pressure."""
 HALVINGS = 12
 STRAIGHT = 1e-24
 """Square of a tilt in rad that is taken for 0."""
@@ -263,7 +265,7 @@ class StackBatch:
             self.springs, self.counts, start, freedoms, strict=True
         ):
             weights = springs.weights(pressures, 2)
-            is_solved = _descended(springs, weights[:, :1], begin, end)
+            is_solved = _descended(springs, weights[:1], begin, end)
             volumes = springs.at(weights, end).volumes
             is_solved &= (self.stack.centres.T @ end <= springs.kind.most_height).all(0)
             total += count * np.where(is_solved, volumes, np.nan)
@@ -454,7 +456,7 @@ class BatchMotion:
         count, most = len(acts), self.batch.stack.most_pressure
         end = _State(begin.freedoms.copy(), begin.pressures.copy())
         is_solved, live = np.zeros(count, dtype=bool), np.arange(count)
-        (at, p), before = begin, np.zeros(count)
+        (at, p), before = begin, np.zeros((2, count))
         x = np.arcsinh(p / SCALE_PRESSURE)
         contents = np.zeros(0)
         for number in range(MOTION_STEPS):
@@ -468,15 +470,15 @@ class BatchMotion:
             moves, dp = self._newton_step(each, p, content - contents, acts, sources)
             rate = np.hypot(p, SCALE_PRESSURE)
             dx = dp / rate
-            largest = np.maximum(np.abs(moves).max((0, 1)), np.abs(dx).max(0))
-            share = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(dx).max(0), 1e-12))
+            largest = np.stack([np.abs(moves).max((0, 1)), np.abs(dx).max(0)])
+            share = np.minimum(1.0, LONGEST_STEP / np.maximum(largest[1], 1e-12))
             for move in moves:
                 share = np.minimum(share, _step_share(move))
             x = np.maximum(x + share * dx, 0.0)
             p = np.minimum(SCALE_PRESSURE * np.sinh(x), most)
             at = at + share * moves
-            still = largest * largest < MOTION_ERROR * before
-            still |= largest < MOTION_ERROR
+            still = (largest * largest < MOTION_ERRORS * before).all(0)
+            still |= (largest < MOTION_ERRORS).all(0)
             if still.any():
                 which = live[still]
                 end.freedoms[:, :, which] = at[:, :, still]
@@ -487,7 +489,7 @@ class BatchMotion:
                     break
                 live, at, x, p = live[rest], at[:, :, rest], x[:, rest], p[:, rest]
                 contents, acts, sources = contents[:, rest], acts[rest], sources[:, rest]
-                largest, share = largest[rest], share[rest]
+                largest, share = largest[:, rest], share[rest]
             before = np.where(share == 1.0, largest, 0.0)
         return is_solved, end
 
