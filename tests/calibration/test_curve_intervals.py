@@ -55,7 +55,7 @@ def test_a_flat_height_by_hand(paper: ModelCalibration) -> None:
 def test_what_a_source_leaves_open_widens_the_interval(
     paper: ModelCalibration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The least end of one assumption and the largest of the other; states not reached count not."""
+    """The least end of one assumption and the largest of the other; no others."""
 
     def model(_: MeasuredCurve, factors: Factors) -> ModelValues:
         series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (40.0,), "300 kPa": (None,)}
