@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -70,37 +69,8 @@ def markdown_rows(text: str, heading: str = "") -> Iterator[list[str]]:
         header = header or cells
 
 
-SHOWN = (
-    # Figure, model and section of the CSV, and the figure's name in the summary.
-    (
-        "1-DoF, 100 kPa, at 75 % of full stroke",
-        "virtual work on Eq. 4",
-        "blocked force, 1-DoF, 75 % of stroke",
-    ),
-    ("3-DoF, 100 kPa, flat", "virtual work on Eq. 4", "blocked force, 3-DoF, flat"),
-    ("3-DoF, 100 kPa, flat", "elastic stack", "blocked force, 3-DoF, flat"),
-    (
-        "3-DoF, 100 kPa, at 75 % of full stroke",
-        "elastic stack",
-        "blocked force, 3-DoF, 75 % of stroke",
-    ),
-    (
-        "height of the 3-DoF of 15 balloons",
-        "elastic stack, 10 kPa in the chambers",
-        "height of the 3-DoF",
-    ),
-    ("largest bend", "elastic stack, 10 kPa in 2 chambers", "largest bend"),
-    (
-        "time to 10 kPa, water, 35 ml/min",
-        "Eq. 4 over flow, three chambers of 15 balloons at 17.5 mm",
-        "time to fill, water",
-    ),
-    ("time to 10 kPa, air, 2.5 l/min", "Eq. 4 over flow, squeezed to 10 kPa", "time to fill, air"),
-    ("3-DoF of 15 balloons, deflated", "sum of the films", "deflated height of the 3-DoF"),
-)
 CALIBRATED = (
     # Curve and place of the CSV, and the figure's name in the summary.
-    ("(force-1dof), height share 0", "blocked force, 1-DoF, flat"),
     ("(force-1dof), height share 0.75", "blocked force, 1-DoF, 75 % of stroke"),
     ("(force-3dof), height share 0", "blocked force, 3-DoF, flat"),
     ("(force-3dof), height share 0.75", "blocked force, 3-DoF, 75 % of stroke"),
@@ -108,28 +78,11 @@ CALIBRATED = (
     ("(flat-height)", "deflated height of the 3-DoF"),
     ("(full-height)", "height of the 3-DoF"),
     ("(largest-bend)", "largest bend"),
-    ("(stroke-10mm-water), volume 86 ul", "stroke of a balloon of d = 10, 86 ul of water"),
     ("(time-water), pressure 10 kPa", "time to fill, water"),
     ("(time-air), pressure 10 kPa", "time to fill, air"),
-    ("(bend-times), bend 89.7 deg", "time to bend by 89.7 deg, water"),
     ("(modulus-3dof)", "lateral modulus, 3-DoF"),
     ("(energy-1kpa), pressure 1 kPa", "pneumatic input work at 1 kPa, d = 10"),
 )
-
-
-def validation_summary() -> Table:
-    """Return the paper's main figures beside their predictions, one row a figure and model."""
-    every = table("validation")
-    at = list(every.columns).index
-    rows = []
-    for figure, model, name in SHOWN:
-        (cells,) = (
-            row for row in every.rows if (row[at("figure")], row[at("model")]) == (figure, model)
-        )
-        share = re.findall(r"([+-][\d.]+)%", cells[at("residual")])[0]
-        brief = model.replace("E = F l^3 / (3 delta I), ", "").split(", three chambers")[0]
-        rows.append([name, cells[at("paper")], cells[at("predicted")], f"{share} %", brief])
-    return Table(["figure", "paper", "predicted", "residual", "model"], rows)
 
 
 def calibrated_summary() -> Table:
@@ -177,7 +130,6 @@ def sofa_summary() -> Table:
 
 
 SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
-    ("validation", "summary"): validation_summary,
     ("calibrated", "summary"): calibrated_summary,
     ("balloons", "summary"): balloons_summary,
     ("faults", "summary"): faults_summary,

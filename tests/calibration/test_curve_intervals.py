@@ -1,0 +1,123 @@
+"""Intervals at the points of measured curves, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for, widened
+from sbafab.calibration.model_values import ModelValues
+from sbafab.evidence.records import MeasuredActuator, MeasuredCurve, Setup, StatedError
+from sbafab.models.calibrated import ModelCalibration, load_calibration
+from sbafab.models.figures import Factors
+from sbafab.models.intervals import Uncertainty
+from sbafab.models.unknowns import UNKNOWNS
+
+FILMS = 12 * 0.038 + 11 * 0.025
+"""mm: twelve films of the 1-DoF and eleven masks between them."""
+DEVIATIONS = 1.6448536
+"""Half width of the middle 90 % of a normal distribution."""
+
+
+@pytest.fixture(scope="module")
+def paper() -> ModelCalibration:
+    calibration = load_calibration("paper")
+    assert calibration is not None
+    return calibration
+
+
+def curve(quantity: str, setup: Setup | None = None, y: float = 1.0) -> MeasuredCurve:
+    return MeasuredCurve(
+        "bench",
+        quantity,
+        "bench",
+        (y,),
+        actuator=MeasuredActuator("1dof-5mm"),
+        setup=setup or Setup(),
+        error=StatedError(absolute=(0.2 * y,), source="scale"),
+    )
+
+
+def test_a_flat_height_by_hand(paper: ModelCalibration) -> None:
+    """In proportion to the press factor: variance of its logarithm, miss, and error, summed."""
+    flat = curve("flat_height_mm", y=0.4)
+    intervals = curve_intervals(flat, uncertainty_for(flat, paper))
+    assert intervals is not None
+    assert intervals[0] is not None
+    low, high = intervals[0]
+    assert math.sqrt(low * high) == pytest.approx(FILMS * paper.values["press_factor"])
+    spread = paper.covariance[2][2] + paper.discrepancy["flat height"] ** 2 + 0.2**2
+    assert math.log(high / low) == pytest.approx(2 * DEVIATIONS * math.sqrt(spread), rel=1e-6)
+
+
+def test_what_a_source_leaves_open_widens_the_interval(
+    paper: ModelCalibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The least end of one assumption and the largest of the other; no others."""
+
+    def model(_: MeasuredCurve, factors: Factors) -> ModelValues:
+        series = {"10 kPa": (factors.modulus_ratio,), "100 kPa": (40.0,), "300 kPa": (None,)}
+        return ModelValues("m", series)
+
+    monkeypatch.setattr("sbafab.calibration.curve_intervals.model_values", model)
+    of = curve("height_mm", y=7.0)
+    intervals = curve_intervals(of, uncertainty_for(of, paper))
+    assert intervals is not None
+    assert intervals[0] is not None
+    missed = paper.discrepancy["motion"] ** 2 + 0.2**2
+    least = math.sqrt(paper.covariance[0][0] + missed)
+    assert intervals[0] == pytest.approx(
+        (
+            paper.values["modulus_ratio"] * math.exp(-DEVIATIONS * least),
+            40 * math.exp(DEVIATIONS * math.sqrt(missed)),
+        )
+    )
+
+
+def test_a_time_counts_its_delay(paper: ModelCalibration) -> None:
+    """A time of 1 s beside the delay: its logarithm changes by the delay's share."""
+    delay = paper.values["water_delay"]
+    uncertainty = Uncertainty(paper, {})
+    time, ends = uncertainty.interval_of("time", lambda f: 1 + f.water_delay, delay="water_delay")
+    assert time == 1 + delay
+    spread = (delay / time) ** 2 * paper.covariance[3][3] + paper.discrepancy["time"] ** 2
+    assert math.log(ends[1] / time) == pytest.approx(DEVIATIONS * math.sqrt(spread))
+    exact = Uncertainty(paper, {"water_delay": delay})
+    _, narrower = exact.interval_of("time", lambda f: 1 + f.water_delay, delay="water_delay")
+    half = DEVIATIONS * paper.discrepancy["time"]
+    assert math.log(narrower[1] / time) == pytest.approx(half)
+
+
+def test_a_value_that_vanishes_with_other_factors_may_be_nothing(paper: ModelCalibration) -> None:
+    def force(factors: Factors) -> float:
+        return 1.0 if factors.modulus_ratio == paper.values["modulus_ratio"] else 1e-4
+
+    value, (low, high) = Uncertainty(paper, {}).interval_of("force", force)
+    assert (value, low) == (1.0, 0.0)
+    assert 1.5 < high < 4.0
+
+
+def test_an_error_is_added_as_an_independent_one() -> None:
+    low, high = widened(2.0, (1.0, 4.0), 0.5)
+    half = math.hypot(math.log(2), DEVIATIONS * 0.5)
+    assert (low, high) == pytest.approx((2 * math.exp(-half), 2 * math.exp(half)))
+    low, high = widened(1.0, (-1.0, 3.0), 0.5)
+    assert (low, high) == pytest.approx((1 - math.hypot(2, 0.5 * DEVIATIONS), 2 - low))
+
+
+def test_a_quantity_that_no_unknown_changes_has_none(paper: ModelCalibration) -> None:
+    mass = curve("mass_g")
+    assert curve_intervals(mass, uncertainty_for(mass, paper)) is None
+    undescribed = replace(curve("force_n"), actuator=MeasuredActuator())
+    assert curve_intervals(undescribed, uncertainty_for(undescribed, paper)) is None
+
+
+def test_another_film_is_as_uncertain_as_the_prior(paper: ModelCalibration) -> None:
+    film = {"product": "TPU 50", "thickness": 0.05, "modulus": 20.0, "poisson": 0.4}
+    changes = {f"films.tpe.{key}": value for key, value in film.items()}
+    of = replace(curve("height_mm"), actuator=MeasuredActuator("1dof-5mm", changes))
+    calibration = uncertainty_for(of, paper).calibration
+    assert calibration.values["modulus_ratio"] == 1.0
+    assert calibration.covariance[0][0] == pytest.approx(UNKNOWNS[0].spread ** 2)
