@@ -1,4 +1,6 @@
-"""A Gymnasium environment of a stack: actions set the valves, the tip is to reach a target."""
+"""Gymnasium environments of a stack, one and many at once: actions set the valves, the tip is to
+reach a target.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector.utils import batch_space
 
 from sbafab.errors import DesignError
+from sbafab.models.stack_batch import StackBatch
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from sbafab.models.film_elements import Array
     from sbafab.models.pneumatics import Line
     from sbafab.models.stack import Motion, Stack
@@ -37,20 +46,9 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         near: float = 0.2,
         **load: Any,
     ) -> None:
-        if not 0 < most_pressure <= stack.most_pressure:
-            raise DesignError(
-                f"most_pressure = {most_pressure:g} kPa must be above 0 and at most "
-                f"{stack.most_pressure:g} kPa, to which the stack was made"
-            )
+        self.action_space, self.observation_space = _spaces(stack, most_pressure)
         self.stack, self.line, self.load = stack, line, load
         self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
-        count = stack.chambers
-        # Films may stretch: no tip is farther than this.
-        far = 2 * sum(stack.maps[kind].most_height + stack.pitch for kind in stack.levels)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float64)
-        most = np.array([far] * 9 + [stack.most_pressure] * count)
-        least = np.array([-far] * 9 + [0.0] * count)
-        self.observation_space = gymnasium.spaces.Box(least, most, dtype=np.float64)
         self._motion: Motion | None = None
         self._target = np.zeros(3)
         self._left = 0
@@ -73,7 +71,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         """Return the observation ``dt`` s later, the reward, if it arrived, and if time is up."""
         if self._motion is None:
             raise DesignError("the environment is at no place yet; call reset first")
-        valves = (np.clip(np.asarray(action, dtype=float), -1.0, 1.0) + 1) / 2 * self.most_pressure
+        valves = _valves(action, self.most_pressure)
         self._motion.step(self.dt, pressures=valves.tolist())
         self._left -= 1
         observation = self._observation(self._motion)
@@ -83,3 +81,131 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
     def _observation(self, motion: Motion) -> Array:
         tip = motion.pose.tip
         return np.concatenate([tip, self._target, self._target - tip, motion.pressures])
+
+
+class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
+    """``num_envs`` tasks of ``ReachEnvironment`` in one: its arguments, observations and rewards.
+
+    Seeds and restarts as of ``gymnasium.vector.SyncVectorEnv``: the step after an episode's end
+    starts the next one. ``workers`` are threads. Fast without a load only.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 (as Gymnasium has it)
+        "render_modes": [],
+        "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        stack: Stack,
+        num_envs: int,
+        line: Line | None = None,
+        most_pressure: float = 10.0,
+        dt: float = 0.02,
+        steps: int = 200,
+        near: float = 0.2,
+        workers: int = 1,
+        **load: Any,
+    ) -> None:
+        if num_envs < 1:
+            raise DesignError(f"num_envs = {num_envs} must be at least 1")
+        self.single_action_space, self.single_observation_space = _spaces(stack, most_pressure)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.num_envs, self.load = num_envs, load
+        self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
+        self.batch = StackBatch(stack, workers)
+        self._motion = self.batch.motion(num_envs, line, **load)
+        self._random = [np_random()[0] for _ in range(num_envs)]
+        self._targets = np.zeros((num_envs, 3))
+        self._left = np.zeros(num_envs, dtype=int)
+        self._is_over = np.ones(num_envs, dtype=bool)
+        self._has_begun = False
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Vent all chambers. Targets are ``options["target"]`` in mm, (3,) or (num_envs, 3), or
+        random poses' tips; with one ``seed`` each environment has the next one.
+        """
+        if seed is not None:
+            seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else seed
+            if len(seeds) != self.num_envs:
+                raise DesignError(f"give a seed, or {self.num_envs} of them")
+            for number, one in enumerate(seeds):
+                if one is not None:
+                    self._random[number] = np_random(one)[0]
+        self._begin(np.ones(self.num_envs, dtype=bool), (options or {}).get("target"))
+        self._has_begun = True
+        return self._observations(), {}
+
+    def step(self, actions: Any) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+        """Return observations ``dt`` s later, rewards, which arrived, and which have no time left.
+
+        Environments whose episode was over start the next one instead, with the reward 0.
+        """
+        if not self._has_begun:
+            raise DesignError("the environments are at no place yet; call reset first")
+        valves = _valves(actions, self.most_pressure)
+        anew = self._is_over
+        if anew.any():
+            self._begin(anew)
+            valves = np.where(anew[:, None], 0.0, valves)
+        self._motion.step(self.dt, valves)
+        self._left -= 1
+        if anew.any():
+            self._motion.restart(anew)
+            self._left[anew] = self.steps
+        observations = self._observations()
+        away = np.sqrt((observations[:, 6:9] ** 2).sum(1))
+        is_there, is_late = (away <= self.near) & ~anew, (self._left <= 0) & ~anew
+        self._is_over = is_there | is_late
+        rewards = np.where(anew, 0.0, -away)
+        return observations, rewards, is_there, is_late, {"time": self._motion.times.copy()}
+
+    def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:
+        """Begin an episode of some of the environments."""
+        if target is None:
+            count, most = self.batch.stack.chambers, self.most_pressure
+            drawn = [
+                self._random[number].uniform(0.0, most, count) for number in np.flatnonzero(which)
+            ]
+            target = self.batch.poses(np.stack(drawn), **self.load).tips
+        self._targets[which] = target
+        self._motion.restart(which)
+        self._left[which] = self.steps
+        self._is_over = self._is_over & ~which
+
+    def _observations(self) -> Array:
+        tips = self._motion.tips
+        parts = [tips, self._targets, self._targets - tips, self._motion.pressures]
+        return np.concatenate(parts, axis=1)
+
+
+def _spaces(
+    stack: Stack, most_pressure: float
+) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
+    """Return the spaces of actions and of observations. Raises DesignError."""
+    if not 0 < most_pressure <= stack.most_pressure:
+        raise DesignError(
+            f"most_pressure = {most_pressure:g} kPa must be above 0 and at most "
+            f"{stack.most_pressure:g} kPa, to which the stack was made"
+        )
+    count = stack.chambers
+    # Films may stretch: no tip is farther than this.
+    far = 2 * sum(stack.maps[kind].most_height + stack.pitch for kind in stack.levels)
+    most = np.array([far] * 9 + [stack.most_pressure] * count)
+    least = np.array([-far] * 9 + [0.0] * count)
+    return (
+        gymnasium.spaces.Box(-1.0, 1.0, (count,), np.float64),
+        gymnasium.spaces.Box(least, most, dtype=np.float64),
+    )
+
+
+def _valves(actions: Any, most_pressure: float) -> Array:
+    """Return the pressures in kPa at the valves of actions."""
+    shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
+    return np.asarray(shares * most_pressure)

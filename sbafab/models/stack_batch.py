@@ -40,6 +40,10 @@ POSE_ERROR = 1e-9
 MOTION_ERRORS = np.array([[1e-6], [1e-5]])
 """Errors at which a step of a motion ends: mm and rad, and the share of a pressure."""
 HALVINGS = 12
+VOLUME_POWER = 0.3
+"""Power of the pressure that volumes grow by, about: of balloons that stretch."""
+ROUNDS = 2
+"""Newton's steps of flows and contents in the first step of films."""
 STRAIGHT = 1e-24
 """Square of a tilt in rad that is taken for 0."""
 CHUNK = 256
@@ -457,26 +461,27 @@ class BatchMotion:
         end = _State(begin.freedoms.copy(), begin.pressures.copy())
         is_solved, live = np.zeros(count, dtype=bool), np.arange(count)
         (at, p), before = begin, np.zeros((2, count))
-        x = np.arcsinh(p / SCALE_PRESSURE)
+        y = _place_of(p)
         contents = np.zeros(0)
         for number in range(MOTION_STEPS):
             each = [
                 springs.at(springs.weights(p, 3), one)
                 for springs, one in zip(self.batch.springs, at, strict=True)
             ]
-            content = self._contents(each, p)
             if not number:
-                contents = content.copy()
-            moves, dp = self._newton_step(each, p, content - contents, acts, sources)
-            rate = np.hypot(p, SCALE_PRESSURE)
-            dx = dp / rate
-            largest = np.stack([np.abs(moves).max((0, 1)), np.abs(dx).max(0)])
-            share = np.minimum(1.0, LONGEST_STEP / np.maximum(largest[1], 1e-12))
+                contents = self._contents(each, p)
+            moves, dy = self._newton_step(
+                each, p, y, contents, acts, sources, 1 if number else ROUNDS
+            )
+            share = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(dy).max(0), 1e-12))
             for move in moves:
                 share = np.minimum(share, _step_share(move))
-            x = np.maximum(x + share * dx, 0.0)
-            p = np.minimum(SCALE_PRESSURE * np.sinh(x), most)
             at = at + share * moves
+            y = np.maximum(y + share * dy, 0.0)
+            after = np.minimum(_pressure_at(y), most)
+            change = np.abs(after - p) / (p + SCALE_PRESSURE)
+            largest = np.stack([np.abs(moves).max((0, 1)), change.max(0)])
+            p = after
             still = (largest * largest < MOTION_ERRORS * before).all(0)
             still |= (largest < MOTION_ERRORS).all(0)
             if still.any():
@@ -487,7 +492,7 @@ class BatchMotion:
                 rest = ~still
                 if not rest.any():
                     break
-                live, at, x, p = live[rest], at[:, :, rest], x[:, rest], p[:, rest]
+                live, at, y, p = live[rest], at[:, :, rest], y[:, rest], p[:, rest]
                 contents, acts, sources = contents[:, rest], acts[rest], sources[:, rest]
                 largest, share = largest[:, rest], share[rest]
             before = np.where(share == 1.0, largest, 0.0)
@@ -500,6 +505,10 @@ class BatchMotion:
             fits &= (self.batch.stack.centres.T @ at <= springs.kind.most_height).all(0)
         return np.asarray(fits)
 
+    @property
+    def _line_volume(self) -> float:
+        return self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
+
     def _contents(self, each: Sequence[SpringBatch], p: Array) -> Array:
         """Return what the chambers hold in ul, of a gas at the atmosphere: (chambers, n)."""
         volumes = sum(
@@ -511,22 +520,17 @@ class BatchMotion:
         return np.asarray((volumes + more) * (1 + p / ATMOSPHERE_KPA))
 
     def _newton_step(
-        self, each: Sequence[SpringBatch], p: Array, gained: Array, acts: Array, sources: Array
+        self, each: Sequence[SpringBatch], p: Array, y: Array, contents: Array, acts: Array, sources: Array, rounds: int
     ) -> tuple[Array, Array]:
         """Return the step of freedoms (kinds, 3, n) and of pressures (chambers, n).
 
         With the freedoms' own steps put in, the volumes' rates by pressure are a matrix that is
         symmetric and positive definite.
         """
-        flow, flow_rate = self.line.flows(sources, p)
-        wrong, own = gained - acts * flow, -acts * flow_rate
-        if self.line.fluid.is_gas:
-            squeezed = 1 + p / ATMOSPHERE_KPA
-            own += self._contents(each, p) / squeezed / ATMOSPHERE_KPA
-            wrong, own = wrong / squeezed, own / squeezed
         chambers, count = p.shape
         matrix = np.zeros((chambers, chambers, count))
-        right, parts = -wrong, []
+        settled, parts = np.zeros_like(p), []
+        volumes = np.full_like(p, self._line_volume)
         for number, springs in zip(self.batch.counts, each, strict=True):
             pulls = np.concatenate(
                 [springs.filling.transpose(1, 0, 2), -springs.gradient[:, None]], axis=1
@@ -534,28 +538,62 @@ class BatchMotion:
             moved, _ = solved(springs.matrix, pulls)
             filled = number * np.einsum("cin,ijn->cjn", springs.filling, moved)
             matrix += filled[:, :-1]
-            right = right - filled[:, -1]
+            settled += filled[:, -1]
             np.einsum("iin->in", matrix)[:] += number * springs.swelling
+            volumes += number * springs.volumes
             parts.append(moved)
-        np.einsum("iin->in", matrix)[:] += own
-        held = (p <= 0) & (wrong >= 0)
-        for _ in range(chambers + 1):
-            dp = _free_step(matrix, right, held)
-            more = (p <= 0) & (dp < 0) & ~held
-            if not more.any():
-                break
-            held |= more
-        moves = [
-            moved[:, -1] + np.einsum("ijn,jn->in", moved[:, :-1], dp) for moved in parts
-        ]
-        return np.stack(moves), dp
+        total = np.zeros_like(p)
+        now, place, rate = p, y, _pressure_rate(p, y)
+        first_rate, ahead = rate, volumes + settled
+        for number in range(rounds):
+            if number:
+                place = np.maximum(y + total / first_rate, 0.0)
+                now = _pressure_at(place)
+                rate = _pressure_rate(now, place)
+                total = (place - y) * first_rate
+                ahead = volumes + settled + np.einsum("cdn,dn->cn", matrix, total)
+            flow, flow_rate = self.line.flows(sources, now)
+            wrong, own = -contents - acts * flow, -acts * flow_rate
+            if self.line.fluid.is_gas:
+                squeezed = 1 + now / ATMOSPHERE_KPA
+                wrong, own = wrong / squeezed, (own + ahead / ATMOSPHERE_KPA) / squeezed
+            total = total + _free_step(matrix, own * (rate / first_rate), -wrong - ahead, now <= 0)
+        moves = [moved[:, -1] + np.einsum("ijn,jn->in", moved[:, :-1], total) for moved in parts]
+        return np.stack(moves), total / first_rate
 
 
-def _free_step(matrix: Array, right: Array, held: NDArray[np.bool_]) -> Array:
-    """Return the solutions (size, n) in which the ``held`` (size, n) stay 0."""
-    if held.any():
+def _place_of(pressures: Array) -> Array:
+    """Return the coordinate of pressures in which volumes are nearly linear."""
+    return np.sinh(VOLUME_POWER * np.arcsinh(pressures / SCALE_PRESSURE))
+
+
+def _pressure_at(places: Array) -> Array:
+    """Return the pressures of coordinates."""
+    return SCALE_PRESSURE * np.sinh(np.arcsinh(places) / VOLUME_POWER)
+
+
+def _pressure_rate(pressures: Array, places: Array) -> Array:
+    """Return the rates of pressures by their coordinates."""
+    return np.hypot(pressures, SCALE_PRESSURE) / (VOLUME_POWER * np.hypot(1.0, places))
+
+
+def _free_step(matrix: Array, more: Array, right: Array, at_end: NDArray[np.bool_]) -> Array:
+    """Return the solutions (size, n) of matrices with ``more`` on their diagonals, of which those
+    ``at_end`` (size, n) may not fall.
+    """
+    whole = matrix.copy()
+    np.einsum("iin->in", whole)[:] += more
+    step = solved(whole, right[:, None])[0][:, 0]
+    if not at_end.any():
+        return step
+    held = np.zeros_like(at_end)
+    for _ in range(len(more)):
+        falls = at_end & ~held & ((step < 0) | (right <= 0))
+        if not falls.any():
+            break
+        held |= falls
         free = ~held
-        matrix = matrix * (free[:, None] & free[None])
-        np.einsum("iin->in", matrix)[held] = 1.0
-        right = np.where(free, right, 0.0)
-    return solved(matrix, right[:, None])[0][:, 0]
+        reduced = whole * (free[:, None] & free[None])
+        np.einsum("iin->in", reduced)[held] = 1.0
+        step = solved(reduced, np.where(free, right, 0.0)[:, None])[0][:, 0]
+    return step

@@ -1,0 +1,152 @@
+"""Many states of a stack at once, against single poses and motions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sbafab
+from sbafab.errors import DesignError
+from sbafab.models import stack as stacks
+from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
+from sbafab.models.stack import Stack
+from sbafab.models.stack_batch import StackBatch
+
+
+@pytest.fixture(scope="module")
+def three() -> Stack:
+    return sbafab.stack("3dof-15mm")
+
+
+def drawn_pressures(chambers: int, count: int = 8) -> np.ndarray:
+    """Return pressures (count, chambers) in kPa, some of them 0."""
+    numbers = np.random.default_rng(7)
+    drawn = numbers.uniform(0.0, 10.0, (count, chambers))
+    drawn[: count // 2] *= numbers.integers(0, 2, (count // 2, chambers))
+    return drawn
+
+
+@pytest.mark.parametrize("design", ["3dof-15mm", "1dof-5mm", "tapered-12mm"])
+def test_poses_are_the_single_ones(design: str) -> None:
+    stack = sbafab.stack(design)
+    pressures = drawn_pressures(stack.chambers, 6)
+    batch = StackBatch(stack).poses(pressures)
+    again = StackBatch(stack, workers=2).poses(pressures[::-1], near=batch)
+    for number, row in enumerate(pressures):
+        pose = stack.pose(row.tolist())
+        for poses, at in ((batch, number), (again, len(pressures) - 1 - number)):
+            assert poses.tips[at] == pytest.approx(pose.tip, abs=1e-6)
+            assert poses.freedoms[at] == pytest.approx(pose.freedoms, abs=1e-6)
+            assert poses.volumes[at] == pytest.approx(pose.volumes, abs=1e-5)
+            assert poses.bends[at] == pytest.approx(pose.bend, abs=1e-5)
+    assert batch.heights == pytest.approx(batch.tips[:, 2])
+
+
+def test_levels_of_unlike_balloons_turn_each_in_its_own_plane() -> None:
+    stack = sbafab.stack({"kind": "3dof", "stack": {"diameters": [5, 5, 4, 5]}})
+    pressures = np.array([[6.0, 1.0, 3.0], [0.0, 2.0, 8.0]])
+    tips = StackBatch(stack).poses(pressures).tips
+    for row, tip in zip(pressures.tolist(), tips, strict=True):
+        assert tip == pytest.approx(stack.pose(row).tip, abs=1e-6)
+
+
+def test_loaded_poses_are_the_single_ones(three: Stack) -> None:
+    pressures = drawn_pressures(3, 3)
+    batch = StackBatch(three).poses(pressures, tip_load=(0.0, 0.0, -0.005))
+    for row, tip in zip(pressures.tolist(), batch.tips, strict=True):
+        assert tip == pytest.approx(three.pose(row, tip_load=(0.0, 0.0, -0.005)).tip, abs=1e-6)
+
+
+@pytest.mark.parametrize("line", [Line(AIR, delay=0.03), Line(WATER)])
+def test_motions_are_the_single_ones(
+    three: Stack, line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stacks, "TOLERANCE", 1e-7)
+    numbers = np.random.default_rng(3)
+    moving = StackBatch(three).motion(3, line)
+    singles = [three.motion(line=line) for _ in range(3)]
+    for number in range(6):
+        valves = numbers.uniform(0.0, 10.0, (3, 3)) * (number < 4)
+        moving.step(0.02, valves)
+        for single, row in zip(singles, valves.tolist(), strict=True):
+            single.step(0.02, pressures=row)
+        assert moving.tips == pytest.approx(np.array([s.pose.tip for s in singles]), abs=2e-5)
+        pressures = np.array([single.pressures for single in singles])
+        assert moving.pressures == pytest.approx(pressures, rel=2e-5, abs=1e-6)
+    assert moving.times == pytest.approx(0.12)
+    volumes = np.array([single.pose.volumes for single in singles])
+    assert moving.poses.volumes == pytest.approx(volumes, abs=0.01)
+
+
+def test_a_state_that_takes_many_steps_is_solved_alone(
+    three: Stack, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sbafab.models.stack_batch.POSE_STEPS", 1)
+    monkeypatch.setattr("sbafab.models.stack_batch.MOTION_STEPS", 1)
+    batch = StackBatch(three)
+    assert batch.poses([[5.0, 1.0, 0.0]]).tips[0] == pytest.approx(three.pose((5, 1, 0)).tip)
+    moving, single = batch.motion(1), three.motion()
+    moving.step(0.02, [[5.0, 1.0, 0.0]])
+    assert moving.tips[0] == pytest.approx(single.step(0.02, (5, 1, 0)).tip)
+
+
+@pytest.mark.parametrize("design", ["none", "paper"])
+def test_volumes_rise_with_pressure_at_the_rate_that_a_map_says(design: str) -> None:
+    # Of stiffened films, whose maps have another scale of pressure.
+    made = sbafab.stack(sbafab.load("3dof-15mm", {"models.calibration": design}))
+    kind, p, h = made.maps[0].stiffened(1.7), np.array([0.05, 0.3, 4.0]), 0.6
+    step = 1e-5
+    rates = (kind.volume(p + step, h) - kind.volume(p - step, h)) / (2 * step)
+    rows = kind.volume_slopes(p)
+    y = h * kind.spans
+    piece = int(y) + 1
+    at = (rows[:, piece] * (y + 1 - piece) ** np.arange(rows.shape[-1])).sum(-1)
+    assert at == pytest.approx(rates, rel=1e-5)
+
+
+@pytest.mark.parametrize("line", [Line(AIR), Line(WATER)])
+def test_flows_of_many_are_those_of_one(line: Line) -> None:
+    sources, chambers = np.meshgrid([0.0, 1e-3, 0.5, 10.0, 60.0], [0.0, 2e-3, 0.6, 10.0, 50.0])
+    flows, rates = line.flows(sources, chambers)
+    step = 1e-7
+    for at in np.ndindex(sources.shape):
+        source, chamber = float(sources[at]), float(chambers[at])
+        assert flows[at] == pytest.approx(line.flow(source, chamber), rel=1e-9)
+        if source != chamber:
+            ends = line.flow(source, chamber + step), line.flow(source, chamber - step)
+            assert rates[at] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-3)
+    assert flows[0, 3] * (1 if line.fluid is WATER else ATMOSPHERE_KPA) > 0
+
+
+@pytest.mark.parametrize(
+    ("pressures", "sentence"),
+    [
+        ([[5.0, 0.0, -1.0]], "a pressure of -1 kPa is outside"),
+        ([[5.0, 0.0]], "a row a state of 3"),
+        ([5.0, 0.0, 0.0], "a row a state of 3"),
+        ([[np.nan, 0.0, 0.0]], "finite numbers"),
+        ([["a", 0.0, 0.0]], "finite numbers"),
+    ],
+)
+def test_pressures_that_no_pose_has_are_refused(
+    three: Stack, pressures: list[list[float]], sentence: str
+) -> None:
+    with pytest.raises(DesignError, match=sentence):
+        StackBatch(three).poses(pressures)
+
+
+def test_what_is_no_batch_is_refused(three: Stack) -> None:
+    batch = StackBatch(three)
+    with pytest.raises(DesignError, match="a load has no weight"):
+        batch.poses([[1.0, 1.0, 1.0]], weight=3)
+    with pytest.raises(DesignError, match="1 poses for 2 states"):
+        batch.poses([[1.0] * 3] * 2, near=batch.poses([[1.0] * 3]))
+    with pytest.raises(DesignError, match="dt = 0 s"):
+        batch.motion(1).step(0.0, [[1.0] * 3])
+    with pytest.raises(DesignError, match="2 rows of 3"):
+        batch.motion(2).step(0.1, [[1.0] * 3])
+    with pytest.raises(DesignError, match="count = 0"):
+        batch.motion(0)
+    with pytest.raises(DesignError, match="workers = 0"):
+        StackBatch(three, workers=0)
+    assert batch.poses(np.zeros((0, 3))).tips.shape == (0, 3)
