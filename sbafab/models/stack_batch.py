@@ -22,7 +22,7 @@ from sbafab.errors import DesignError
 from sbafab.models.batch_springs import BatchSprings, SpringBatch, solved
 from sbafab.models.least_energy import LARGEST_MOVE
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
-from sbafab.models.stack import LEAST_CONTENT, LONGEST_STEP, SCALE_PRESSURE, TOLERANCE, Motion
+from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion
 from sbafab.models.stack_poses import NO_LOAD, Pose
 
 if TYPE_CHECKING:
@@ -361,7 +361,9 @@ class BatchMotion:
             alone = [Motion(stack, line, load, begin) for _ in range(count)]
         shape = (len(batch.springs), 3, count), (stack.chambers, count)
         state = _State(np.empty(shape[0]), np.empty(shape[1]))
-        motion = cls(batch, line, load, alone[0].pose if alone else start, state, np.zeros(count), alone)
+        motion = cls(
+            batch, line, load, alone[0].pose if alone else start, state, np.zeros(count), alone
+        )
         motion.restart(slice(None))
         return motion
 
@@ -374,9 +376,7 @@ class BatchMotion:
         self.state.pressures[:, where] = np.array(self.start.pressures)[:, None]
         if self.alone:
             for number in np.arange(len(self.times))[where].tolist():
-                self.alone[number] = Motion(
-                    self.batch.stack, self.line, self.load, self.start
-                )
+                self.alone[number] = Motion(self.batch.stack, self.line, self.load, self.start)
 
     @property
     def pressures(self) -> Array:
@@ -520,7 +520,14 @@ class BatchMotion:
         return np.asarray((volumes + more) * (1 + p / ATMOSPHERE_KPA))
 
     def _newton_step(
-        self, each: Sequence[SpringBatch], p: Array, y: Array, contents: Array, acts: Array, sources: Array, rounds: int
+        self,
+        each: Sequence[SpringBatch],
+        p: Array,
+        y: Array,
+        contents: Array,
+        acts: Array,
+        sources: Array,
+        rounds: int,
     ) -> tuple[Array, Array]:
         """Return the step of freedoms (kinds, 3, n) and of pressures (chambers, n).
 
