@@ -7,6 +7,7 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
+import sbafab
 from sbafab.cli import app
 
 QUICK = ("--set", "rules.yield_builds=100")
@@ -26,9 +27,15 @@ def test_check_opens_with_the_size_and_gives_it_to_programs() -> None:
 
 def test_predict_opens_with_the_size_also_round_a_tube(tmp_path: Path) -> None:
     arguments = ["predict", "radial-15mm", "-o", str(tmp_path), *QUICK]
-    said = CliRunner().invoke(app, arguments).output.splitlines()[0]
+    drawn = [*arguments, "--set", "models.calibration=none"]
+    said = CliRunner().invoke(app, drawn).output.splitlines()[0]
     # The paper's 15.33 (Sec. 2.1).
     assert said.startswith("size: 15.33 mm round its tube, flat, ")
+    # Pressed, it is the tube and twice the pressed films, as in the figures below it.
+    said = CliRunner().invoke(app, [*arguments, "--set", "models.calibration=paper"]).output
+    pressed = sbafab.predict("radial-15mm").value("deflated diameter")
+    assert said.startswith(f"size: {pressed:.2f} mm round its tube, flat, ")
+    assert 15 < pressed < 15.33
 
 
 def test_a_solved_chamber_is_said(tmp_path: Path) -> None:

@@ -320,14 +320,26 @@ def test_the_studio_s_answers_hold_them(calibrated: dict[str, Prediction], tmp_p
 
 
 @pytest.mark.long
-def test_assemblies_hold_them() -> None:
+def test_assemblies_leave_out_what_is_near_once_calibrated() -> None:
     found = sbafab.predict_assembly("standing")
+    told = {figure.name for figure in found.figures if figure.measured}
+    assert told == {"sag of the tip, 1.2 g across it"}
+
+
+@pytest.mark.long
+def test_assemblies_hold_them(tmp_path: Path) -> None:
+    text = sbafab.template("3dof-15mm") + '\n[models]\ncalibration = "none"\n'
+    (tmp_path / "tip.toml").write_text(text, encoding="utf-8")
+    path = tmp_path / "standing.toml"
+    text = sbafab.template("standing").replace('design = "3dof-15mm"', 'design = "tip.toml"')
+    path.write_text(text, encoding="utf-8")
+    found = sbafab.predict_assembly(path)
     told = {figure.name: figure.measured for figure in found.figures}
     assert "0.95 mm" in told["height, flat"]
     assert "17.5 mm" in told["height, inflated"]
     assert "81 +- 6 deg" in told["bend by one chamber"]
     assert "60 kPa" in told["sag of the tip, 1.2 g across it"]
-    ended = CliRunner().invoke(app, ["predict", "standing"])
+    ended = CliRunner().invoke(app, ["predict", str(path)])
     for sentence in filter(None, told.values()):
         assert sentence in _joined(ended.output)
 
