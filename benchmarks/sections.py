@@ -11,6 +11,7 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks import (
+    batches,
     checking,
     copies,
     decks,
@@ -203,6 +204,14 @@ def poses(rounds: int) -> Section:
         for kind, is_dragged in (("along a path", True), ("at random", False)):
             taken = [equilibria.reach_seconds(load, is_dragged) for _ in range(rounds)]
             rows.append(Row(f"{load}, tip to a place, {kind}", taken, rate(taken, "places")))
+    for kind, is_dragged in (("near the ones before", True), ("at random", False)):
+        taken = [batches.pose_seconds(is_dragged) for _ in range(rounds)]
+        name = f"no load, {batches.STATES:,} at once, {kind}"
+        rows.append(Row(name, taken, rate(taken, "equilibria")))
+    taken = [batches.step_seconds() for _ in range(rounds)]
+    rows.append(Row(f"a step of {batches.STATES:,} environments", taken, rate(taken, "steps")))
+    clock = batches.clock_rate(2)
+    notes.append(f"{batches.STATES:,} environments in two processes: {clock:,.0f} steps a second")
     rivals = {
         "SOFA, shells": simulators.sofa,
         "MuJoCo, flexes in rings of 8": lambda: simulators.mujoco(8),

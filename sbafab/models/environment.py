@@ -87,7 +87,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """``num_envs`` tasks of ``ReachEnvironment`` in one: its arguments, observations and rewards.
 
     Seeds and restarts as of ``gymnasium.vector.SyncVectorEnv``: the step after an episode's end
-    starts the next one. ``workers`` are threads. Fast without a load only.
+    starts the next one. Fast without a load only.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (as Gymnasium has it)
@@ -104,7 +104,6 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         dt: float = 0.02,
         steps: int = 200,
         near: float = 0.2,
-        workers: int = 1,
         **load: Any,
     ) -> None:
         if num_envs < 1:
@@ -114,7 +113,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.num_envs, self.load = num_envs, load
         self.most_pressure, self.dt, self.steps, self.near = most_pressure, dt, steps, near
-        self.batch = StackBatch(stack, workers)
+        self.batch = StackBatch(stack)
         self._motion = self.batch.motion(num_envs, line, **load)
         self._random = [np_random()[0] for _ in range(num_envs)]
         self._targets = np.zeros((num_envs, 3))

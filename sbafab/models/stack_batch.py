@@ -8,9 +8,7 @@ one. Lengths mm, pressures kPa, volumes ul.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
@@ -46,8 +44,8 @@ ROUNDS = 2
 """Newton's steps of flows and contents in the first step of films."""
 STRAIGHT = 1e-24
 """Square of a tilt in rad that is taken for 0."""
-CHUNK = 256
-"""States solved together: their numbers stay in the processor's cache."""
+CHUNK = 1024
+"""States solved together: more are no faster, and take more memory."""
 
 
 class LevelRun(NamedTuple):
@@ -94,14 +92,9 @@ class _State(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StackBatch:
-    """Many states of one ``stack``, solved together on ``workers`` threads."""
+    """Many states of one ``stack``, solved together."""
 
     stack: Stack
-    workers: int = 1
-
-    def __post_init__(self) -> None:
-        if self.workers < 1:
-            raise DesignError(f"workers = {self.workers} must be at least 1")
 
     def poses(
         self, pressures: ArrayLike, near: BatchPoses | None = None, **load: Any
@@ -111,7 +104,7 @@ class StackBatch:
         ``near`` are N poses to start from; ``load`` are keyword arguments of ``Stack.pose`` beside
         pressures. Raises DesignError as ``Stack.pose`` does, for the first state that has no pose.
         """
-        asked = self._table(pressures, "pressures in kPa")
+        asked = self.table(pressures)
         most = self.stack.most_pressure
         if asked.size and not (asked.min() >= 0 and asked.max() <= most):
             worst = asked.max() if asked.min() >= 0 else asked.min()
@@ -134,15 +127,13 @@ class StackBatch:
         freedoms = np.empty((len(self.springs), 3, len(asked)))
         volumes = np.empty((self.stack.chambers, len(asked)))
 
-        def solve(part: slice) -> None:
+        for part in _parts(len(asked)):
             freedoms[:, :, part], volumes[:, part] = self._free_poses(p[:, part], start[:, :, part])
-
-        self.each_chunk(solve, len(asked))
         for number in np.flatnonzero(np.isnan(volumes[0])):
             alone = self.stack.pose(tuple(asked[number].tolist()))
             freedoms[:, :, number] = alone.freedoms[self.stack.first_levels]
             volumes[:, number] = alone.volumes
-        return BatchPoses(asked, *self._spread(freedoms), volumes.T, self.tips(freedoms))
+        return BatchPoses(asked, self.every_level(freedoms), volumes.T, self.tips(freedoms))
 
     def motion(
         self,
@@ -185,21 +176,6 @@ class StackBatch:
         values = (load.get(name, value) for name, value in NO_LOAD.items())
         return self.stack.load(*values) is not None
 
-    def each_chunk(self, solve: Callable[[slice], None], count: int) -> None:
-        """Call a function with each part of ``count`` states, on the threads."""
-        parts = max(math.ceil(count / CHUNK), min(self.workers, count))
-        ends = np.linspace(0, count, parts + 1).astype(int).tolist()
-        chunks = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
-        if self.workers == 1 or parts == 1:
-            for chunk in chunks:
-                solve(chunk)
-        else:
-            list(self._pool.map(solve, chunks))
-
-    @cached_property
-    def _pool(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(self.workers)
-
     def tips(self, freedoms: Array) -> Array:
         """Return the middles of the top plates in mm of freedoms (kinds, 3, N): (N, 3).
 
@@ -231,20 +207,21 @@ class StackBatch:
             tip[2] += share * sine
         return tip.T
 
-    def _spread(self, freedoms: Array) -> tuple[Array]:
-        return (freedoms.transpose(2, 0, 1)[:, self.stack.levels],)
+    def every_level(self, freedoms: Array) -> Array:
+        """Return freedoms (kinds, 3, N) as (N, levels, 3)."""
+        return np.asarray(freedoms.transpose(2, 0, 1)[:, self.stack.levels])
 
-    def _table(self, values: ArrayLike, quantity: str, rows: int | None = None) -> Array:
-        """Return numbers (rows, chambers). Raises DesignError."""
+    def table(self, pressures: ArrayLike, rows: int | None = None) -> Array:
+        """Return pressures (rows, chambers) in kPa. Raises DesignError where they are no such."""
         try:
-            table = np.asarray(values, dtype=float)
+            table = np.asarray(pressures, dtype=float)
         except (TypeError, ValueError):
             table = np.zeros(0)
         shape = (len(table) if rows is None and table.ndim else rows, self.stack.chambers)
         if table.shape != shape or not np.isfinite(table).all():
             states = "a row a state" if rows is None else f"{rows} rows"
             raise DesignError(
-                f"{quantity} must be finite numbers, {states} of {self.stack.chambers}"
+                f"pressures in kPa must be finite numbers, {states} of {self.stack.chambers}"
             )
         return table
 
@@ -275,6 +252,11 @@ class StackBatch:
             total += count * np.where(is_solved, volumes, np.nan)
         total[:, np.isnan(total[0])] = np.nan
         return freedoms, total
+
+
+def _parts(count: int) -> list[slice]:
+    """Return the parts of so many states that are solved together."""
+    return [slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK)]
 
 
 def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
@@ -405,7 +387,7 @@ class BatchMotion:
             )
         )
         return BatchPoses(
-            self.pressures, *self.batch._spread(freedoms), np.asarray(volumes).T, self.tips
+            self.pressures, self.batch.every_level(freedoms), np.asarray(volumes).T, self.tips
         )
 
     def step(self, dt: float, pressures: ArrayLike) -> None:
@@ -415,7 +397,7 @@ class BatchMotion:
         if not (np.isfinite(dt) and dt > 0):
             raise DesignError(f"dt = {dt:g} s must be above 0 s")
         count = len(self.times)
-        valves = self.batch._table(pressures, "pressures in kPa", count)
+        valves = self.batch.table(pressures, count)
         if self.alone:
             for motion, row in zip(self.alone, valves.tolist(), strict=True):
                 motion.step(dt, pressures=row)
@@ -426,12 +408,10 @@ class BatchMotion:
         is_solved = np.zeros(count, dtype=bool)
         ahead = _State(np.empty_like(self.state.freedoms), np.empty_like(self.state.pressures))
 
-        def solve(part: slice) -> None:
+        for part in _parts(count):
             state = self.state.at(part)
             is_solved[part], after = self._stepped(state, acts[part], sources[:, part])
             ahead.freedoms[:, :, part], ahead.pressures[:, part] = after
-
-        self.batch.each_chunk(solve, count)
         for number in np.flatnonzero(~is_solved).tolist():
             pose = self._pose_after(number, dt, valves[number])
             ahead.freedoms[:, :, number] = pose.freedoms[self.batch.stack.first_levels]
@@ -469,7 +449,7 @@ class BatchMotion:
                 for springs, one in zip(self.batch.springs, at, strict=True)
             ]
             if not number:
-                contents = self._contents(each, p)
+                contents = self._volumes(each) * self._squeezed(p)
             moves, dy = self._newton_step(
                 each, p, y, contents, acts, sources, 1 if number else ROUNDS
             )
@@ -505,19 +485,18 @@ class BatchMotion:
             fits &= (self.batch.stack.centres.T @ at <= springs.kind.most_height).all(0)
         return np.asarray(fits)
 
-    @property
-    def _line_volume(self) -> float:
-        return self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
+    def _volumes(self, each: Sequence[SpringBatch]) -> Array:
+        """Return the volumes of the chambers in ul, of a gas with its line: (chambers, n)."""
+        volumes = np.zeros_like(each[0].volumes)
+        if self.line.fluid.is_gas:
+            volumes += self.line.dead_volume + self.line.tube_volume
+        for count, springs in zip(self.batch.counts, each, strict=True):
+            volumes += count * springs.volumes
+        return volumes
 
-    def _contents(self, each: Sequence[SpringBatch], p: Array) -> Array:
-        """Return what the chambers hold in ul, of a gas at the atmosphere: (chambers, n)."""
-        volumes = sum(
-            count * springs.volumes for count, springs in zip(self.batch.counts, each, strict=True)
-        )
-        if not self.line.fluid.is_gas:
-            return np.asarray(volumes)
-        more = self.line.dead_volume + self.line.tube_volume
-        return np.asarray((volumes + more) * (1 + p / ATMOSPHERE_KPA))
+    def _squeezed(self, pressures: Array) -> Array | float:
+        """Return contents by volumes: a gas is counted at the atmosphere."""
+        return 1 + pressures / ATMOSPHERE_KPA if self.line.fluid.is_gas else 1.0
 
     def _newton_step(
         self,
@@ -537,7 +516,6 @@ class BatchMotion:
         chambers, count = p.shape
         matrix = np.zeros((chambers, chambers, count))
         settled, parts = np.zeros_like(p), []
-        volumes = np.full_like(p, self._line_volume)
         for number, springs in zip(self.batch.counts, each, strict=True):
             pulls = np.concatenate(
                 [springs.filling.transpose(1, 0, 2), -springs.gradient[:, None]], axis=1
@@ -547,24 +525,25 @@ class BatchMotion:
             matrix += filled[:, :-1]
             settled += filled[:, -1]
             np.einsum("iin->in", matrix)[:] += number * springs.swelling
-            volumes += number * springs.volumes
             parts.append(moved)
         total = np.zeros_like(p)
         now, place, rate = p, y, _pressure_rate(p, y)
-        first_rate, ahead = rate, volumes + settled
+        first_rate, volumes = rate, self._volumes(each) + settled
+        ahead = volumes
         for number in range(rounds):
             if number:
                 place = np.maximum(y + total / first_rate, 0.0)
                 now = _pressure_at(place)
                 rate = _pressure_rate(now, place)
                 total = (place - y) * first_rate
-                ahead = volumes + settled + np.einsum("cdn,dn->cn", matrix, total)
+                ahead = volumes + np.einsum("cdn,dn->cn", matrix, total)
             flow, flow_rate = self.line.flows(sources, now)
-            wrong, own = -contents - acts * flow, -acts * flow_rate
+            squeezed, own = self._squeezed(now), -acts * flow_rate
             if self.line.fluid.is_gas:
-                squeezed = 1 + now / ATMOSPHERE_KPA
-                wrong, own = wrong / squeezed, (own + ahead / ATMOSPHERE_KPA) / squeezed
-            total = total + _free_step(matrix, own * (rate / first_rate), -wrong - ahead, now <= 0)
+                own += ahead / ATMOSPHERE_KPA
+            wrong = ahead - (contents + acts * flow) / squeezed
+            more = own / squeezed * (rate / first_rate)
+            total = total + _free_step(matrix, more, -wrong, now <= 0)
         moves = [moved[:, -1] + np.einsum("ijn,jn->in", moved[:, :-1], total) for moved in parts]
         return np.stack(moves), total / first_rate
 

@@ -45,11 +45,13 @@ def test_more_pressure_than_the_stack_was_made_for_is_refused() -> None:
         ReachEnvironment(sbafab.stack("1dof-5mm"), most_pressure=500.0)
 
 
-@pytest.mark.parametrize("load", [{}, {"tip_load": (0.0, 0.0, -0.005)}])
-def test_many_at_once_do_what_single_ones_do(load: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    ("design", "load"), [("3dof-15mm", {}), ("1dof-5mm", {"tip_load": (0.0, 0.0, -0.005)})]
+)
+def test_many_at_once_do_what_single_ones_do(design: str, load: dict[str, object]) -> None:
     from gymnasium.vector import SyncVectorEnv
 
-    stack = sbafab.stack("3dof-15mm")
+    stack = sbafab.stack(design)
 
     def one() -> ReachEnvironment:
         return ReachEnvironment(stack, steps=4, near=2.0, **load)
@@ -63,8 +65,8 @@ def test_many_at_once_do_what_single_ones_do(load: dict[str, object]) -> None:
     seen, _ = singles.reset(seed=5)
     assert many.reset(seed=5)[0] == pytest.approx(seen, abs=1e-4)
     numbers, ends = np.random.default_rng(2), 0
-    for _ in range(12):
-        actions = numbers.uniform(-1.2, 1.2, (3, 3))
+    for _ in range(9):
+        actions = numbers.uniform(-1.2, 1.2, (3, stack.chambers))
         expected, got = singles.step(actions), many.step(actions)
         assert many.observation_space.contains(got[0])
         # Single motions end within 1e-5 of a chamber's content.
@@ -74,7 +76,7 @@ def test_many_at_once_do_what_single_ones_do(load: dict[str, object]) -> None:
         assert (got[3] == expected[3]).all()
         assert got[4]["time"][~got[2]] == pytest.approx(many._motion.times[~got[2]])
         ends += int((got[2] | got[3]).sum())
-    assert ends >= 6  # some of them began anew
+    assert ends >= 3  # some of them began anew
 
 
 def test_many_that_reach_their_target_begin_anew() -> None:

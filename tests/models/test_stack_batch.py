@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import numpy as np
 import pytest
 
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import stack as stacks
-from sbafab.models.pneumatics import AIR, ATMOSPHERE_KPA, WATER, Line
+from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Stack
 from sbafab.models.stack_batch import StackBatch
 
@@ -26,12 +27,12 @@ def drawn_pressures(chambers: int, count: int = 8) -> np.ndarray:
     return drawn
 
 
-@pytest.mark.parametrize("design", ["3dof-15mm", "1dof-5mm", "tapered-12mm"])
+@pytest.mark.parametrize("design", ["3dof-15mm", "1dof-5mm"])
 def test_poses_are_the_single_ones(design: str) -> None:
     stack = sbafab.stack(design)
     pressures = drawn_pressures(stack.chambers, 6)
     batch = StackBatch(stack).poses(pressures)
-    again = StackBatch(stack, workers=2).poses(pressures[::-1], near=batch)
+    again = StackBatch(stack).poses(pressures[::-1], near=batch)
     for number, row in enumerate(pressures):
         pose = stack.pose(row.tolist())
         for poses, at in ((batch, number), (again, len(pressures) - 1 - number)):
@@ -42,12 +43,18 @@ def test_poses_are_the_single_ones(design: str) -> None:
     assert batch.heights == pytest.approx(batch.tips[:, 2])
 
 
-def test_levels_of_unlike_balloons_turn_each_in_its_own_plane() -> None:
-    stack = sbafab.stack({"kind": "3dof", "stack": {"diameters": [5, 5, 4, 5]}})
+def test_levels_of_unlike_balloons_turn_each_in_its_own_plane(three: Stack) -> None:
+    # The same balloons with a stiffer kind among them, which bends by less.
+    kinds = (three.maps[0], three.maps[0].stiffened(2.0))
+    mixed = replace(three, maps=kinds, levels=np.array([0, 0, 1, 0, 1, 1, 0]))
     pressures = np.array([[6.0, 1.0, 3.0], [0.0, 2.0, 8.0]])
-    tips = StackBatch(stack).poses(pressures).tips
-    for row, tip in zip(pressures.tolist(), tips, strict=True):
-        assert tip == pytest.approx(stack.pose(row).tip, abs=1e-6)
+    batch = StackBatch(mixed)
+    poses, moving = batch.poses(pressures), batch.motion(2)
+    moving.step(0.02, pressures)
+    for number, row in enumerate(pressures.tolist()):
+        assert poses.tips[number] == pytest.approx(mixed.pose(row).tip, abs=1e-6)
+        single = mixed.motion().step(0.02, row)
+        assert moving.tips[number] == pytest.approx(single.tip, abs=1e-3)
 
 
 def test_loaded_poses_are_the_single_ones(three: Stack) -> None:
@@ -90,11 +97,9 @@ def test_a_state_that_takes_many_steps_is_solved_alone(
     assert moving.tips[0] == pytest.approx(single.step(0.02, (5, 1, 0)).tip)
 
 
-@pytest.mark.parametrize("design", ["none", "paper"])
-def test_volumes_rise_with_pressure_at_the_rate_that_a_map_says(design: str) -> None:
+def test_volumes_rise_with_pressure_at_the_rate_that_a_map_says(three: Stack) -> None:
     # Of stiffened films, whose maps have another scale of pressure.
-    made = sbafab.stack(sbafab.load("3dof-15mm", {"models.calibration": design}))
-    kind, p, h = made.maps[0].stiffened(1.7), np.array([0.05, 0.3, 4.0]), 0.6
+    kind, p, h = three.maps[0].stiffened(1.7), np.array([0.05, 0.3, 4.0]), 0.6
     step = 1e-5
     rates = (kind.volume(p + step, h) - kind.volume(p - step, h)) / (2 * step)
     rows = kind.volume_slopes(p)
@@ -115,7 +120,6 @@ def test_flows_of_many_are_those_of_one(line: Line) -> None:
         if source != chamber:
             ends = line.flow(source, chamber + step), line.flow(source, chamber - step)
             assert rates[at] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-3)
-    assert flows[0, 3] * (1 if line.fluid is WATER else ATMOSPHERE_KPA) > 0
 
 
 @pytest.mark.parametrize(
@@ -147,6 +151,4 @@ def test_what_is_no_batch_is_refused(three: Stack) -> None:
         batch.motion(2).step(0.1, [[1.0] * 3])
     with pytest.raises(DesignError, match="count = 0"):
         batch.motion(0)
-    with pytest.raises(DesignError, match="workers = 0"):
-        StackBatch(three, workers=0)
     assert batch.poses(np.zeros((0, 3))).tips.shape == (0, 3)
