@@ -23,6 +23,8 @@ from sbafab.models.balloon_map import (
 from sbafab.models.stack_loads import RING_POINTS
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_poses import PosedStack
@@ -47,7 +49,7 @@ class SpringBatch(NamedTuple):
     volumes: Array
     filling: Array
     swelling: Array
-    meets: Array
+    meets: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
