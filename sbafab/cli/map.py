@@ -103,7 +103,7 @@ def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
     each = tuple(PRESSURE.read(text) for text in pressures.split(","))
     if len(each) != chambers:
         raise DesignError(
-            f"--pressures has {len(each)} values and the design {chambers} chambers; give one a "
+            f"--pressures has {len(each)} of {chambers} pressures; give one a "
             "chamber, with commas between them, such as 10,0,0"
         )
     return each

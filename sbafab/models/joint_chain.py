@@ -74,13 +74,17 @@ class _Limits(NamedTuple):
 
 
 def _limits(stack: Stack, kind: int) -> _Limits:
-    """Return the limits of a level. At the largest tilt that any rise allows, rims just meet on one
-    side and a balloon is as high as its map on the other.
+    """Return the limits of a level. At the largest tilt that any rise and direction allow, rims
+    just meet on one side and a balloon on the other is as high as its map.
     """
     balloon = stack.maps[kind]
-    farthest = float(np.hypot(*stack.axes.T).max())
-    tilt = balloon.most_height / (stack.outline + farthest)
+    turns = np.radians(np.arange(360))
+    ways = np.stack([np.cos(turns), np.sin(turns)])
+    # Gaps by tilt are y and -x.
+    rims = stack.rims[kind][:, [2, 1]] * (-1, 1)
+    across = (-(rims @ ways)).max(0) + (stack.axes @ ways).max(0)
     force = stack.chambers * float(balloon.force(balloon.most_pressure, 0.0)) / 1000
+    tilt = balloon.most_height / float(across.min())
     return _Limits(balloon.most_height, tilt, force, force * stack.outline)
 
 
@@ -148,14 +152,14 @@ def _add_plate(link: ET.Element, stack: Stack, mass: float | None) -> None:
 
 def _note(name: str, stack: Stack, mass: float | None) -> str:
     tilts = [math.degrees(_limits(stack, kind).tilt) for kind in set(stack.levels.tolist())]
-    masses = "Not known: a film has no density" if mass is None else "The films'"
+    masses = "not known, a film has no density" if mass is None else "the films'"
     return f"""\
 {name}: the kinematic chain of {len(stack.levels)} levels of balloons, in m, kg, rad, N.
 plate_0 is the base, plate_{len(stack.levels)} the tip. A level tilts about x and y by half, rises,
 and tilts by the other half, which mimics the first: 3 freedoms a level.
 Limits are those of the balloons' map to {stack.most_pressure:g} kPa. At the largest tilt of a level
-({min(tilts):.3g} degrees) rims just meet at one side while a balloon is as high as its map at the
-other; at other rises less is allowed, which URDF cannot say.
-Efforts are the balloons' at that pressure; velocities of {VELOCITY:g} stand in, for lines and valves
-set them. Masses: {masses}; links between plates have none.
+({max(tilts):.3g} degrees) rims just meet at one side while a balloon is as high as its map at the
+other; at other rises or in other directions less is allowed, which URDF cannot say.
+Efforts are the balloons' at that pressure; velocities of {VELOCITY:g} stand in, for lines and
+valves set them. Masses: {masses}; links between plates have none.
 Which values hold at which pressures is not in this file: sbafab.stack(...).pose(pressures)."""

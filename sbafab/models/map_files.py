@@ -1,5 +1,5 @@
-"""The balloons of a design as files for other programs: CSV, JSON, and Python that takes numpy arrays
-and needs no package.
+"""The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies
+that takes numpy arrays too.
 
 Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import runpy
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import sbafab
@@ -86,11 +89,50 @@ def test_python_file_needs_nothing_and_says_the_same(
     assert area == pytest.approx(slope, rel=1e-4)
 
 
+def test_python_file_takes_arrays(
+    balloon: BalloonMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "balloons.py"
+    assert run(["map", "1dof-5mm", "--to", str(file)], capsys)[0] == 0
+    functions = runpy.run_path(str(file))
+    p = np.linspace(0.0, balloon.most_pressure, 7)[:, None]
+    h = np.linspace(0.0, balloon.most_height, 9)
+    for name in ("force", "volume", "potential"):
+        values = functions[name](p, h)
+        assert values == pytest.approx(getattr(balloon, name)(p, h), rel=1e-6, abs=1e-5)
+        # Both ways of counting agree, down to a number of numpy's.
+        each = [[functions[name](float(x), float(y)) for y in h] for x in p[:, 0]]
+        assert values == pytest.approx(np.array(each), rel=1e-12, abs=1e-12)
+        assert functions[name](p[3, 0], h[4]) == pytest.approx(each[3][4], rel=1e-12)
+    with pytest.raises(ValueError, match="outside the map"):
+        functions["force"](np.array([1.0, 1e4]), 0.5)
+
+
+def test_models_of_robots_are_files_of_xml(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for file, options, root in (
+        ("stack.xml", ["--pressures", "10,0 kPa,0"], "mujoco"),
+        ("even.xml", [], "mujoco"),
+        ("stack.urdf", [], "robot"),
+    ):
+        path = tmp_path / file
+        design = ["3dof-15mm", "--set", "stack.balloons=2"]
+        assert run(["map", *design, "--to", str(path), *options], capsys)[0] == 0
+        assert ET.parse(path).getroot().tag == root
+    assert "for 10, 0, 0 kPa" in (tmp_path / "stack.xml").read_text()
+    assert "for 10, 10, 10 kPa" in (tmp_path / "even.xml").read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
+        (["1dof-5mm", "--to", "a.py", "--pressures", "5"], "is for a MuJoCo model"),
+        (["1dof-5mm", "--to", "a.xml", "--pressures", "5,5"], "has 2 of 1 pressures"),
+        (["1dof-5mm", "--to", "a.xml", "--pressures", "x"], "must be a pressure such as"),
+        (["1dof-5mm", "--to", "a.xml", "--pressures", "200"], "give 0 to 110 kPa"),
         (["radial-15mm"], "no round pockets"),
-        (["1dof-5mm", "--to", "map.txt"], "must end with .csv, .json, .py"),
+        (["1dof-5mm", "--to", "map.txt"], "must end with .csv, .json, .py, .urdf, .xml"),
         (["1dof-5mm", "--pressure", "400"], "give 0 to 367 kPa"),
         (["1dof-5mm", "--pressure", "0"], "give more than 0 kPa"),
         (["1dof-5mm", "--pocket-loss", "2"], "a pocket loss of 2 mm leaves 0.5"),

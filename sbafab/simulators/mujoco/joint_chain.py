@@ -12,7 +12,6 @@ from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, linearised
 from sbafab.models.joint_chain import (
     JOINTS,
-    UPPER,
     axis_of,
     document,
     joint_values,
@@ -34,7 +33,13 @@ DT, SETTLING = 0.002, 0.05
 """s: a step, and the time constant of each level, by dampers as of no actuator."""
 MASS = 1e-5
 """kg of a plate that stands in where a density is not known."""
-FREEDOMS = (("rise",), ("tilt_x", "tilt_x_upper"), ("tilt_y", "tilt_y_upper"))
+MIRROR = 100.0
+"""Stiffness that holds both halves of a tilt equal, as a multiple of the tilt's."""
+FREEDOMS: tuple[tuple[str, ...], ...] = (
+    ("rise",),
+    ("tilt_x", "tilt_x_upper"),
+    ("tilt_y", "tilt_y_upper"),
+)
 """Joints that add up to each freedom of a level."""
 SPRINGS = ("rise", "tilt_x", "tilt_y")
 POSE = "pressed"
@@ -62,13 +67,12 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
     centre = {"center": numbers((0, 0, height / 2)), "extent": number(max(height, 5.0))}
     ET.SubElement(root, "statistic", centre)
     _add_plates(ET.SubElement(root, "worldbody"), stack)
-    _add_mirrors(ET.SubElement(root, "equality"), len(stack.levels))
     tendons = ET.SubElement(root, "tendon")
     _add_springs(tendons, at)
     _add_chambers(tendons, at)
     if span:
         _add_controls(ET.SubElement(root, "actuator"), stack, pose, span)
-    key = {"name": POSE, "qpos": numbers(joint_values(at.freedoms).ravel())}
+    key = {"name": POSE, "qpos": numbers(joint_values(at.freedoms).ravel().round(12))}
     ET.SubElement(ET.SubElement(root, "keyframe"), "key", key)
     return document(root, _note(name, stack, pose, span))
 
@@ -132,17 +136,12 @@ def _add_plates(world: ET.Element, stack: Stack) -> None:
     ET.SubElement(body, "site", {"name": "tip"})
 
 
-def _add_mirrors(equality: ET.Element, levels: int) -> None:
-    for level in range(1, levels + 1):
-        for joint in (joint for joint in JOINTS if joint.endswith(UPPER)):
-            upper = f"level{level}_{joint}"
-            names = {"joint1": upper, "joint2": upper.removesuffix(UPPER)}
-            ET.SubElement(equality, "joint", {**names, "polycoef": "0 1 0 0 0"})
-
-
 def _add_springs(tendons: ET.Element, at: Linearised) -> None:
     """Add three springs a level, whose energy is q H q / 2 for the second derivatives H = L D L^T
     by its freedoms: D are stiffnesses, and L says of which freedoms each spring's length is.
+
+    Both halves of a tilt are held equal by stiffer springs: equality constraints of MuJoCo ignore
+    dampers, and blow up with masses as small as these.
     """
     lower = np.linalg.cholesky(at.matrices)
     roots = np.diagonal(lower, axis1=1, axis2=2)
@@ -153,13 +152,24 @@ def _add_springs(tendons: ET.Element, at: Linearised) -> None:
         for spring, ways, stiffness, length in zip(
             SPRINGS, columns.T, stiffnesses, lengths, strict=True
         ):
-            parts = {
-                "name": f"level{level}_{spring}",
-                "stiffness": number(stiffness),
-                "damping": number(stiffness * SETTLING),
-                "springlength": number(length),
-            }
-            _add_joints(ET.SubElement(tendons, "fixed", parts), level, ways)
+            tendon = _damped(tendons, f"level{level}_{spring}", stiffness, length)
+            _add_joints(tendon, level, ways)
+        for joints in FREEDOMS[1:]:
+            name = f"level{level}_{joints[0]}_halves"
+            tendon = _damped(tendons, name, MIRROR * float(stiffnesses[1:].max()), 0.0)
+            for joint, sign in zip(joints, ("1", "-1"), strict=True):
+                ET.SubElement(tendon, "joint", {"joint": f"level{level}_{joint}", "coef": sign})
+
+
+def _damped(tendons: ET.Element, name: str, stiffness: float, length: float) -> ET.Element:
+    """Add a spring with its damper, and no joints as yet."""
+    parts = {
+        "name": name,
+        "stiffness": number(stiffness),
+        "damping": number(stiffness * SETTLING),
+        "springlength": number(round(length, 12)),
+    }
+    return ET.SubElement(tendons, "fixed", parts)
 
 
 def _add_joints(tendon: ET.Element, level: int, ways: Array) -> None:
@@ -195,12 +205,12 @@ def _listed(pressures: Sequence[float]) -> str:
 def _note(name: str, stack: Stack, pose: Pose, span: float) -> str:
     share = f"{100 * ACCURACY:g} %"
     valid = (
-        f"ctrl of a chamber is by how many kPa it is above that. Within {span:g} kPa, each chamber\n"
-        f"alone or all together, the tip settles within {share} of the stack's length\n"
-        f"({length_of(pose):.4g} mm) of the elastic stack's place."
+        f"ctrl of a chamber is by how many kPa it is above that. At {span:g} kPa more or less,\n"
+        f"each chamber alone or all together, the tip settles within {share} of the stack's\n"
+        f"length ({length_of(pose):.4g} mm) of the elastic stack's place."
         if span
-        else f"Balloons change so much with pressure there that no range of them is within {share}\n"
-        "of the stack's length, and there are no controls."
+        else "Balloons change so much with pressure there that no range of it keeps the tip\n"
+        f"within {share} of the stack's length: there are no controls."
     )
     mass = "the films'" if stack.weight is not None else f"{MASS:g} kg, for a film has no density"
     return f"""\
