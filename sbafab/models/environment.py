@@ -141,7 +141,9 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._has_begun = True
         return self._observations(), {}
 
-    def step(self, actions: Any) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+    def step(
+        self, actions: Any
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Return observations ``dt`` s later, rewards, which arrived, and which have no time left.
 
         Environments whose episode was over start the next one instead, with the reward 0.

@@ -52,7 +52,7 @@ class LevelRun(NamedTuple):
     """Neighbouring levels with equal freedoms: the row of these, and their number."""
 
     row: int
-    count: int
+    levels: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +71,12 @@ class BatchPoses:
     @property
     def heights(self) -> Array:
         """Heights of the middles of the top plates above the base in mm: (N,)."""
-        return self.tips[:, 2]
+        return np.asarray(self.tips[:, 2])
 
     @cached_property
     def bends(self) -> Array:
         """Degrees from base to top, along the stack: (N,)."""
-        return np.degrees(np.hypot(*self.freedoms[:, :, 1:].sum(1).T))
+        return np.asarray(np.degrees(np.hypot(*self.freedoms[:, :, 1:].sum(1).T)))
 
 
 class _State(NamedTuple):
@@ -187,7 +187,7 @@ class StackBatch:
             rise, x, y = freedoms[run.row]
             square = np.maximum(x * x + y * y, STRAIGHT)
             angle = np.sqrt(square)
-            whole = run.count * angle
+            whole = run.levels * angle
             sine, cosine = np.sin(whole), np.cos(whole)
             if number:
                 # Rodrigues' formula.
