@@ -171,7 +171,7 @@ class BalloonMap:
                 f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
                 f"{self.most_pressure:g} kPa"
             )
-        x, rate = self._scaled(p)
+        x, rate = self.scaled(p)
         first = x.astype(np.int_)
         powers = np.empty((*p.shape, 2, DEGREE + 1))
         powers[..., 0, :] = (x - first)[..., None] ** POWERS
@@ -196,7 +196,7 @@ class BalloonMap:
             rest = self.volume_slopes(np.maximum(below, 0.0))
             return np.where((below < 0)[..., None, None], volumes / COLLAPSE_SUCTION, rest)
         p = below
-        x, rate = self._scaled(p)
+        x, rate = self.scaled(p)
         first = x.astype(np.int_)
         powers = (x - first)[..., None] ** POWERS
         weights = np.zeros_like(powers)
@@ -206,7 +206,7 @@ class BalloonMap:
         slopes = weights[..., None, :] @ self._polynomials[first]
         return np.asarray(slopes.reshape(*p.shape, PIECES_IN_ALL, DEGREE + 1))
 
-    def _scaled(self, p: Array) -> tuple[Array, Array]:
+    def scaled(self, p: Array) -> tuple[Array, Array]:
         """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
         each = PRESSURE_SPANS / math.asinh(self.most_pressure / self.scale_pressure)
         x = np.minimum(np.arcsinh(p / self.scale_pressure) * each, PRESSURE_SPANS * (1 - 1e-12))
@@ -344,7 +344,7 @@ def _spread(count: int) -> Array:
 def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Array:
     """Coefficients of the potential: least squares of W, the force and the volume."""
     blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
-    x, rate = BalloonMap(Balloon(), most, top, blank)._scaled(p)
+    x, rate = BalloonMap(Balloon(), most, top, blank).scaled(p)
     y = np.minimum(h * HEIGHT_SPANS / top, HEIGHT_SPANS * (1 - 1e-12))
     by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
     by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]

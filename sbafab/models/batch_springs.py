@@ -23,8 +23,6 @@ from sbafab.models.balloon_map import (
 from sbafab.models.stack_loads import RING_POINTS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_poses import PosedStack
@@ -39,8 +37,7 @@ LEAST_PIVOT = 1e-12
 class SpringBatch(NamedTuple):
     """Springs of n states of one kind of balloon: ``energy`` (n), ``gradient`` (3, n) and
     ``matrix`` (3, 3, n) by rise and tilt; ``volumes`` (chambers, n), their rates by rise and tilt,
-    ``filling`` (chambers, 3, n), and by pressure, ``swelling`` (chambers, n); ``meets`` (points, n)
-    where gaps are shut.
+    ``filling`` (chambers, 3, n), and by pressure, ``swelling`` (chambers, n).
     """
 
     energy: Array
@@ -49,7 +46,6 @@ class SpringBatch(NamedTuple):
     volumes: Array
     filling: Array
     swelling: Array
-    meets: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +86,7 @@ class BatchSprings:
         """Return the splines' weights at pressures (chambers, n) of values and of derivatives by
         pressure: (orders, coefficients, chambers, n).
         """
-        x, rate = self.kind._scaled(pressures)
+        x, rate = self.kind.scaled(pressures)
         first = x.astype(np.int_)
         powers = np.empty((DEGREE + 1, x.size))
         powers[0] = 1.0
@@ -163,7 +159,6 @@ class BatchSprings:
             sums[0] if orders > 1 else none,
             (self.tilts @ -first[1]).reshape(chambers, 3, count) if orders > 1 else none,
             sums[1] if orders > 2 else none,
-            meets,
         )
 
 

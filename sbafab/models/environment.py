@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from sbafab.models.pneumatics import Line
     from sbafab.models.stack import Motion, Stack
 
-    Flags = NDArray[np.bool_]
-
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):
     """Task of moving the tip of a stack to a point that it can reach.
@@ -143,7 +141,9 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._has_begun = True
         return self._observations(), {}
 
-    def step(self, actions: Any) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:
+    def step(
+        self, actions: Any
+    ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Return observations ``dt`` s later, rewards, which arrived, and which have no time left.
 
         Environments whose episode was over start the next one instead, with the reward 0.
@@ -161,10 +161,10 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
             self._motion.restart(anew)
             self._left[anew] = self.steps
         observations = self._observations()
-        away: Array = np.sqrt((observations[:, 6:9] ** 2).sum(1))
+        away = np.sqrt((observations[:, 6:9] ** 2).sum(1))
         is_there, is_late = (away <= self.near) & ~anew, (self._left <= 0) & ~anew
         self._is_over = is_there | is_late
-        rewards: Array = np.where(anew, 0.0, -away)
+        rewards = np.where(anew, 0.0, -away)
         return observations, rewards, is_there, is_late, {"time": self._motion.times.copy()}
 
     def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:

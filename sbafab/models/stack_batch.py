@@ -71,7 +71,7 @@ class BatchPoses:
     @property
     def heights(self) -> Array:
         """Heights of the middles of the top plates above the base in mm: (N,)."""
-        return self.tips[:, 2]
+        return np.asarray(self.tips[:, 2])
 
     @cached_property
     def bends(self) -> Array:
