@@ -62,6 +62,11 @@ def plate_mass(stack: Stack) -> float | None:
     return None if stack.weight is None else stack.weight / GRAVITY / 1000
 
 
+def disc_inertia(mass: float, radius: float, height: float) -> tuple[float, float]:
+    """Return the moments of inertia of a disc about a diameter and about its axis."""
+    return mass * (3 * radius**2 + height**2) / 12, mass * radius**2 / 2
+
+
 class _Limits(NamedTuple):
     """Largest rise of a level in mm and tilt in rad, and the largest force in N and moment in N mm
     that its balloons have there.
@@ -99,8 +104,10 @@ def urdf_text(name: str, stack: Stack) -> str:
             title = f"level{level}_{joint}"
             child = f"plate_{level}" if joint == JOINTS[-1] else f"{title}_link"
             link = ET.SubElement(root, "link", {"name": child})
+            if mass is not None:
+                _add_mass(link, stack, mass / len(JOINTS))
             if joint == JOINTS[-1]:
-                _add_plate(link, stack, mass)
+                _add_plate(link, stack)
             _add_joint(root, title, joint, (parent, child), limits, stack.pitch)
             parent = child
     return document(root, _note(name, stack, mass))
@@ -132,27 +139,30 @@ def _add_joint(
         ET.SubElement(element, "mimic", {"joint": title.removesuffix(UPPER)})
 
 
-def _add_plate(link: ET.Element, stack: Stack, mass: float | None) -> None:
-    radius, height = stack.outline / 1000, stack.pitch / 1000
-    origin = {"xyz": numbers((0, 0, -height / 2)), "rpy": "0 0 0"}
-    if mass is not None:
-        inertial = ET.SubElement(link, "inertial")
-        ET.SubElement(inertial, "origin", origin)
-        ET.SubElement(inertial, "mass", {"value": number(mass)})
-        across, along = mass * (3 * radius**2 + height**2) / 12, mass * radius**2 / 2
-        moments = {"ixx": across, "ixy": 0, "ixz": 0, "iyy": across, "iyz": 0, "izz": along}
-        each = {key: number(value) for key, value in moments.items()}
-        ET.SubElement(inertial, "inertia", each)
+def _add_mass(link: ET.Element, stack: Stack, mass: float) -> None:
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "mass", {"value": number(mass)})
+    across, along = disc_inertia(mass, stack.outline / 1000, stack.pitch / 1000)
+    moments = {"ixx": across, "ixy": 0, "ixz": 0, "iyy": across, "iyz": 0, "izz": along}
+    each = {key: number(value) for key, value in moments.items()}
+    ET.SubElement(inertial, "inertia", each)
+
+
+def _add_plate(link: ET.Element, stack: Stack) -> None:
+    height = stack.pitch / 1000
     visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", origin)
-    geometry = ET.SubElement(visual, "geometry")
-    size = {"radius": number(radius), "length": number(height)}
-    ET.SubElement(geometry, "cylinder", size)
+    ET.SubElement(visual, "origin", {"xyz": numbers((0, 0, -height / 2)), "rpy": "0 0 0"})
+    size = {"radius": number(stack.outline / 1000), "length": number(height)}
+    ET.SubElement(ET.SubElement(visual, "geometry"), "cylinder", size)
 
 
 def _note(name: str, stack: Stack, mass: float | None) -> str:
     tilts = [math.degrees(_limits(stack, kind).tilt) for kind in set(stack.levels.tolist())]
-    masses = "not known, a film has no density" if mass is None else "the films'"
+    masses = (
+        "not known, a film has no density"
+        if mass is None
+        else "the films', a fifth of a level's on each of its links"
+    )
     return f"""\
 {name}: the kinematic chain of {len(stack.levels)} levels of balloons, in m, kg, rad, N.
 plate_0 is the base, plate_{len(stack.levels)} the tip. A level tilts about x and y by half, rises,
@@ -161,5 +171,5 @@ Limits are those of the balloons' map to {stack.most_pressure:g} kPa. At the lar
 ({max(tilts):.3g} degrees) rims just meet at one side while a balloon is as high as its map at the
 other; at other rises or in other directions less is allowed, which URDF cannot say.
 Efforts are the balloons' at that pressure; velocities of {VELOCITY:g} stand in, for lines and
-valves set them. Masses: {masses}; links between plates have none.
+valves set them. Masses: {masses}.
 Which values hold at which pressures is not in this file: sbafab.stack(...).pose(pressures)."""

@@ -109,7 +109,7 @@ def test_limits_are_those_of_the_map(lobed: Stack, robot: ET.Element) -> None:
 
 def test_masses_are_the_films(robot: ET.Element) -> None:
     masses = [float(mass.get("value")) for mass in robot.iter("mass")]
-    assert len(masses) == 5
+    assert len(masses) == 25
     assert sum(masses) == pytest.approx(film_mass(sbafab.build(*LOBED)) / 1000)
 
 

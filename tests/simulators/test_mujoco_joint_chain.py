@@ -10,6 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
+from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
 from sbafab.simulators.mujoco.joint_chain import ACCURACY, chain_text, length_of
 
@@ -18,6 +19,7 @@ mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 STEPS = 300
 CASES = [
     ("1dof-5mm", (10.0,)),
+    ("short", (10.0, 5.0, 0.0)),
     ("lobed", (10.0, 10.0, 10.0)),
     ("lobed", (10.0, 0.0, 0.0)),
     ("lobed", (20.0, 3.0, 9.0)),
@@ -28,6 +30,7 @@ CASES = [
 def stacks() -> dict[str, Stack]:
     return {
         "1dof-5mm": sbafab.stack("1dof-5mm"),
+        "short": sbafab.stack("3dof-15mm", "stack.balloons=1"),
         "lobed": sbafab.stack("3dof-15mm", "stack.balloons=5"),
     }
 
@@ -107,3 +110,18 @@ def test_a_film_without_density_has_a_mass_that_stands_in(stacks: dict[str, Stac
 def test_pressures_are_one_a_chamber(stacks: dict[str, Stack]) -> None:
     with pytest.raises(DesignError, match="give one a chamber"):
         chain_text("lobed", stacks["lobed"], (10.0,))
+
+
+def test_mujoco_reads_the_urdf_as_the_same_chain(stacks: dict[str, Stack]) -> None:
+    stack = stacks["lobed"]
+    model = mujoco.MjModel.from_xml_string(urdf_text("lobed", stack))
+    state = mujoco.MjData(model)
+    pose = stack.pose((10.0, 0.0, 0.0))
+    values = joint_values(pose.freedoms)
+    values[:, 2] /= 1000
+    for (level, place), value in np.ndenumerate(values):
+        state.joint(f"level{level + 1}_{JOINTS[place]}").qpos = value
+    mujoco.mj_kinematics(model, state)
+    for level, place in enumerate(pose.frames[0][1:], start=1):
+        assert 1000 * state.body(f"plate_{level}").xpos == pytest.approx(place, abs=1e-3)
+    assert float(model.body_mass.sum()) == pytest.approx(5 * stack.level_weight / 9806.65)

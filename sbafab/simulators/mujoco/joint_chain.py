@@ -13,6 +13,7 @@ from sbafab.models.derivatives import Linearised, linearised
 from sbafab.models.joint_chain import (
     JOINTS,
     axis_of,
+    disc_inertia,
     document,
     joint_values,
     number,
@@ -114,11 +115,11 @@ def _add_plates(world: ET.Element, stack: Stack) -> None:
     shape = {"type": "cylinder", "size": size, "contype": "0", "conaffinity": "0", "mass": "0"}
     paint = {"rgba": "0.35 0.60 0.85 1"}
     ET.SubElement(world, "geom", {"name": "base", **shape, "rgba": "0.4 0.4 0.4 1"})
-    across = mass / 2 * stack.outline**2
+    across, along = disc_inertia(mass / 2, stack.outline, stack.pitch)
     inertial = {
         "pos": "0 0 0",
         "mass": number(mass / 2),
-        "diaginertia": numbers((across / 4, across / 4, across / 2)),
+        "diaginertia": numbers((across, across, along)),
     }
     body = world
     for level in range(1, len(stack.levels) + 1):
