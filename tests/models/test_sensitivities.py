@@ -9,6 +9,7 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
+from sbafab.models.figures import Factors
 from sbafab.models.sensitivities import sensitivities
 from sbafab.models.stack import stack
 
@@ -22,7 +23,9 @@ def test_films_so_much_stiffer_under_as_much_more_pressure_and_load_stay_as_they
 ) -> None:
     """Film energies are in proportion to the modulus: Euler's theorem of homogeneous functions."""
     design = sbafab.load("3dof-15mm")
-    (row,) = sensitivities(design, PRESSURES, ["films.tpe.modulus"], tip_load=force)
+    (row,) = sensitivities(
+        design, PRESSURES, ["films.tpe.modulus"], factors=Factors(), tip_load=force
+    )
     each = stack(design).derivatives(PRESSURES, tip_load=force)
     for part in ("tip", "turn", "volumes"):
         by_modulus = getattr(row.rates, part)[:, 0] * row.value
@@ -37,7 +40,7 @@ def test_rates_by_a_key_are_those_of_stacks_with_more_and_less_of_it(load: dict[
     """The same maps: what differs is the implicit step from the balance of the middle one."""
     design = sbafab.load("3dof-15mm")
     keys = ("chamber.diameter", "films.tpe.thickness", "stack.balloons")
-    for row in sensitivities(design, PRESSURES, keys, **load):
+    for row in sensitivities(design, PRESSURES, keys, factors=Factors(), **load):
         step = 1 if row.key == "stack.balloons" else 0.1 * row.value
         low, high = (
             stack(design.with_({row.key: row.value + side * step})).pose(PRESSURES, **load)

@@ -12,6 +12,7 @@ ROOT = Path(sbafab.__file__).parent
 STATES = {
     "as_built/expected.py": {"_ContourGroup"},
     "models/stack.py": {"Motion"},
+    "models/stack_batch.py": {"BatchMotion"},
     "output/artefacts.py": {"DesignFolder"},
     "rules/sealing.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},
