@@ -84,7 +84,7 @@ class Line:
         return math.copysign(min(laminar, turbulent), drop)
 
     def flows(self, sources: Array, chambers: Array) -> tuple[Array, Array]:
-        """Return ``flow`` in ul/s for pressures of any shape, and its rates by those in chambers."""
+        """Return ``flow`` in ul/s for pressures of any shape, and rates by those in chambers."""
         drops, rates = sources - chambers, np.full(np.shape(chambers), -1.0)
         if self.fluid.is_gas:
             drops = drops * (1 + (sources + chambers) / (2 * ATMOSPHERE_KPA))
