@@ -74,7 +74,7 @@ def calibrated(model: Model, factors: Factors) -> Model:
 
 def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
     """Yield stroke, volume and input work of a free stack of round pockets at each pressure."""
-    if not actuator.radii:
+    if not actuator.radii or not request.pressures_kpa:
         return
     try:
         kinds = Counter(

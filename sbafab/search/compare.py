@@ -398,7 +398,7 @@ def _inflated(comparison: DesignComparison) -> PicturePair:
     wish = PictureRequest({}, width=SIZE[0], height=SIZE[1])
     drawn = map(_uri, pictures_at_one_scale(bodies, wish))
     first, second = ("" if note else next(drawn) for note in notes)
-    title = f"Inflated at {pressure:g} kPa, of chambers side by side one"
+    title = f"Inflated at {pressure:g} kPa; of parallel chambers only the first"
     return PicturePair(title, (first, second), (notes[0], notes[1]))
 
 

@@ -478,3 +478,9 @@ def test_the_work_of_the_air_is_its_integral_over_the_volume() -> None:
     below = float(np.trapezoid(volumes, pressures)) + 0.75 * pressures[0] * volumes[0]
     work = 6 * (1.0 * volumes[-1] - below) / 1000
     assert found.value("pneumatic input work at 1 kPa, free") == pytest.approx(work, rel=0.04)
+
+
+def test_without_pressures_there_are_the_figures_that_need_none() -> None:
+    prediction = sbafab.predict("1dof-5mm", pressures_kpa=[])
+    assert prediction.value("full stroke") == 7.0
+    assert not [figure for figure in prediction.figures if "kPa" in figure.name]
