@@ -49,7 +49,7 @@ def fast_stack() -> Posed | None:
     make = getattr(sbafab, "stack", None)
     if make is None:
         return None
-    stack = make(NAME)
+    stack = make(NAME, "models.calibration=none")
 
     def pose(pressures: Sequence[float]) -> tuple[float, float]:
         found = stack.pose(tuple(pressures))

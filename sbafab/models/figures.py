@@ -520,7 +520,8 @@ def chosen(figures: Iterable[Figure], to_come: tuple[str, ...] = ()) -> tuple[Fi
     """
     candidates = tuple(figures)
     return tuple(
-        replace(figure, other=_is_superseded(figure, candidates, to_come)) for figure in candidates
+        replace(figure, other=figure.other or _is_superseded(figure, candidates, to_come))
+        for figure in candidates
     )
 
 

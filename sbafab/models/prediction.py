@@ -498,6 +498,9 @@ def predict(
         items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     to_come = (STACK,) if quick and subject.radii else ()
+    if to_come and uncertainty is not None:
+        # Forces that the calibrated stack will give are those to design with.
+        items = [_superseded_later(item) for item in items]
     figures = chosen((item for item in items if isinstance(item, Figure)), to_come)
     return Prediction(
         wish,
@@ -513,6 +516,11 @@ def predict(
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
     )
+
+
+def _superseded_later(item: Figure | LeftOut) -> Figure | LeftOut:
+    is_force = isinstance(item, Figure) and item.name.startswith("blocked force")
+    return replace(item, other=True) if is_force and isinstance(item, Figure) else item
 
 
 def _moved_figures(

@@ -201,7 +201,7 @@ def test_an_assembly_moves_and_says_how_it_grips(brace: Watched) -> None:
     assert f"{pose.bend:.1f}°" in readings[1]
     assert share_changed(before, picture(brace, "#view-swing .surface")) > 0.02
     trust = page.locator("#view-swing .trust").inner_text()
-    assert "not calibrated" in trust
+    assert "its design's calibration" in trust
     assert "Contact between parts is ignored here" in trust
     # Emptied, the grip is as wide as its films.
     page.get_by_role("button", name="Vent").locator("visible=true").click()
