@@ -4,8 +4,9 @@ Both come from one potential, the films' energy less the work of the air: force 
 -dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
 both derivatives of balloons between plates. So the map conserves energy: no cycle of pressure and
 height gives or takes work. A balloon of least energy holds the more the higher its pressure, and
-pushes the less the higher it stands (W is concave in p, convex in h): of all splines that do, and
-hold a volume above 0, the map is the one nearest to the balloons. Lengths mm, pressures kPa,
+pushes the less the higher it stands (W is concave in p, convex in h): of all splines whose
+Bernstein coefficients say so, and that hold a volume above 0, the map is the one nearest to the
+balloons. So both hold at every place of the map, by construction. Lengths mm, pressures kPa,
 volumes ul, forces mN, energies uJ.
 """
 
@@ -50,14 +51,16 @@ VOLUME_WEIGHT = 0.6
 """Weight of volumes beside forces."""
 LOW_HEIGHT = 0.2
 """Height in mm below which volume errors are weighted absolutely, above relatively."""
-PRESSURE_CHECKS, HEIGHT_CHECKS = 8 * PRESSURE_SPANS + 1, 4 * HEIGHT_SPANS + 1
-"""Points at which volumes must rise with pressure and forces fall with height, each way."""
-LOW_CHECKS = np.array([0.001, 0.002, 0.004, 0.007])
-"""Further heights near the flat, as shares of the map's height."""
+PRESSURE_PARTS, HEIGHT_PARTS = 4, 1
+"""Parts of each piece, each way, over which volumes must rise with pressure and forces fall with
+height. A polynomial whose Bernstein coefficients on a part are above 0 is above 0 all over it.
+"""
+LOW_PARTS = np.array([0.005, 0.02])
+"""Further ends of parts near the flat, as shares of the map's height."""
 LEAST_CHECK = 0.005
-"""Share of the map's height from which on volumes must be above 0."""
+"""Share of the map's height by which limits are scaled below it."""
 MARGIN = 5e-5
-"""Share by which the limits are met at these points, so that they hold in between as well."""
+"""Share by which the limits are met, far above what sums in floating point lose."""
 ACTIVE_SET_ROUNDS = 12
 """Rounds in which limits that are violated join the active set."""
 MOST_STRETCH = 0.15
@@ -82,6 +85,13 @@ def _spline_pieces() -> Array:
 
 PIECES = _spline_pieces()
 POWERS = np.arange(DEGREE + 1.0)
+BERNSTEIN = np.linalg.inv(
+    [
+        [math.comb(DEGREE, k) * u**k * (1 - u) ** (DEGREE - k) for k in range(DEGREE + 1)]
+        for u in np.linspace(0, 1, DEGREE + 1)
+    ]
+)
+"""From values at even places from 0 to 1 to Bernstein coefficients."""
 SLOPES = np.stack([PIECES[:, k] * k for k in range(1, DEGREE + 1)], -1)
 WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 """The coefficients of each piece by height."""
@@ -383,19 +393,19 @@ def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Arra
 
 
 class MapLimits(NamedTuple):
-    """Linear functions of a spline's coefficients that must not fall below MARGIN: the matrices by
-    pressure and by height (places, coefficients) of each kind.
+    """Linear functions of a spline's coefficients that must be above 0, and are to be MARGIN: the
+    matrices by pressure and by height (Bernstein coefficients, coefficients) of each kind.
     """
 
     kinds: tuple[tuple[Array, Array], ...]
 
     def values(self, coefficients: Array) -> list[Array]:
-        """Return the values at all places of each kind: (pressures, heights)."""
+        """Return the values of each kind: (by pressure, by height)."""
         grid = coefficients.reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
         return [across @ grid @ along.T for across, along in self.kinds]
 
     def rows(self, chosen: list[NDArray[np.bool_]]) -> Array:
-        """Return the equations of the places chosen: (places, coefficients)."""
+        """Return the equations of the values chosen: (values, coefficients)."""
         rows = []
         for (across, along), these in zip(self.kinds, chosen, strict=True):
             i, j = np.nonzero(these)
@@ -407,22 +417,63 @@ class MapLimits(NamedTuple):
 def _limits(most: float, top: float, area: float) -> MapLimits:
     """Return the limits on W: volumes that rise with pressure and are above 0 without any, as
     shares of area times height; forces that fall with height, as shares of pressure times area.
+
+    The limits are on Bernstein coefficients, so that they hold between places as well.
     """
     each = PRESSURE_SPANS / math.asinh(most / P0)
-    x = np.linspace(0, PRESSURE_SPANS * (1 - 1e-12), PRESSURE_CHECKS)
-    even = np.linspace(0, 1 - 1e-12, HEIGHT_CHECKS)
-    y = HEIGHT_SPANS * np.sort(np.concatenate([(even + even**2) / 2, LOW_CHECKS]))
-    value, slope, curve = (_rows(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
+    x = np.linspace(0, PRESSURE_SPANS, PRESSURE_SPANS * PRESSURE_PARTS + 1)
+    even = np.linspace(0, 1, HEIGHT_SPANS * HEIGHT_PARTS + 1)
+    y = HEIGHT_SPANS * np.unique(np.concatenate([even, LOW_PARTS]))
+    value, slope, curve = (_parts(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
     slope, curve = each * slope, each**2 * curve
-    # With p = P0 sinh s the volume is -W_s / (P0 cosh s).
-    s = (x / each)[:, None]
-    rises = (np.tanh(s) * slope - curve) / (P0 * np.cosh(s) * area * top)
-    falls = value * HEIGHT_SPANS**2 / top / (area * (P0 * np.sinh(s) + LOW_PRESSURE))
-    share = np.maximum(y / HEIGHT_SPANS, LEAST_CHECK)
-    by_height, bent = (_rows(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
-    by_height /= share[:, None]
-    holds = _rows(share * HEIGHT_SPANS * (1 - 1e-12), 0, HEIGHT_SPANS + DEGREE) / share[:, None]
-    return MapLimits(((rises, by_height), (falls, bent), (-slope[:1] / (P0 * area * top), holds)))
+    # With p = P0 sinh s the volume is -W_s / (P0 cosh s). It rises where tanh(s) W_s - W_ss > 0.
+    # W_s < 0, and no tangent of tanh lies below it: that at a part's middle takes its place.
+    low, high = x[:-1] / each, x[1:] / each
+    middle = (low + high) / 2
+    bend = (high - low) / 2 / np.cosh(middle) ** 2
+    tangent = np.tanh(middle) + np.stack([-bend, bend])
+    scale = (P0 * np.cosh(middle))[:, None, None]
+    rises = (_times_line(slope, tangent) - curve) / (scale * area * top)
+    falls = value * HEIGHT_SPANS**2 / top
+    falls /= (area * (P0 * np.sinh(middle) + LOW_PRESSURE))[:, None, None]
+    share = np.maximum(y[1:] / HEIGHT_SPANS, LEAST_CHECK)[:, None, None]
+    by_height, bent = (_parts(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
+    by_height /= share
+    by_height, none = _joined(by_height), -slope[0, :1] / (P0 * area * top)
+    every = rises.reshape(-1, rises.shape[-1])
+    return MapLimits(((every, by_height), (_joined(falls), _joined(bent)), (none, by_height)))
+
+
+def _joined(parts: Array) -> Array:
+    """List the coefficients of all parts, those that two parts share once."""
+    return np.concatenate([parts[:, :-1].reshape(-1, parts.shape[-1]), parts[-1, -1:]])
+
+
+def _parts(ends: Array, order: int, count: int) -> Array:
+    """Return the Bernstein coefficients, all of degree DEGREE, of a spline or a derivative on the
+    parts between ``ends`` (in pieces): the matrix (parts, DEGREE + 1, count) to its coefficients.
+    """
+    low, wide = ends[:-1], np.diff(ends)
+    first = (low + wide / 2).astype(np.int_)
+    table = np.zeros((DEGREE + 1, DEGREE + 1))
+    pieces_of_order = (PIECES, SLOPES, CURVES)[order]
+    table[:, : pieces_of_order.shape[1]] = pieces_of_order
+    places = (low - first)[:, None] + wide[:, None] * np.linspace(0, 1, DEGREE + 1)
+    weights = BERNSTEIN @ (places[..., None] ** POWERS) @ table.T
+    matrices = np.zeros((len(low), DEGREE + 1, count))
+    columns = first[:, None, None] + np.arange(DEGREE + 1)
+    np.put_along_axis(matrices, np.broadcast_to(columns, weights.shape), weights, -1)
+    return matrices
+
+
+def _times_line(parts: Array, line: Array) -> Array:
+    """Return Bernstein coefficients (parts, DEGREE + 1, count) of polynomials below DEGREE, times
+    lines (2, parts) given at either end of the part.
+    """
+    places = np.linspace(0, 1, DEGREE + 1)
+    line_values = line[0][:, None] * (1 - places) + line[1][:, None] * places
+    values = np.linalg.inv(BERNSTEIN) @ parts
+    return np.asarray(BERNSTEIN @ (line_values[..., None] * values))
 
 
 def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | None:

@@ -11,7 +11,17 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.models.balloon_map import BalloonMap, balloon_map
+from sbafab.models.balloon_map import (
+    DEGREE,
+    HEIGHT_SPANS,
+    P0,
+    PIECES_IN_ALL,
+    PRESSURE_SPANS,
+    BalloonMap,
+    balloon_map,
+    derivatives,
+    horner,
+)
 from sbafab.models.rippled import compressed_shapes, free_shapes, height_ratio
 from tests.quick import few
 
@@ -24,7 +34,7 @@ SIZES = {
 SIZES["unlike films"] = replace(
     SIZES["d = 5"], mate=replace(SIZES["d = 5"], thickness=0.05, modulus=40_000.0)
 )
-FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.013, "d = 12": 0.023, "unlike films": 0.01}
+FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.014, "d = 12": 0.023, "unlike films": 0.01}
 """How near free heights are, as shares."""
 NEAR = {"d = 12": 0.035}
 """How near forces and volumes are, as shares, where not within 0.02."""
@@ -78,21 +88,34 @@ def test_free_heights_are_near(name: str, made: BalloonMap) -> None:
 def test_without_pressure_it_holds_and_widens_as_its_films_do(made: BalloonMap) -> None:
     h = np.linspace(0.1, 0.97, 9) * made.most_height
     none, step = np.zeros(len(h)), 1e-3
-    assert made.volume(none, h) == pytest.approx(
-        inflate(made.balloon, none, h, tied=True).volume, rel=0.03
-    )
+    volume = inflate(made.balloon, none, h, tied=True).volume
+    assert made.volume(none, h) == pytest.approx(volume, rel=0.03)
     more, less = (inflate(made.balloon, none, h + s, tied=True).volume for s in (step, -step))
     own = (made.volume(none, h + step) - made.volume(none, h - step)) / (2 * step)
     widest = math.pi * made.balloon.pocket**2
     expected = (more - less) / (2 * step)
     assert own[:-1] == pytest.approx(expected[:-1], abs=0.03 * widest)
     # At the top, far beyond any free height, volumes that may not fall with pressure bend it.
-    assert own[-1] == pytest.approx(expected[-1], abs=0.15 * widest)
+    assert own[-1] == pytest.approx(expected[-1], abs=0.18 * widest)
 
 
 def mylar(radius: float) -> float:
     """Ul of a balloon that wrinkles freely and does not stretch (Paulsen 1994): 1.2185 r^3."""
     return 1.2185 * radius**3
+
+
+def never_falls(made: BalloonMap) -> None:
+    """Both slopes of a map, 17 by 17 places in each of its pieces, its ends and the flat too."""
+    x = np.linspace(0, 1, 16 * PRESSURE_SPANS + 1)
+    p = np.minimum(P0 * np.sinh(x * math.asinh(made.most_pressure / P0)), made.most_pressure)
+    y = np.linspace(0, HEIGHT_SPANS, 16 * HEIGHT_SPANS + 1)
+    y = np.broadcast_to(y, (len(p), len(y)))
+    rows = PIECES_IN_ALL * np.arange(len(p))[:, None]
+    potential, slopes = made.pressed(p)[:, 0], made.volume_slopes(p)
+    stiffness = horner(derivatives(potential.reshape(-1, DEGREE + 1)), rows, y)[2]
+    growth = horner(derivatives(slopes.reshape(-1, DEGREE + 1)), rows, y)[0]
+    assert (stiffness > 0).all()
+    assert (growth > 0).all()
 
 
 def judged(balloon: Balloon, most: float = 110.0) -> None:
@@ -103,9 +126,9 @@ def judged(balloon: Balloon, most: float = 110.0) -> None:
     volume, force = made.volume(p, h), made.force(p, h)
     area = math.pi * balloon.pocket**2
     assert (volume > 0).all()
-    # A share of a thousandth, or of what the pocket holds at a tenth of a um, is no fall.
-    assert (np.diff(volume, axis=0) >= -1e-3 * volume[1:] - 1e-4 * area).all()
-    assert (np.diff(force, axis=1) <= 1e-5 * (p * area + np.abs(force[:, 1:]))).all()
+    assert (np.diff(volume, axis=0) > 0).all()
+    assert (np.diff(force, axis=1) < 0).all()
+    never_falls(made)
     # Taut films whose neck, pocket and rim stay: none stretches up to a tenth of its length.
     gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.membrane_stiffness
     assert (volume[gentle] < 1.1**3 * mylar(balloon.pocket + 0.1)).all()
