@@ -249,7 +249,10 @@ def _assembly_predict() -> dict[str, Any]:
 
 def _balloon_map() -> dict[str, Any]:
     rows = array(array(number()))
-    grid = {**rows, "description": "a row a pressure, a column a height"}
+    grid = {
+        **array(array(number("null"))),
+        "description": "a row a pressure, a column a height; null where the map does not hold",
+    }
     sizes = ("pocket_radius_mm", "neck_radius_mm", "bore_radius_mm", "film_mm", "modulus_kpa")
     balloon = table(
         **dict.fromkeys((*sizes, "poisson"), number()),

@@ -1,6 +1,7 @@
 """The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies
 that takes numpy arrays too.
 
+Tables cover only where the map holds (``map_range``): CSV has no row elsewhere, JSON null.
 Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """
 
@@ -14,9 +15,12 @@ import numpy as np
 
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
 from sbafab.models.joint_chain import urdf_text
+from sbafab.models.map_range import map_range
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Stack
@@ -50,6 +54,8 @@ def _csv(stack: Stack, points: int) -> str:
     for number, balloon in enumerate(stack.maps, start=1):
         pressures, heights = _grid(balloon, points)
         p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
+        holds = map_range(balloon).holds(p, h)
+        p, h = p[holds], h[holds]
         columns = (p, h, balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h))
         for row in zip(*(column.tolist() for column in columns), strict=True):
             rows.append([str(number), *(f"{value:.7g}" for value in row)])
@@ -71,13 +77,14 @@ def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
 def _balloon(balloon: BalloonMap, points: int) -> dict[str, Any]:
     pressures, heights = _grid(balloon, points)
     p, h = np.meshgrid(pressures, heights, indexing="ij")
+    holds = map_range(balloon).holds(p, h)
     return {
         **_dimensions(balloon),
         "pressure": [_short(value) for value in pressures.tolist()],
         "height": [_short(value) for value in heights.tolist()],
-        "force": _rows(balloon.force(p, h)),
-        "volume": _rows(balloon.volume(p, h)),
-        "potential": _rows(balloon.potential(p, h)),
+        "force": _rows(balloon.force(p, h), holds),
+        "volume": _rows(balloon.volume(p, h), holds),
+        "potential": _rows(balloon.potential(p, h), holds),
     }
 
 
@@ -93,8 +100,11 @@ def _dimensions(balloon: BalloonMap) -> dict[str, float]:
     }
 
 
-def _rows(values: Array) -> list[list[float]]:
-    return [[_short(value) for value in row] for row in values.tolist()]
+def _rows(values: Array, holds: NDArray[np.bool_]) -> list[list[float | None]]:
+    rows = zip(values.tolist(), holds.tolist(), strict=True)
+    return [
+        [_short(value) if here else None for value, here in zip(*row, strict=True)] for row in rows
+    ]
 
 
 def _short(value: float) -> float:

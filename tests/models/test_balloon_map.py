@@ -22,6 +22,7 @@ from sbafab.models.balloon_map import (
     derivatives,
     horner,
 )
+from sbafab.models.map_range import map_range
 from sbafab.models.rippled import compressed_shapes, free_shapes, height_ratio
 from tests.quick import few
 
@@ -167,3 +168,23 @@ def test_so_they_do_of_random_balloons() -> None:
 def test_a_map_ends_where_its_pressure_does() -> None:
     with pytest.raises(DesignError, match="give 0 to 110 kPa"):
         balloon_map(SIZES["d = 5"], 110.0).volume(111.0, 1.0)
+
+
+@pytest.mark.parametrize(("diameter", "film"), few(((5, 0.038), (12, 0.02), (25, 0.2)), 1, names=2))
+def test_a_range_tells_where_a_map_is_within_three_percent(diameter: float, film: float) -> None:
+    """At places between its checks; far above the free height at low pressure it is not."""
+    balloon = Balloon(diameter / 2, neck=1.27, bore=0.52, thickness=film)
+    made = balloon_map(balloon, 33.0)
+    covered = map_range(made)
+    draw = np.random.default_rng(1)
+    p = 0.05 * (33.0 / 0.05) ** draw.random(300)
+    h = made.most_height * draw.random(300) ** 1.5
+    here = covered.holds(p, h)
+    assert 0.6 < here.mean() < 1
+    p, h = p[here], h[here]
+    exact = compressed_shapes(balloon, p, h, tied=True)
+    area = math.pi * balloon.pocket**2
+    force = np.abs(made.force(p, h) - exact.force) / (area * (p + 0.1) + np.abs(exact.force))
+    assert force.max() < 0.032
+    missed = np.abs(made.volume(p, h) - exact.volume) / (exact.volume + 0.01 * area)
+    assert missed.max() < 0.032
