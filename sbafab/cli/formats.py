@@ -15,10 +15,13 @@ from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.laminate.films import Film
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
+from sbafab.output.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
@@ -374,6 +377,40 @@ def _checks() -> dict[str, Any]:
     return and_perhaps(found, **printed)
 
 
+def _laminate() -> dict[str, Any]:
+    shape = {**COUNT, "description": "place in shapes, from 0"}
+    film = {**COUNT, "description": "place in films, from 0"}
+    line = {**array(number()), "description": "start x, y, end x, y", "minItems": 4, "maxItems": 4}
+    arc = {
+        "type": "array",
+        "prefixItems": [*[number()] * 7, {"type": "boolean"}],
+        "minItems": 8,
+        "maxItems": 8,
+        "description": "start x, y, end x, y, centre x, y, radius; true: counter-clockwise",
+    }
+    contour = {**array({"oneOf": [line, arc]}), "description": "closed; holes run clockwise"}
+    regions = ("outline", "sheets", "second", "window")
+    panel = of(SheetPanel, *regions, **{**dict.fromkeys(regions, shape), "sheets": array(shape)})
+    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", "panel")
+    return of(
+        Laminate,
+        *lists,
+        schema={"const": LAMINATE_SCHEMA},
+        films=array(of(Film)),
+        layers={
+            **array(of(Layer, "profile", film=film, shape=shape)),
+            "description": "bottom to top",
+        },
+        chambers={**array(of(Chamber)), "description": "void nets, each with one inlet"},
+        bores=array(of(Bore)),
+        inlets=array(of(Inlet)),
+        pins=array(of(Pin)),
+        outline=shape,
+        panel={**panel, "type": ["object", "null"]},
+        shapes={**array(array(contour)), "description": "mm, the actuator's axis at 0, 0"},
+    )
+
+
 def _error() -> dict[str, Any]:
     kinds = ["usage", "input", "too-large", "defect", "stopped", "memory", "files"]
     error = table(kind={"enum": kinds}, message=TEXT, exit_code={"type": "integer"})
@@ -590,6 +627,9 @@ class Format(NamedTuple):
 FORMATS: Mapping[str, Format] = {
     "design": Format(ids.DESIGN_SCHEMA, "design and assembly files (TOML)", _design),
     "checks": Format(CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints", _checks),
+    "laminate": Format(
+        LAMINATE_SCHEMA, "`laminate.json`: layers with exact edges, films, inlets", _laminate
+    ),
     "manifest": Format(
         SCHEMA, "`manifest.json` of a design's folder", lambda: _manifest(Manifest, SCHEMA)
     ),

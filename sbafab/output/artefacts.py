@@ -45,6 +45,9 @@ from sbafab.output.checked import (
     limits,
     machine,
 )
+from sbafab.output.laminate_file import FILE as LAMINATE_FILE
+from sbafab.output.laminate_file import laminate_json
+from sbafab.output.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
 from sbafab.pressing.cycles import batch_json, design_runs
@@ -388,6 +391,10 @@ def _checks(folder: DesignFolder) -> str:
     return as_json(checks(folder.checked.findings, "design", design.name, [design]))
 
 
+def _laminate(folder: DesignFolder) -> str:
+    return laminate_json(folder.laminate)
+
+
 def _design(folder: DesignFolder) -> str:
     """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
     design = folder.design
@@ -452,6 +459,13 @@ ARTEFACTS: tuple[Artefact, ...] = (
     ),
     Artefact(FINDINGS, "preview", "the page for the designer", _findings, is_page=True),
     Artefact("checks.json", "", "what the rules found", _checks, CHECKS_SCHEMA),
+    Artefact(
+        LAMINATE_FILE,
+        "",
+        "the layers with exact edges, for other programs",
+        _laminate,
+        LAMINATE_SCHEMA,
+    ),
     Artefact(
         "design.toml",
         "",

@@ -33,7 +33,7 @@ def test_a_schema_is_one_and_has_an_id(name: str, capsys: pytest.CaptureFixture[
 
 def test_files_of_a_folder_are_of_their_schemas(tmp_path: Path) -> None:
     made = sbafab.generate("1dof-5mm", ONE, "order.copies=2", out=tmp_path)
-    for name in ("manifest", "checks", "press"):
+    for name in ("manifest", "checks", "press", "laminate"):
         hold(name, json.loads((made.folder / f"{name}.json").read_text(encoding="utf-8")))
     told = made.design.model_dump(mode="json", exclude_none=True)
     jsonschema.validate(told, schema_of("design"))

@@ -1,0 +1,176 @@
+"""``laminate.json``: read back exactly, sound by a validator that knows nothing of sbafab."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+
+from sbafab.actuators import build, load_design
+from sbafab.cli.formats import schema_of
+from sbafab.errors import DesignError
+from sbafab.geometry.region import Region
+from sbafab.laminate.laminate import ROLES, Laminate
+from sbafab.output import laminate_validator
+from sbafab.output.laminate_file import laminate_json, read_laminate
+from sbafab.output.laminate_validator import FIELDS, HEAD, PANEL, faults
+from sbafab.output.laminate_validator import ROLES as ROLES_OF_THE_FORMAT
+from tests.properties.designs import Draft, valid
+from tests.properties.test_designs import share
+from tests.site.formats import hold
+
+TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
+PANEL_OF_4 = Path(__file__).parents[2] / "docs" / "gallery" / "panel-of-4.toml"
+
+
+def regions(laminate: Laminate) -> list[Region]:
+    panel = laminate.panel
+    sheets = () if panel is None else (panel.outline, *panel.sheets, panel.second, panel.window)
+    return [laminate.outline, *(layer.profile for layer in laminate.layers), *sheets]
+
+
+def assert_read_back(laminate: Laminate, folder: Path) -> None:
+    path = folder / "laminate.json"
+    path.write_text(laminate_json(laminate), encoding="utf-8")
+    again = read_laminate(path)
+    assert again == laminate
+    pairs = zip(regions(laminate), regions(again), strict=True)
+    assert all(region.is_exactly(other) for region, other in pairs)
+    assert laminate_json(again) == path.read_text(encoding="utf-8")
+
+
+def assert_draft_read_back(draft: Draft) -> None:
+    with TemporaryDirectory() as name:
+        assert_read_back(build(load_design(draft.write(Path(name)))), Path(name))
+
+
+@pytest.mark.parametrize("name", [*TEMPLATES, str(PANEL_OF_4)])
+def test_a_template_is_read_back_exactly(name: str, tmp_path: Path) -> None:
+    laminate = build(load_design(name))
+    assert (laminate.panel is not None) == (name == str(PANEL_OF_4))
+    assert_read_back(laminate, tmp_path)
+    hold("laminate", json.loads(laminate_json(laminate)))
+
+
+@pytest.mark.long
+@settings(max_examples=100)
+@given(valid())
+def test_100_random_laminates_are_read_back_exactly(draft: Draft) -> None:
+    assert_draft_read_back(draft)
+
+
+@share(2, 2)
+@given(valid())
+def test_a_random_laminate_is_read_back_exactly(draft: Draft) -> None:
+    assert_draft_read_back(draft)
+
+
+def test_the_validator_knows_every_key_of_the_schema() -> None:
+    properties = schema_of("laminate")["properties"]
+    for name, fields in FIELDS.items():
+        assert set(properties[name]["items"]["properties"]) == set(fields), name
+    assert set(properties["panel"]["properties"]) == set(PANEL)
+    assert set(properties) == {*HEAD, *FIELDS, "schema", "panel", "shapes"}
+    assert ROLES_OF_THE_FORMAT == ROLES
+
+
+def validate(path: Path) -> subprocess.CompletedProcess[str]:
+    """The validator run as a program that sees the standard library alone."""
+    command = [sys.executable, "-I", "-S", str(laminate_validator.__file__), str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_the_validator_stands_alone(tmp_path: Path) -> None:
+    path = tmp_path / "laminate.json"
+    text = laminate_json(build(load_design("1dof-5mm")))
+    path.write_text(text, encoding="utf-8")
+    sound = validate(path)
+    assert (sound.returncode, sound.stdout, sound.stderr) == (0, "", "")
+    document = json.loads(text)
+    document["layers"][1]["film"] = 9
+    path.write_text(json.dumps(document), encoding="utf-8")
+    unsound = validate(path)
+    assert (unsound.returncode, unsound.stderr) == (1, "")
+    assert unsound.stdout == "layers[1].film: there is no film 9\n"
+    path.write_text(text[:-9], encoding="utf-8")
+    assert validate(path).returncode == 2
+
+
+def test_further_keys_are_passed_over(tmp_path: Path) -> None:
+    laminate = build(load_design("3dof-15mm"))
+    document = json.loads(laminate_json(laminate))
+    for rows in ([document], document["films"], document["layers"], document["inlets"]):
+        for row in rows:
+            row["further"] = 1
+    path = tmp_path / "laminate.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert read_laminate(path) == laminate
+
+
+def first_arc(document: dict[str, Any]) -> list[Any]:
+    arcs: list[list[Any]] = [
+        edge
+        for shape in document["shapes"]
+        for contour in shape
+        for edge in contour
+        if len(edge) == 8
+    ]
+    return arcs[0]
+
+
+FAULTS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "id": (lambda d: d.update(schema="x"), "schema: "),
+    "name": (lambda d: d.pop("name"), "name: is missing"),
+    "lumen": (lambda d: d.update(lumen=-1.0), "lumen: "),
+    "list": (lambda d: d.update(pins={}), "pins: "),
+    "panel": (lambda d: d.pop("panel"), "panel: "),
+    "panel's keys": (lambda d: d.update(panel={}), "panel.outline: "),
+    "outline": (lambda d: d.update(outline=999), "outline: there is no shape 999"),
+    "no layers": (lambda d: d.update(layers=[]), "layers: "),
+    "order": (lambda d: d["layers"].reverse(), "layers[0].index: "),
+    "role": (lambda d: d["layers"][0].update(role="lid"), "layers[0].role: "),
+    "film's kind": (lambda d: d["layers"][0].update(role="chamber-mask"), "layers[0].role: "),
+    "kind": (lambda d: d["films"][0].update(kind="tape"), "films[0].kind: "),
+    "thickness": (lambda d: d["films"][0].update(thickness=0), "films[0].thickness: "),
+    "infinite": (lambda d: d["films"][0].update(limit=1e999), "films[0].limit: "),
+    "yes": (lambda d: d["films"][0].update(stays_solid=1), "films[0].stays_solid: "),
+    "height": (lambda d: d["layers"][2].update(z=1.0), "layers[2].z: "),
+    "shape": (lambda d: d["layers"][0].update(shape=999), "layers[0].shape: "),
+    "pieces": (lambda d: d["layers"][0].update(pieces=0), "layers[0].pieces: "),
+    "net": (lambda d: d["inlets"][0].update(chamber="x"), "inlets[0].chamber: "),
+    "mouth": (lambda d: d["inlets"][0].update(mouth=[0]), "inlets[0].mouth: "),
+    "edge": (lambda d: d["shapes"][0][0].append([0, 0]), "shapes[0][0]["),
+    "open": (lambda d: d["shapes"][0][0].pop(), "shapes[0][0][0]: does not begin"),
+    "empty": (lambda d: d["shapes"][0].append([]), "shapes[0]: "),
+    "radius": (lambda d: first_arc(d).__setitem__(6, 77.0), "shapes["),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_named_at_its_place(name: str, tmp_path: Path) -> None:
+    spoil, where = FAULTS[name]
+    document = json.loads(laminate_json(build(load_design("1dof-5mm"))))
+    assert list(faults(document)) == []
+    spoil(document)
+    told = list(faults(document))
+    assert told[0].startswith(where), told
+    path = tmp_path / "laminate.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(DesignError) as refused:
+        read_laminate(path)
+    assert told[0] in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "null", "{", '{"schema": "sbafab/laminate@1"}'])
+def test_what_is_no_laminate_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "laminate.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DesignError, match=r"laminate\.json"):
+        read_laminate(path)
