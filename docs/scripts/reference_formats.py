@@ -35,6 +35,21 @@ One closed `LWPOLYLINE` with bulges a contour, `CIRCLE` for a full circle. Layer
 (0, 0); sheets have their lower left corner there. Custom properties hold the design's hash, the state of the kerf and
 what was waived. See [cutting](../cutting.md) for kerf, order and readers that take no bulges.
 
+## Laminates
+
+`laminate.json` holds all that cut files, meshes and rules are made from. Lengths are mm, layers go bottom to top, z is a
+layer's lower face. Films and shapes stand once each; `film`, `shape` and `outline` are places in these lists, from 0.
+
+| part | what stands there |
+|---|---|
+| shape | contours, each a list of edges; holes run clockwise |
+| line | `[x0, y0, x1, y1]`, from start to end |
+| arc | `[x0, y0, x1, y1, xc, yc, r, ccw]`: start, end, centre, radius, and `true` if counter-clockwise |
+| `chambers` | the nets of voids, to which `bores` and `inlets` belong by name |
+| `panel` | registered sheets, `null` without |
+
+`python -I sbafab/output/laminate_validator.py FILE` names every fault at its place, with the standard library alone.
+
 ## Meshes
 
 STL, 3MF and GLB of the flat solid and of each chamber's cavity in millimetres (GLB in metres, as its standard asks);
