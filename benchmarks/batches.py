@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
@@ -12,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import sbafab
+from benchmarks.processes import by_another_process
 from benchmarks.stacks import DESIGN, MOST
-from benchmarks.timing import ROOT, environment
 from sbafab.process import prepare
 
 STATES = 1024
@@ -65,16 +63,7 @@ def step_seconds(states: int = STATES) -> float:
 
 def clock_rate(processes: int) -> float:
     """Steps of ``STATES`` environments a second by the clock, shared among processes."""
-    program = f"from benchmarks.batches import measured; print(measured({processes}))"
-    run = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=ROOT,
-        env=environment(ROOT),
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    return float(run.stdout)
+    return by_another_process(f"benchmarks.batches.measured({processes})")
 
 
 def measured(processes: int) -> float:

@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from sbafab.cli.options import (
-    FLOW,
     PRESSURE,
     designs_or_folders,
+    flow_option,
     json_option,
     out_option,
     set_option,
@@ -42,14 +42,7 @@ from sbafab.search.compare import compare as compared
     help="Pressure of the figures, and the first of them of the pictures, kPa or with a unit. "
     "Repeatable.  [default: 10]",
 )
-@click.option(
-    "--flow",
-    type=FLOW.read,
-    default="35 ml/min",
-    show_default=True,
-    metavar="Q",
-    help="Flow for the times, ml/min or with a unit.",
-)
+@flow_option("Flow for the times")
 @out_option
 @set_option
 @json_option
@@ -57,7 +50,7 @@ def compare(
     first: str,
     second: str,
     pressures: tuple[float, ...],
-    flow: float,
+    flow_ml_min: float,
     out: Path,
     assignments: tuple[str, ...],
     as_json: bool,
@@ -70,7 +63,7 @@ def compare(
     designs = [load_compared(source, assignments) for source in (first, second)]
     with shown_progress(as_json) as progress:
         comparison = compared(
-            designs[0], designs[1], (first, second), pressures or PRESSURES, flow, progress
+            designs[0], designs[1], (first, second), pressures or PRESSURES, flow_ml_min, progress
         )
         folder = write_page(comparison, out)
     if as_json:

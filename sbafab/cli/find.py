@@ -10,7 +10,7 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import FLOW, json_option, refuse_options, set_option
+from sbafab.cli.options import flow_option, json_option, refuse_options, set_option
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
@@ -96,15 +96,7 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
     metavar="P",
     help="Probability with which each requirement on a predicted quantity must hold, e.g. 0.9.",
 )
-@click.option(
-    "--flow",
-    "flow_ml_min",
-    type=FLOW.read,
-    default="35 ml/min",
-    show_default=True,
-    metavar="Q",
-    help="Flow of water in all, for the time, ml/min or with a unit.",
-)
+@flow_option("Flow of water in all, for the time")
 @click.option(
     "--best",
     default="mass",

@@ -16,7 +16,7 @@ from sbafab.models.formulas import force
 from sbafab.models.intervals import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.stack import stack
-from sbafab.simulators.mujoco.joint_chain import chain_text
+from sbafab.simulators.mujoco.mjcf import chain_text
 
 MUJOCO = "xml"
 """Ending of a MuJoCo model."""

@@ -195,6 +195,19 @@ def calibration_options(command: Command) -> Command:
     return lost(modulus(command))
 
 
+def flow_option(words: str) -> Callable[[Command], Command]:
+    """Return the option of a flow in ml/min, whose help begins with ``words``."""
+    return click.option(
+        "--flow",
+        "flow_ml_min",
+        type=FLOW.read,
+        default="35 ml/min",
+        show_default=True,
+        metavar="Q",
+        help=f"{words}, ml/min or with a unit.",
+    )
+
+
 def waive_option(words: str) -> Callable[[Command], Command]:
     """Add ``--waive`` with the help text of a command."""
     return click.option(

@@ -12,12 +12,12 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import load
 from sbafab.cli.exit import RULE_FAILED, print_error
 from sbafab.cli.options import (
-    FLOW,
     PRESSURE,
     VOLUME,
     Request,
     calibration_options,
     finite,
+    flow_option,
     refuse_options,
     run_options,
 )
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 ELASTIC_OPTIONS = ("pocket_loss", "modulus_mpa", "sensitivity")
 """Options of the model of elastic balloons alone."""
-FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
+FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
 """Options of formulas that need round or oblong pockets."""
 
 
@@ -63,14 +63,7 @@ FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
     metavar="P",
     help="Pressure for force and work, kPa or with a unit. Repeatable.  [default: 10, 100]",
 )
-@click.option(
-    "--flow",
-    type=FLOW.read,
-    default="35 ml/min",
-    show_default=True,
-    metavar="Q",
-    help="Flow for the actuation time, ml/min or with a unit.",
-)
+@flow_option("Flow for the actuation time")
 @click.option(
     "--volume",
     "volumes",
@@ -113,7 +106,7 @@ FORMULA_OPTIONS = ("flow", "volumes", "contact_factor")
 def predict(
     request: Request,
     pressures: tuple[float, ...],
-    flow: float,
+    flow_ml_min: float,
     volumes: tuple[float, ...],
     load_g: float,
     sensitivity: bool,
@@ -135,7 +128,7 @@ def predict(
         return
     _refuse_for_design(design)
     wish = PredictionRequest(
-        pressures or PredictionRequest.pressures_kpa, flow, volumes, overrides=factors
+        pressures or PredictionRequest.pressures_kpa, flow_ml_min, volumes, overrides=factors
     )
     with shown_progress(request.as_json) as progress:
         progress("predicting", 0, 1)

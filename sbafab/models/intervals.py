@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from sbafab.models.calibrated import DESIGN_UNKNOWNS, SHARE, ModelCalibration, load_calibration
@@ -45,6 +45,11 @@ def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
     )
 
 
+def given_factors(overrides: Mapping[str, float | None]) -> dict[str, float]:
+    """Return the values that a user gave, by field of ``Factors``."""
+    return {field: value for field, value in overrides.items() if value is not None}
+
+
 @dataclass(frozen=True)
 class Uncertainty:
     """A calibration with the user's own values (``overrides``, by field of ``Factors``), which are
@@ -71,11 +76,11 @@ class Uncertainty:
     @property
     def _given(self) -> set[str]:
         """Fields of the unknowns that the user gave, a modulus in place of its ratio included."""
-        given = {field for field, value in self.overrides.items() if value is not None}
+        given = set(given_factors(self.overrides))
         return given | ({"modulus_ratio"} if "modulus_mpa" in given else set())
 
     def _with_overrides(self, factors: Factors) -> Factors:
-        values = {field: value for field, value in self.overrides.items() if value is not None}
+        values = given_factors(self.overrides)
         if "modulus_mpa" in values:
             values.setdefault("modulus_ratio", 1.0)
         label = self.calibration.name
@@ -103,11 +108,7 @@ class Uncertainty:
             (change, value if change == 0 else value_at(factors))
             for change, factors in self.shifted()
         ]
-        is_log = _is_log(value, [each for _, each in moved])
-        slopes = [_slope(value, each, change, is_log) for change, each in moved]
-        slopes += self._delay_slopes(value, delay)
-        low, high = self.calibration.interval(group, value, slopes, is_log, share)
-        return value, (max(low, 0.0) if value >= 0 else low, high)
+        return value, self._interval(group, value, moved, share=share, delay=delay)
 
     def bounded(
         self, items: Items, evaluated: Callable[[Factors], Items]
@@ -134,18 +135,34 @@ class Uncertainty:
         present = [value for value in values if value is not None]
         if len(present) < len(values) or not all(map(math.isfinite, present)):
             return figure
-        is_log = _is_log(figure.value, present) and not figure.name.startswith(CLEARANCES)
-        slopes = [
-            _slope(figure.value, value, change, is_log)
-            for value, (change, _) in zip(present, moved, strict=True)
-        ]
         fluid = next((name for name in DELAYS if name in figure.name), "")
-        delay = DELAYS[fluid] if fluid and figure.unit == "s" else ""
-        slopes += self._delay_slopes(figure.value, delay)
-        low, high = self.calibration.interval(group, figure.value, slopes, is_log)
-        if figure.value >= 0 and not figure.name.startswith(CLEARANCES):
-            low = max(low, 0.0)
-        return replace(figure, interval=(low, high))
+        interval = self._interval(
+            group,
+            figure.value,
+            [(change, value) for value, (change, _) in zip(present, moved, strict=True)],
+            delay=DELAYS[fluid] if fluid and figure.unit == "s" else "",
+            may_be_negative=figure.name.startswith(CLEARANCES),
+        )
+        return replace(figure, interval=interval)
+
+    def _interval(
+        self,
+        group: str,
+        value: float,
+        moved: Sequence[tuple[float, float]],
+        *,
+        share: float = SHARE,
+        delay: str = "",
+        may_be_negative: bool = False,
+    ) -> tuple[float, float]:
+        """Return the interval of a value, from changes of the design unknowns, each with the value
+        that it gives. A clearance, which may be negative, is linear in them.
+        """
+        is_log = not may_be_negative and _is_log(value, [each for _, each in moved])
+        slopes = [_slope(value, each, change, is_log) for change, each in moved]
+        slopes += self._delay_slopes(value, delay)
+        low, high = self.calibration.interval(group, value, slopes, is_log, share)
+        return (max(low, 0.0) if value >= 0 and not may_be_negative else low), high
 
     def _delay_slopes(self, time: float, delay: str) -> list[float]:
         """Return slopes of a time's logarithm by the logarithms of the delays, of which it holds
@@ -175,6 +192,7 @@ def _is_log(value: float, moved: Sequence[float]) -> bool:
     return min(value, *moved) > 0 and max(moved) < LOG_RANGE * value < LOG_RANGE**2 * min(moved)
 
 
+# A value that changes by more than this factor is not near enough to linear in its logarithm.
 LOG_RANGE = 3.0
 
 
@@ -218,11 +236,5 @@ def factors_of(design: Design, overrides: Mapping[str, float | None] | None = No
     """
     uncertainty = uncertainty_of(design, overrides)
     if uncertainty is None:
-        given = {field: value for field, value in (overrides or {}).items() if value is not None}
-        return Factors(**given)  # type: ignore[arg-type]
+        return Factors(**given_factors(overrides or {}))  # type: ignore[arg-type]
     return uncertainty.factors
-
-
-def factor_fields() -> Iterator[str]:
-    """Yield the fields of ``Factors`` that a user may give."""
-    return (item.name for item in fields(Factors) if item.name != "calibration")

@@ -471,7 +471,8 @@ def predict(
     uncertainty = None
     if wish.calibration is None:
         uncertainty = uncertainty_of(design, wish.overrides)
-        wish = replace(wish, calibration=factors_of(design, wish.overrides))
+        factors = factors_of(design, wish.overrides) if uncertainty is None else uncertainty.factors
+        wish = replace(wish, calibration=factors)
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -498,10 +499,9 @@ def predict(
         items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     to_come = (STACK,) if quick and subject.radii else ()
-    if to_come and uncertainty is not None:
-        # Forces that the calibrated stack will give are those to design with.
-        items = [_superseded_later(item) for item in items]
-    figures = chosen((item for item in items if isinstance(item, Figure)), to_come)
+    figures = chosen(
+        (item for item in items if isinstance(item, Figure)), to_come, uncertainty is not None
+    )
     return Prediction(
         wish,
         tuple(
@@ -516,11 +516,6 @@ def predict(
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
     )
-
-
-def _superseded_later(item: Figure | LeftOut) -> Figure | LeftOut:
-    is_force = isinstance(item, Figure) and item.name.startswith("blocked force")
-    return replace(item, other=True) if is_force and isinstance(item, Figure) else item
 
 
 def _moved_figures(

@@ -26,6 +26,7 @@ from sbafab.output.checked import Checked, check
 from sbafab.output.schema_ids import COMPARE_SCHEMA
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
+from sbafab.reports.html_templates import environment
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
 from sbafab.search.measure import RuleMargin, margins
@@ -348,27 +349,22 @@ def write_page(comparison: DesignComparison, out: Path) -> Path:
 
 def compare_html(comparison: DesignComparison) -> str:
     """Return the whole page; style and pictures stand in it, nothing is fetched."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(TEMPLATE).render(
-        names=comparison.names,
-        designs=comparison.designs,
-        hashes=[design_sha256(each.design)[:12] for each in comparison.designs],
-        keys=[(row.key, *map(value_text, row.values)) for row in comparison.keys],
-        rules=[(row.rule, *map(margin_text, row.margins)) for row in comparison.rules],
-        figures=[
-            (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures), pair.differs)
-            for pair in sorted(comparison.figures, key=lambda pair: not pair.is_main)
-        ],
-        pictures=[_flat(comparison), _inflated(comparison)],
-        generator=GENERATOR,
+    return (
+        environment(Path(__file__).parent)
+        .get_template(TEMPLATE)
+        .render(
+            names=comparison.names,
+            designs=comparison.designs,
+            hashes=[design_sha256(each.design)[:12] for each in comparison.designs],
+            keys=[(row.key, *map(value_text, row.values)) for row in comparison.keys],
+            rules=[(row.rule, *map(margin_text, row.margins)) for row in comparison.rules],
+            figures=[
+                (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures), pair.differs)
+                for pair in sorted(comparison.figures, key=lambda pair: not pair.is_main)
+            ],
+            pictures=[_flat(comparison), _inflated(comparison)],
+            generator=GENERATOR,
+        )
     )
 
 

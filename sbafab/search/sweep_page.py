@@ -18,6 +18,7 @@ from sbafab.design.records import Design
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE
+from sbafab.reports.html_templates import environment
 from sbafab.search.sweep_table import Table
 from sbafab.search.vary import Varied
 from sbafab.version import GENERATOR
@@ -229,8 +230,6 @@ class _Cause(NamedTuple):
 
 def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     """The whole page."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     keys = [swept.key for swept in varied]
     objectives = _objectives(table)
     names = [*keys, *(objective.column for objective in objectives)]
@@ -238,28 +237,25 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
     pairs = _pairs(objectives, dots)
     trades, best = trades_svg(dots, pairs) if pairs else ("", set())
     listed = sorted(best)[:MOST_ROWS]
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template(TEMPLATE).render(
-        name=design.name,
-        sha256=design_sha256(design)[:12],
-        generator=GENERATOR,
-        total=len(table),
-        outcomes=Counter(dots.outcomes),
-        keys=[(swept.key, _values_text(swept)) for swept in varied],
-        passes=passes_svg(dots, keys),
-        trades=trades,
-        causes=causes[:MOST_REASONS],
-        more_causes=max(0, len(causes) - MOST_REASONS),
-        head=[*keys, *(objective.label for objective in objectives)],
-        best=[(n + 1, [_cell(dots.columns[name][n]) for name in names]) for n in listed],
-        unlisted=len(best) - len(listed),
-        measured=_measured(design, objectives),
+    return (
+        environment(Path(__file__).parent)
+        .get_template(TEMPLATE)
+        .render(
+            name=design.name,
+            sha256=design_sha256(design)[:12],
+            generator=GENERATOR,
+            total=len(table),
+            outcomes=Counter(dots.outcomes),
+            keys=[(swept.key, _values_text(swept)) for swept in varied],
+            passes=passes_svg(dots, keys),
+            trades=trades,
+            causes=causes[:MOST_REASONS],
+            more_causes=max(0, len(causes) - MOST_REASONS),
+            head=[*keys, *(objective.label for objective in objectives)],
+            best=[(n + 1, [_cell(dots.columns[name][n]) for name in names]) for n in listed],
+            unlisted=len(best) - len(listed),
+            measured=_measured(design, objectives),
+        )
     )
 
 

@@ -11,7 +11,6 @@ from sbafab.actuators import load_design
 from sbafab.errors import DesignError
 from sbafab.evidence.files import (
     COLUMNS,
-    evidence_csv,
     evidence_ids,
     load_evidence,
     read_csv,
@@ -20,6 +19,7 @@ from sbafab.evidence.files import (
 )
 from sbafab.evidence.records import AXES, KINDS, QUANTITIES, TIPS, MeasuredCurve, StatedError
 from sbafab.models import paper, printed
+from tests.evidence.tables import evidence_csv
 
 ROOT = Path(__file__).parents[2]
 

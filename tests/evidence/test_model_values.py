@@ -19,7 +19,7 @@ from sbafab.calibration.model_values import (
 )
 from sbafab.cli import main
 from sbafab.errors import DesignError
-from sbafab.evidence.files import evidence_csv, load_evidence
+from sbafab.evidence.files import load_evidence
 from sbafab.evidence.records import (
     QUANTITIES,
     Evidence,
@@ -32,6 +32,7 @@ from sbafab.models.stack import Stack
 from sbafab.reproduction.comparison import compare, table_lines
 from sbafab.results.evidence import from_lab_records
 from sbafab.results.store import Lab
+from tests.evidence.tables import evidence_csv
 from tests.site.formats import hold
 
 ONE = MeasuredActuator("1dof-5mm")

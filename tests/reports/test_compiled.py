@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
-from sbafab.reports.traveller.page import compiled_beside
+from sbafab.reports.html_templates import compiled_beside
 
 
 def rendered(folder: Path) -> str:

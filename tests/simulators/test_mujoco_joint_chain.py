@@ -12,7 +12,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
-from sbafab.simulators.mujoco.joint_chain import ACCURACY, chain_text, length_of
+from sbafab.simulators.mujoco.mjcf import ACCURACY, chain_text, length_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 

@@ -19,15 +19,16 @@ from sbafab.laminate.films import Film
 from sbafab.models.formulas import inflated_diameter, reached_diameter
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import joined_words
+from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import base_plate, bench, bill, units
 from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import Item
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.page import (
+    HERE,
     cautions,
     code_svg,
     context,
-    environment,
     for_the_designer,
     frame,
     record_text,
@@ -85,7 +86,7 @@ def assembly_html(job: AssemblyJob) -> str:
     text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
     return (
-        environment()
+        environment(HERE)
         .get_template(PAGE)
         .render(
             **frame(name, job.sha256, job.generator),
@@ -129,7 +130,7 @@ def _chapter(design: DesignWork, number: int, mark: str) -> str:
     # The sheet goes round its tube when the assembly is put together.
     page["wrapping"] = []
     html = (
-        environment()
+        environment(HERE)
         .get_template(CHAPTER)
         .render(
             **page | _again(design, number),

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.reports.traveller.page import environment, frame
+from sbafab.reports.html_templates import environment
+from sbafab.reports.traveller.page import HERE, frame
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
@@ -86,7 +87,7 @@ def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[I
     """Return the whole page, a chapter for each design."""
     chapters = [_chapter(design) for design in inspected]
     page = frame(title, sha256, generator)
-    return environment().get_template(TEMPLATE).render(**page, shapes="", chapters=chapters)
+    return environment(HERE).get_template(TEMPLATE).render(**page, shapes="", chapters=chapters)
 
 
 def _chapter(inspected: Inspected) -> _Chapter:

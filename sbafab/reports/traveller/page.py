@@ -6,15 +6,13 @@ date of a print is written by the browser that prints.
 
 from __future__ import annotations
 
-import sys
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import cited, departures, tube_name
@@ -26,6 +24,7 @@ from sbafab.models.formulas import sizes
 from sbafab.pressing.schedule import Schedule, joined_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
+from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bench import before_the_day, tools
@@ -36,9 +35,6 @@ from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions,
 from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST
-
-if TYPE_CHECKING:
-    from jinja2 import BytecodeCache, Environment
 
 HERE = Path(__file__).parent
 TEMPLATE = "traveller.html.j2"
@@ -56,22 +52,7 @@ def traveller_html(
 ) -> str:
     """Return the whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
     work = Work(design, laminate, schedule, sheets, job)
-    return environment().get_template(TEMPLATE).render(context(work))
-
-
-def environment() -> Environment:
-    """Return the environment of this folder's templates; an undefined name is an error."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    return Environment(
-        loader=FileSystemLoader(HERE),
-        bytecode_cache=compiled_beside(HERE),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    return environment(HERE).get_template(TEMPLATE).render(context(work))
 
 
 def context(work: Work) -> dict[str, Any]:
@@ -277,34 +258,6 @@ def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
 def css_string(words: str) -> str:
     """Return words as a CSS string that can neither end early nor leave the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
-
-
-# Compiled templates, cached beside them as Python caches its modules.
-
-
-def compiled_beside(folder: Path) -> BytecodeCache:
-    """Return the cache of compiled templates in ``__pycache__``, filled where Python may write.
-
-    Each template is kept with its source's checksum and compiled again when that changes. Where the
-    folder cannot be read or written, nothing is kept.
-    """
-    from jinja2 import FileSystemBytecodeCache
-    from jinja2.bccache import Bucket
-
-    class Compiled(FileSystemBytecodeCache):
-        def load_bytecode(self, bucket: Bucket) -> None:
-            with suppress(OSError):
-                super().load_bytecode(bucket)
-
-        def dump_bytecode(self, bucket: Bucket) -> None:
-            if sys.dont_write_bytecode:
-                return
-            with suppress(OSError):
-                place.mkdir(exist_ok=True)
-                super().dump_bytecode(bucket)
-
-    place = folder / "__pycache__"
-    return Compiled(str(place), f"%s.{sys.implementation.cache_tag}.jinja")
 
 
 # The QR code: which design this sheet of paper belongs to.
