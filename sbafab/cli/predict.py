@@ -229,14 +229,17 @@ def print_prediction(prediction: Prediction, verbose: bool = False) -> None:
     """Print the main figures; ``verbose`` also all figures and the validity of their models."""
     width = console().width
     label = max((len(line.quantity) for line in prediction.verdict), default=0) + 2
+    lines = prediction.verdict
     previous = ""
-    for line in prediction.verdict:
+    for number, line in enumerate(lines):
         head = "" if line.quantity == previous else f"{line.quantity}:"
         previous = line.quantity
         text = f"{line.figure}: {line.note}" if line.quantity == LEFT_OUT else line.figure
         for row in wrapped(text, width, head.ljust(label), " " * label):
             print_line(row)
-        if line.quantity != LEFT_OUT:
+        # A note of several lines stands once, under the last of them.
+        is_last = all(line.note != other.note for other in lines[number + 1 :])
+        if line.quantity != LEFT_OUT and is_last:
             for row in wrapped(line.note, width, " " * (label + 2), " " * (label + 2)):
                 print_line(row)
     if verbose:

@@ -7,7 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
-from sbafab.pressing.schedule import HeatPoint, Schedule, layers_in_words
+from sbafab.pressing.plate_heating import HeatPoint
+from sbafab.pressing.schedule import Schedule, layers_in_words
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"

@@ -13,16 +13,8 @@ from sbafab.design.sections import HoldDown
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import (
-    END,
-    MELTING,
-    PATIENCE,
-    START,
-    Heating,
-    HeatPoint,
-    Step,
-    joined_words,
-)
+from sbafab.pressing.plate_heating import END, MELTING, PATIENCE, START, Heating, HeatPoint
+from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.base_plate import punch
 from sbafab.reports.traveller.bill import kerf_states

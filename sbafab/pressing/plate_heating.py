@@ -1,0 +1,183 @@
+"""How a base plate warms in the press and cools beside it: the time-temperature line of a step, and
+the tacking of registered sheets.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.dowels import PinSetting
+
+# Warming of a cold plate between hot platens: a time-temperature line, first order.
+#
+# The paper states minutes at 135 C (Sec. 2); it does not say when its clock starts, nor what lay
+# between platens and films. Ours: the plate goes in cold, its edge follows T(t) = platen - (platen
+# - start) exp(-t / tau), and the clock starts when the edge reads 5 C less than the platens, or
+# the melting point where that is higher. tau is the bench's own, measured once.
+
+
+ROOM = 20.0
+"""Temperature of plate and films when the press closes, C: ours."""
+CLOCK_SHORTFALL = 5.0
+"""Largest shortfall of the plate's edge behind the platens when the clock starts, C: ours."""
+PATIENCE = 5.0
+"""Time constants after which a first-order plate is within 1 C of its final temperature: ours."""
+MELTING, START, END = "melting point", "clock starts", "clock ends"
+
+
+@dataclass(frozen=True)
+class HeatPoint:
+    """A point of the line: ``edge_c`` of the plate's edge, ``after_constants`` and
+    ``after_minutes`` from closing the press; None where it is not known.
+    """
+
+    point: str
+    edge_c: float | None
+    after_constants: float | None
+    after_minutes: float | None
+
+
+@dataclass(frozen=True)
+class Heating:
+    """Parameters of the time-temperature line. ``melting_c`` is the highest melting point of the
+    structural films, ``time_constant_minutes`` the bench's; None where they are not known.
+    """
+
+    start_c: float
+    platen_c: float
+    melting_c: float | None
+    clock_c: float
+    time_constant_minutes: float | None
+    basis: str
+
+    def constants_to(self, edge_c: float) -> float:
+        """Return the time constants in which the edge of the plate comes to ``edge_c``."""
+        if edge_c <= self.start_c:
+            return 0.0
+        return math.log((self.platen_c - self.start_c) / (self.platen_c - edge_c))
+
+    def edge_after(self, minutes: float) -> float | None:
+        """Return the temperature of the plate's edge so many minutes after the press closed."""
+        tau = self.time_constant_minutes
+        if tau is None:
+            return None
+        return self.platen_c - (self.platen_c - self.start_c) * math.exp(-minutes / tau)
+
+    def line(self, minutes: float | None) -> tuple[HeatPoint, ...]:
+        """Return melting point, start and end of the clock of a step of so many minutes."""
+        points = []
+        if self.melting_c is not None:
+            points.append(self._point(MELTING, self.melting_c))
+        start = self._point(START, self.clock_c)
+        end = None
+        if minutes is not None and start.after_minutes is not None:
+            end = start.after_minutes + minutes
+        edge = None if end is None else self.edge_after(end)
+        after = None if end is None else round(end, 2)
+        return (
+            *points,
+            start,
+            HeatPoint(END, None if edge is None else round(edge, 1), None, after),
+        )
+
+    def _point(self, name: str, edge_c: float) -> HeatPoint:
+        constants = self.constants_to(edge_c)
+        tau = self.time_constant_minutes
+        after = None if tau is None else round(constants * tau, 2)
+        return HeatPoint(name, edge_c, round(constants, 3), after)
+
+
+def heating(laminate: Laminate, platen_c: float, time_constant_minutes: float | None) -> Heating:
+    """Return the warming of the plate; the press must be hotter than its films melt."""
+    films = {layer.film for layer in laminate.layers if not layer.is_mask}
+    melting = [film.softens_above for film in films if film.softens_above is not None]
+    is_known = bool(melting) and not any(
+        film.softens_above is None and not film.stays_solid for film in films
+    )
+    hottest = max(melting) if is_known else None
+    clock = max(platen_c - CLOCK_SHORTFALL, hottest or 0.0)
+    return Heating(
+        start_c=ROOM,
+        platen_c=platen_c,
+        melting_c=hottest,
+        clock_c=clock,
+        time_constant_minutes=time_constant_minutes,
+        basis=f"estimate, ours: first order from {ROOM:g} C, tau "
+        + (
+            "not measured (press.time_constant)"
+            if time_constant_minutes is None
+            else f"{time_constant_minutes:g} min as measured"
+        )
+        + "; the paper states its minutes at 135 C and not when its clock starts",
+    )
+
+
+# Tacking of masks to their films.
+
+
+TOUCH = 40.0
+"""Temperature of a plate that can be touched, C."""
+STEEL = 3.8e6
+"""Heat capacity of a base plate, J/(m3 K): 7,850 kg/m3 of steel with 490 J/(kg K)."""
+CONTACT, AIR = 500.0, 10.0
+"""W/(m2 K): from a platen into a plate that lies dry on it, and from each face of a plate into
+still air. Handbook orders, ours: neither was measured in a press."""
+
+
+@dataclass(frozen=True)
+class Tacking:
+    """Tacking of masks to their films: so many sheets, each by itself, on a plate that goes in
+    cold and is cooled again. Minutes are those of one sheet; ``pins`` are the corner pins' then.
+    """
+
+    sheets: int
+    warm_minutes: float
+    press_minutes: float
+    cool_minutes: float
+    stack_mm: float
+    pins: tuple[PinSetting, ...]
+    basis: str
+
+    @property
+    def each_minutes(self) -> float:
+        """Minutes of one sheet, from cold to cold."""
+        return self.warm_minutes + self.press_minutes + self.cool_minutes
+
+    @property
+    def total_minutes(self) -> float:
+        """Minutes of all sheets, one after the other on one plate."""
+        return self.sheets * self.each_minutes
+
+
+def tack_stack(laminate: Laminate) -> float:
+    """Return the largest height in mm of a film with its mask, the transfer film left out."""
+    masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
+    films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
+    return round(max(films) + max(masks), 6)
+
+
+def tacking_of(
+    laminate: Laminate, minutes: float, platen_c: float, plate: float, pins: tuple[PinSetting, ...]
+) -> Tacking:
+    """Return the tacking of the masks of registered sheets, on a base plate ``plate`` mm thick.
+
+    First order: a plate that heat reaches through one face, and leaves through both.
+    """
+    heat = STEEL * plate / 1000
+    warm = heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60
+    cool = heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60
+    return Tacking(
+        sheets=sum(layer.is_mask for layer in laminate.layers),
+        warm_minutes=round(warm, 1),
+        press_minutes=minutes,
+        cool_minutes=round(cool, 1),
+        stack_mm=tack_stack(laminate),
+        pins=pins,
+        basis=(
+            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to "
+            f"{CLOCK_SHORTFALL:g} C short of the platen with {CONTACT:g} W/(m2 K), and in still "
+            f"air down to {TOUCH:g} C with {AIR:g} W/(m2 K) from each face; not measured"
+        ),
+    )
