@@ -62,7 +62,7 @@ def calibrated(model: Model, factors: Factors) -> Model:
         return replace(model, name=name, trust=CALIBRATED_TRUST)
     factor_names = []
     if factors.press_factor != 1:
-        factor_names.append(f"press factor {factors.press_factor:g}")
+        factor_names.append(f"press factor {factors.press_factor:.3g}")
     if factors.pocket_loss:
         factor_names.append(f"pocket loss {factors.pocket_loss:g} mm")
     if factors.modulus_mpa is not None:

@@ -435,7 +435,7 @@ class Subject:
         flow = f"at {quantity.flow or WATER_FLOW:g} ml/min"
         if quantity.name == "height":
             factor = self.factors.press_factor
-            pressed = f" x press factor {factor:g}" if factor != 1 else ""
+            pressed = f" x press factor {factor:.3g}" if factor != 1 else ""
             return "deflated height", FLAT_HEIGHT_OF_FILMS + pressed
         if group_of(quantity, self.design.form) is None:
             return "", ""
