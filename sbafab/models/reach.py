@@ -41,7 +41,9 @@ if TYPE_CHECKING:
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
 STEPS, LAST_STEP = 9, 2e-3
-"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
+"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last, but not
+below an outer plate, whose contacts are too stiff for any to close in it unseen.
+"""
 CLOSE = 0.05
 """Step (mm, rad, asinh) from which on tangents are exact."""
 LONGEST_STEP = 1.5
@@ -206,6 +208,8 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
         at = at if target.load is None else at[stack.levels]
     rows = stack.places if target.load is None else stack.level_places
+    has_plate = target.load is not None and target.load.wall is not None
+    last = STILL if has_plate else LAST_STEP
     largest = math.inf
     for _ in range(STEPS):
         now = _linearised(target, x, at, largest < CLOSE)
@@ -220,7 +224,7 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         share = float(step_limit(move).min())
         x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
         largest = max(float(np.abs(move).max()), float(np.abs(ahead).max()))
-        if largest < STILL or (largest < LAST_STEP and (_closed(rows, at) == now.closed).all()):
+        if largest < STILL or (largest < last and (_closed(rows, at) == now.closed).all()):
             if np.linalg.norm(missing - rates @ ahead) < NEAR and is_positive_definite(now.matrix):
                 return _pose(target, x, at)
             return None
@@ -275,7 +279,8 @@ def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
     try:
         if target.load is None:
             return stack.pose_at(pressures, springs, at[stack.levels], at)
-        return stack.pose_at(pressures, springs, at)
+        push = loaded_energy(stack.each(springs), stack.pitch, target.load, at).push
+        return stack.pose_at(pressures, springs, at, force=push / 1000)
     except DesignError:
         return None
 

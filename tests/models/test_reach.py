@@ -46,6 +46,7 @@ def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
         assert min(reached.pressures) >= 0
         assert max(reached.pressures) <= MOST + 1e-9
         again = stack.pose(np.clip(reached.pressures, 0, MOST).tolist(), **loads, near=reached)
+        assert reached.force == pytest.approx(again.force, abs=1e-5)
         number += not np.linalg.norm(again.tip - target) < CLOSE
     return number
 
@@ -55,12 +56,22 @@ def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
     assert missed(three, 8 if load == "plate" else 20, LOADS[load]) == 0
 
 
+def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
+    """Where a point of the top meets the plate in the last step, and where all push hard."""
+    load = LOADS["plate"]
+    met, pushed = (three.pose(each, **load) for each in ((6.32, 9.94, 5.48), (10.0, 9.0, 9.5)))
+    for near in (None, pushed):
+        reached = three.reach(met.tip, most_pressure=MOST, near=near, **load)
+        again = three.pose(reached.pressures, near=reached, **load)
+        assert reached.tip == pytest.approx(again.tip, abs=1e-5)
+        assert reached.force == pytest.approx(again.force, abs=1e-5)
+    assert reached.force > 1e-3
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("load", LOADS)
 def test_a_thousand_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    # Under a plate three of a thousand places of the calibrated stack are missed.
-    drawn = sbafab.stack("3dof-15mm", "models.calibration=none")
-    assert missed(drawn if load == "plate" else three, 1000, LOADS[load]) == 0
+    assert missed(three, 1000, LOADS[load]) == 0
 
 
 @pytest.mark.parametrize("count", [2, 4])
