@@ -392,7 +392,7 @@ def _checks(folder: DesignFolder) -> str:
 
 
 def _laminate(folder: DesignFolder) -> str:
-    return laminate_json(folder.laminate)
+    return laminate_json(folder.marked)
 
 
 def _design(folder: DesignFolder) -> str:

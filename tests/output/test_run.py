@@ -76,7 +76,8 @@ def test_a_failing_design_writes_no_cut_files(tmp_path: Path) -> None:
     assert run.failed
     written = hashes(run.folder)
     assert not [path for path in written if path.startswith(("layers/", "mesh/", "press"))]
-    assert "must not be built" in (run.folder / "preview" / "layers.svg").read_text()
+    for path in ("laminate.json", "preview/layers.svg"):
+        assert "must not be built; failed: bond-width" in (run.folder / path).read_text(), path
     findings = json.loads((run.folder / "checks.json").read_text())["findings"]
     assert "fail" in {finding["verdict"] for finding in findings}
 
@@ -90,7 +91,7 @@ def test_waivers_stand_in_every_file(tmp_path: Path) -> None:
     for path in cut:
         assert "bond-width, tube-fit" in path.read_text(), path.name
     assert manifest_of(run.folder)["waived"] == ["bond-width", "tube-fit"]
-    for path in ("press.json", "preview/layers.svg"):
+    for path in ("laminate.json", "press.json", "preview/layers.svg"):
         assert "bond-width, tube-fit" in (run.folder / path).read_text(), path
 
 
