@@ -12,6 +12,7 @@ nearly linear.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -40,9 +41,15 @@ if TYPE_CHECKING:
 
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
-STEPS, LAST_STEP = 9, 2e-3
-"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last, but not
-below an outer plate, whose contacts are too stiff for any to close in it unseen.
+STEPS, PLATE_STEPS = 25, 9
+"""Newton's steps of freedoms and pressures; below an outer plate, whose contacts may go on closing
+and opening.
+"""
+WHOLE_STEPS = 5
+"""Steps after which one that closes or opens contacts is halved, lest they do so for ever."""
+LAST_STEP = 2e-3
+"""Step so small (mm, rad, asinh) that it is the last, but not below an outer plate, whose contacts
+are too stiff for any to close in it unseen.
 """
 CLOSE = 0.05
 """Step (mm, rad, asinh) from which on tangents are exact."""
@@ -145,9 +152,15 @@ def start(target: TipTarget) -> Array:
         length *= (bend / 2) / math.sin(bend / 2)
     way = target.place[:2] / max(aside, 1e-12)
     rises = length - stack.flat_height - bend * (stack.axes @ way)
-    grid = np.linspace(0.0, target.most, 33)
+    return np.interp(rises, *_column_rises(stack, target.most))
+
+
+@lru_cache(maxsize=16)
+def _column_rises(stack: PosedStack, most: float) -> tuple[Array, Array]:
+    """Return by how many mm all balloons of a chamber rise freely, and at which asinh(p / P0)."""
+    grid = np.linspace(0.0, most, 33)
     kinds = np.stack([kind.rises(P0 * np.sinh(grid)) for kind in stack.maps])
-    return np.interp(rises, kinds[stack.levels].sum(0), grid)
+    return kinds[stack.levels].sum(0), grid
 
 
 def _further_starts(target: TipTarget, guess: Array) -> Iterator[Array]:
@@ -209,9 +222,9 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         at = at if target.load is None else at[stack.levels]
     rows = stack.places if target.load is None else stack.level_places
     has_plate = target.load is not None and target.load.wall is not None
-    last = STILL if has_plate else LAST_STEP
+    steps, last = (PLATE_STEPS, STILL) if has_plate else (STEPS, LAST_STEP)
     largest = math.inf
-    for _ in range(STEPS):
+    for number in range(steps):
         now = _linearised(target, x, at, largest < CLOSE)
         if now is None:
             return None
@@ -222,9 +235,12 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         ahead = bounded_step(rates, missing, damping, room)
         move = now.own + now.by_pressure @ ahead
         share = float(step_limit(move).min())
+        if number >= WHOLE_STEPS and (_closed(rows, at + share * move) != now.closed).any():
+            share /= 2
         x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
         largest = max(float(np.abs(move).max()), float(np.abs(ahead).max()))
-        if largest < STILL or (largest < last and (_closed(rows, at) == now.closed).all()):
+        is_small = largest < last and share == 1.0
+        if largest < STILL or (is_small and (_closed(rows, at) == now.closed).all()):
             if np.linalg.norm(missing - rates @ ahead) < NEAR and is_positive_definite(now.matrix):
                 return _pose(target, x, at)
             return None
@@ -279,6 +295,8 @@ def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
     try:
         if target.load is None:
             return stack.pose_at(pressures, springs, at[stack.levels], at)
+        if target.load.wall is None:
+            return stack.pose_at(pressures, springs, at)
         push = loaded_energy(stack.each(springs), stack.pitch, target.load, at).push
         return stack.pose_at(pressures, springs, at, force=push / 1000)
     except DesignError:
