@@ -41,16 +41,10 @@ if TYPE_CHECKING:
 
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
-STEPS, PLATE_STEPS = 25, 9
-"""Newton's steps of freedoms and pressures; below an outer plate, whose contacts may go on closing
-and opening.
-"""
+STEPS, LAST_STEP = 25, 2e-3
+"""Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
 WHOLE_STEPS = 5
 """Steps after which one that closes or opens contacts is halved, lest they do so for ever."""
-LAST_STEP = 2e-3
-"""Step so small (mm, rad, asinh) that it is the last, but not below an outer plate, whose contacts
-are too stiff for any to close in it unseen.
-"""
 CLOSE = 0.05
 """Step (mm, rad, asinh) from which on tangents are exact."""
 LONGEST_STEP = 1.5
@@ -106,11 +100,13 @@ def reach(
     target = TipTarget(stack, place, load, math.asinh(most_pressure / P0))
     guess = start(target) if near is None else np.arcsinh(np.array(near.pressures) / P0)
     guess = np.clip(guess, 0.0, target.most)
-    if near is not None or load is None or load.wall is None:
+    # An outer plate is too stiff for steps of freedoms and pressures together.
+    has_plate = load is not None and load.wall is not None
+    if not has_plate:
         pose = _by_freedoms(target, guess, near)
         if pose is not None:
             return pose
-    if load is not None:
+    if load is not None and not has_plate:
         # From an equilibrium, where the load has bent the stack far.
         posed = _equilibrium(target, guess, arguments, near)
         pose = None if posed is None else _by_freedoms(target, guess, posed)
@@ -118,7 +114,7 @@ def reach(
             return pose
     best = None
     further = _further_starts(target, guess)
-    for x in (guess, *(further if load is None or load.wall is None else islice(further, 2))):
+    for x in (guess, *(islice(further, 2) if has_plate else further)):
         pose = _by_poses(target, x, arguments, near if best is None else None)
         if pose is None:
             continue
@@ -221,10 +217,8 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
         at = stack.start_freedoms((P0 * np.sinh(x)).tolist())
         at = at if target.load is None else at[stack.levels]
     rows = stack.places if target.load is None else stack.level_places
-    has_plate = target.load is not None and target.load.wall is not None
-    steps, last = (PLATE_STEPS, STILL) if has_plate else (STEPS, LAST_STEP)
     largest = math.inf
-    for number in range(steps):
+    for number in range(STEPS):
         now = _linearised(target, x, at, largest < CLOSE)
         if now is None:
             return None
@@ -239,7 +233,7 @@ def _by_freedoms(target: TipTarget, x: Array, near: Pose | None) -> Pose | None:
             share /= 2
         x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
         largest = max(float(np.abs(move).max()), float(np.abs(ahead).max()))
-        is_small = largest < last and share == 1.0
+        is_small = largest < LAST_STEP and share == 1.0
         if largest < STILL or (is_small and (_closed(rows, at) == now.closed).all()):
             if np.linalg.norm(missing - rates @ ahead) < NEAR and is_positive_definite(now.matrix):
                 return _pose(target, x, at)
@@ -295,10 +289,7 @@ def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
     try:
         if target.load is None:
             return stack.pose_at(pressures, springs, at[stack.levels], at)
-        if target.load.wall is None:
-            return stack.pose_at(pressures, springs, at)
-        push = loaded_energy(stack.each(springs), stack.pitch, target.load, at).push
-        return stack.pose_at(pressures, springs, at, force=push / 1000)
+        return stack.pose_at(pressures, springs, at)
     except DesignError:
         return None
 
