@@ -18,11 +18,12 @@ To have an editor complete and check keys, save the schema (`sbafab schema > des
 file with `#:schema ./design.schema.json`, which Taplo and its editor plug-ins read.
 """
 
-ALL = "Shared by `1dof`, `lobed` and `radial`, which `family` names.\n"
+ALL = "Shared by `1dof`, `lobed`, `radial` and `drawn`, which `family` names.\n"
 FAMILIES = {
     "OneDofDesign": "1dof",
     "LobedDesign": "lobed",
     "RadialDesign": "radial",
+    "DrawnDesign": "drawn",
 }
 LENGTH = "^\\s*\\+?(?:"
 """How the pattern of a length with a unit begins."""
@@ -43,6 +44,7 @@ def page() -> str:
         parts += [f"\n### [{key}]\n", *_section(key, record, found)]
     for name, family in FAMILIES.items():
         parts.append(f"\n## Family {family}\n\n{found[name]['description']}\n")
+        parts += _further(found[name], found["OneDofDesign"], found)
         for key, record in sections[name].items():
             if key not in shared:
                 parts += [f"\n### [{key}] of {family}\n", *_section(key, record, found)]
@@ -51,12 +53,36 @@ def page() -> str:
     return "\n".join(parts) + "\n"
 
 
+def _further(record: dict[str, Any], usual: dict[str, Any], found: dict[str, Any]) -> Iterator[str]:
+    """Keys that stand outside tables, and are not those of all families; then rows of lists."""
+    further = {k: v for k, v in record["properties"].items() if k not in usual["properties"]}
+    plain = {key: value for key, value in further.items() if "$ref" not in value}
+    if plain:
+        yield from _table("", {"properties": plain}, found)
+    for key, value in further.items():
+        rows = value.get("items") or _named_rows(value, found)
+        if "$ref" in rows:
+            yield f"\n### Each of `{key}`\n"
+            yield from _section(key, _name(rows), found)
+
+
+def _named_rows(value: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
+    """What each table under a name of the user's is, where all are."""
+    table = found[_name(value)] if "$ref" in value else {}
+    rows = table.get("additionalProperties")
+    return rows if isinstance(rows, dict) and not table["properties"] else {}
+
+
+def _name(reference: dict[str, Any]) -> str:
+    return str(reference["$ref"]).rpartition("/")[2]
+
+
 def _sections(record: dict[str, Any], found: dict[str, Any]) -> dict[str, str]:
     """Names of the tables of a design, with that of their record."""
     return {
-        key: value["$ref"].rpartition("/")[2]
+        key: _name(value)
         for key, value in record["properties"].items()
-        if "$ref" in value
+        if "$ref" in value and not _named_rows(value, found)
     }
 
 

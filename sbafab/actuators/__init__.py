@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel
 
-from sbafab.actuators import lobed, one_dof, radial
+from sbafab.actuators import drawn, lobed, one_dof, radial
 from sbafab.actuators.fits import Fits, refuse_unfit
 from sbafab.design.files import (
     FITS,
@@ -41,6 +41,7 @@ FAMILIES = {
     "1dof": Family(one_dof.OneDofDesign, one_dof.build),
     "lobed": Family(lobed.LobedDesign, lobed.build),
     "radial": Family(radial.RadialDesign, radial.build),
+    "drawn": Family(drawn.DrawnDesign, drawn.build),
 }
 PLUGINS = "sbafab.families"
 """Entry points by which an installed package adds families, each a ``Family``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Annotated
 
 from pydantic import Field
@@ -157,43 +157,48 @@ def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
     return Pin(name, centre, bore.pin, round(bore.diameter - bore.pin, 9))
 
 
-def film_of(design: Design, role: Role) -> Film:
-    """Return the film that a design's layup gives to the layers of a role.
+def film_of(design: Design, role: Role, index: int = 0) -> Film:
+    """Return the film that a design gives to the layers of a role, or to the one of this index.
 
     Raises DesignError if it names none, or one of the wrong kind.
     """
-    key = role.replace("-", "_")
-    name: str = getattr(design.layup, key)
+    key = f"layup.{role.replace('-', '_')}"
+    name: str = getattr(design.layup, role.replace("-", "_"))
+    if index in design.layer_films:
+        key, name = f"film of layer {index}", design.layer_films[index]
     stock = design.films.stock
     kind = "mask" if role.endswith("-mask") else "structural"
     fit = [name_of_film for name_of_film, film in stock.items() if film.kind == kind]
     if name not in stock:
         raise DesignError(
-            f"layup.{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
+            f"{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
             "[films.NAME] adds one"
         )
     if name not in fit:
         raise DesignError(
-            f"layup.{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
+            f"{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
             f"{kind} one: {listed(fit)}"
         )
     return stock[name]
 
 
 def used_films(design: Design) -> dict[str, Film]:
-    """Return the films that a design's layup names, by material, TPE first. Raises DesignError."""
-    named = {film.material: film for role in ROLES for film in [film_of(design, role)]}
+    """Return the films that a design names, by material, TPE first. Raises DesignError."""
+    stock = design.films.stock
+    films = [film_of(design, role) for role in ROLES]
+    films += [stock[name] for name in design.layer_films.values() if name in stock]
+    named = {film.material: film for film in films}
     return {material: named[material] for material in in_order(named)}
 
 
 def layers(cuts: Iterable[CutFilm], design: Design) -> tuple[Layer, ...]:
     """Return the films as layers, with heights and pattern names."""
-    films = {role: film_of(design, role) for role in ROLES}
+    film_for = cache(partial(film_of, design))
     patterns: dict[tuple[str, Region], str] = {}
     placed: list[Layer] = []
     z = 0.0
     for index, cut in enumerate(cuts, start=1):
-        film = films[cut.role]
+        film = film_for(cut.role, index if index in design.layer_films else 0)
         shape = (film.material, cut.profile)
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(

@@ -353,12 +353,10 @@ def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]
 
 
 def _drawn_in_chords(design: Design) -> bool:
-    """Return True if the user's outline has chords in place of arcs."""
-    if design.drawing is None:
-        return False
-
+    """Return True if an outline of the user's has chords in place of arcs."""
     try:
-        return chords_for_arc(read_outline(design.drawing)) is not None
+        outlines = map(read_outline, design.drawings.values())
+        return any(chords_for_arc(outline) is not None for outline in outlines)
     except (DesignError, OSError):
         return False
 

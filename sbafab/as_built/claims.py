@@ -121,7 +121,7 @@ def order_problems(claims: Manifest, design: Design) -> list[Problem]:
         if layer.role != role:
             message = f"layer {position} has the role {layer.role}, where the order asks for {role}"
             problems.append(claim(message, position))
-        if layer.material != film_of(design, layer.role).material:
+        if layer.material != film_of(design, layer.role, position).material:
             message = f"layer {position} is {layer.material}, which no {layer.role} is made of"
             problems.append(claim(message, position))
     return problems
@@ -145,7 +145,7 @@ def height_problems(claims: Manifest, layers: Sequence[Layer], design: Design) -
     placed = {layer.index: layer for layer in layers}
     z = 0.0
     for position, layer in enumerate(claims.layers, start=1):
-        nominal = film_of(design, layer.role).thickness
+        nominal = film_of(design, layer.role, position).thickness
         if abs(layer.thickness - nominal) > HEIGHT:
             problems.append(
                 claim(

@@ -114,7 +114,7 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
 
 def _film(claim: LayerClaim, design: Design) -> Film:
     """Return the film of a layer's role, with the claimed name and thickness."""
-    film = film_of(design, claim.role)
+    film = film_of(design, claim.role, claim.index)
     return replace(film, material=claim.material, thickness=claim.thickness)
 
 

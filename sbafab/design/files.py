@@ -153,6 +153,7 @@ Change = str | Mapping[str, Any]
 """A key to set: "key.path=value", or a table of keys, which may be dotted, with their values."""
 OUTLINE = "chamber.outline"
 DIAMETER = "chamber.diameter"
+_SHAPE_FILE = re.compile(r"shapes\.[^.]+\.file")
 KIT = "kit"
 AnyRecord = TypeVar("AnyRecord", bound=BaseModel)
 MOST_BYTES = 1_000_000
@@ -309,6 +310,9 @@ def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) ->
     if OUTLINE in keys:
         chamber = data["chamber"]
         chamber["outline"] = str(Path(str(chamber["outline"])).absolute())
+    for key in filter(_SHAPE_FILE.fullmatch, keys):
+        shape = data["shapes"][key.split(".")[1]]
+        shape["file"] = str(Path(str(shape["file"])).absolute())
     if KIT in keys and isinstance(data[KIT], str) and data[KIT] not in kit_names():
         data[KIT] = str(Path(data[KIT]).absolute())
 

@@ -10,6 +10,7 @@ from typing import Any
 from sbafab.design.files import (
     FITS,
     checked,
+    override,
 )
 from sbafab.design.films import UNCALIBRATED, LayerFilms
 from sbafab.design.kits import DEFAULT, SCHEMA, Kit, KitFile, load_kit
@@ -142,9 +143,11 @@ def _films(design: Design) -> dict[str, list[object]]:
 
 
 def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the drawn outline's content in place of its path."""
-    if design.drawing is not None:
-        table["chamber"]["outline"] = hashlib.sha256(design.drawing.read_bytes()).hexdigest()
+    """The table with the content of drawn outlines in place of their paths."""
+    contents = {
+        key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in design.drawings.items()
+    }
+    table = override(table, [contents])
     models = table.get("models")
     calibration = design.folder / design.models.calibration
     if models and calibration.is_file():

@@ -150,7 +150,7 @@ def _checked(loop: Strand) -> Region:
             f"measures {width:.4g} x {height:.4g} mm, where {SMALLEST:g} to {LARGEST:g} is "
             "allowed; check its units"
         )
-    _refuse_crossings(loop)
+    refuse_crossings(loop)
     contour = tidy(loop)
     if contour is None:
         raise DesignError("encloses no area; draw the outline of a pocket")
@@ -176,7 +176,8 @@ def _surrounds(region: Region, p: Point) -> bool:
     return region.contains(p) and region.distance_to_edge(p) >= EPSILON
 
 
-def _refuse_crossings(loop: Strand) -> None:
+def refuse_crossings(loop: Strand) -> None:
+    """Raises DesignError where a closed loop crosses or touches itself."""
     # A tangle is told at its first knot: there may be one for every two edges.
     for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
         ends = loop[i].start, loop[i].end, loop[j].start, loop[j].end

@@ -23,6 +23,7 @@ from sbafab.design.files import (
     ASSEMBLY,
     FITS,
     KIT,
+    OUTLINE,
     Change,
     changed_keys,
     checked,
@@ -111,6 +112,16 @@ class Design(Section):
         return None if self.chamber.outline is None else self.folder / self.chamber.outline
 
     @property
+    def drawings(self) -> dict[str, Path]:
+        """The files of all drawn outlines, by the keys that name them."""
+        return {} if self.drawing is None else {OUTLINE: self.drawing}
+
+    @property
+    def layer_films(self) -> dict[int, str]:
+        """Films that single layers name, by the layer's index; else ``layup`` has the role's."""
+        return {}
+
+    @property
     def thickest_pin(self) -> float:
         """Diameter of the thickest dowel pin that the design may need, mm."""
         return max(self.bore.pin, self.registration.pin_diameter)
@@ -165,6 +176,12 @@ class Design(Section):
             Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
             Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
         )
+
+    def drawn_from(self, key: str, file: str) -> Self:
+        """Return the design with another file under one of the keys of ``drawings``."""
+        assert key == OUTLINE, key
+        chamber = self.chamber.model_copy(update={"outline": file})
+        return self.model_copy(update={"chamber": chamber})
 
     def with_(self, *changes: str | Mapping[str, Any], **tables: Any) -> Self:
         """Return the design with keys changed, checked like a design file.
@@ -360,11 +377,13 @@ def _tables(design: Design) -> dict[str, Any]:
 
 
 def without_none(table: dict[str, Any]) -> dict[str, Any]:
-    return {
-        key: without_none(value) if isinstance(value, dict) else value
-        for key, value in table.items()
-        if value is not None
-    }
+    return {key: _without_none(value) for key, value in table.items() if value is not None}
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_without_none(item) for item in value]
+    return without_none(value) if isinstance(value, dict) else value
 
 
 def keys_of(design: Design) -> list[tuple[str, object, object]]:

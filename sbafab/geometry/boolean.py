@@ -125,16 +125,16 @@ FAR = 1e-3
 class ClosedChain:
     """A closed chain, and how many times it and its twins count together.
 
-    ``drawn`` is the first of them; ``contour`` is its tidy form if it is ``alone``, which means
+    ``outline`` is the first of them; ``contour`` is its tidy form if it is ``alone``, which means
     that it stays clear of itself.
     """
 
-    __slots__ = ("alone", "circle", "contour", "drawn", "start", "turns")
+    __slots__ = ("alone", "circle", "contour", "outline", "start", "turns")
 
     def __init__(self, contour: Contour, turns: int) -> None:
         whole = alone(contour)
         self.alone = whole is not None
-        self.drawn = contour
+        self.outline = contour
         self.contour = whole or contour
         self.circle = whole.circle if whole is not None else None
         self.turns = turns
@@ -198,7 +198,7 @@ class ChainGroup:
     @property
     def edges(self) -> list[tuple[Edge, int]]:
         """The edges of all its chains, and how many times each counts."""
-        return [(edge, chain.turns) for chain in self.chains for edge in chain.drawn.edges]
+        return [(edge, chain.turns) for chain in self.chains for edge in chain.outline.edges]
 
     @property
     def clear(self) -> list[int]:
@@ -206,7 +206,7 @@ class ChainGroup:
         return [
             number if chain.alone else -1
             for number, chain in enumerate(self.chains)
-            for _ in chain.drawn.edges
+            for _ in chain.outline.edges
         ]
 
 

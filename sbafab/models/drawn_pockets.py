@@ -67,6 +67,8 @@ def why_no_disc(design: Design) -> str:
     """Return the reason why a drawn pocket has no stroke, and the command that computes one."""
     discs = near_discs(design)
     instead = "sbafab simulate --with calculix, or sofa, inflates it"
+    if discs is None and design.form.wrap is None:
+        return f"no model knows the form of layers drawn one by one; {instead}"
     if discs is None:
         return f"no model knows the form of a drawn pocket outline round a tube; {instead}"
     return (

@@ -398,11 +398,10 @@ def _laminate(folder: DesignFolder) -> str:
 def _design(folder: DesignFolder) -> str:
     """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
     design = folder.design
-    if design.drawing is not None:
-        name = f"outline{design.drawing.suffix.lower()}"
-        shutil.copyfile(design.drawing, folder.path / name)
-        chamber = design.chamber.model_copy(update={"outline": name})
-        design = design.model_copy(update={"chamber": chamber})
+    for key, file in design.drawings.items():
+        name = f"{'-'.join(key.split('.')[1:])}{file.suffix.lower()}"
+        shutil.copyfile(file, folder.path / name)
+        design = design.drawn_from(key, name)
     if design.kit not in kit_names():
         (folder.path / KIT_FILE).write_bytes(kit_of(design).text)
         design = design.model_copy(update={"kit": KIT_FILE})

@@ -101,7 +101,8 @@ def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Fiel
                 yield from _fields(inner, schema, f"{prefix}{name}.")
             continue
         key = prefix + name
-        if key != "family" and rule.get("type") != "object":
+        is_table = rule.get("type") == "object" or "$ref" in rule.get("items", {})
+        if key != "family" and not is_table:
             yield _field(key, rule)
 
 

@@ -164,7 +164,7 @@ def test_templates_schema_and_new(
     monkeypatch.chdir(tmp_path)
     code, out, _ = run(["templates"], capsys)
     assert code == 0
-    assert len(out.splitlines()) == 7
+    assert len(out.splitlines()) == 8
     code, out, _ = run(["schema"], capsys)
     assert code == 0
     records = json.loads(out)["$defs"]

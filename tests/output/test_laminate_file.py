@@ -26,7 +26,7 @@ from tests.properties.designs import Draft, valid
 from tests.properties.test_designs import share
 from tests.site.formats import hold
 
-TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
+TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm", "pouch")
 PANEL_OF_4 = Path(__file__).parents[2] / "docs" / "gallery" / "panel-of-4.toml"
 
 

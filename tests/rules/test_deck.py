@@ -253,7 +253,7 @@ def test_a_laminate_without_its_fault_passes(
     assert failing(good(*design)) == set()
 
 
-@pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
+@pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm", "pouch"])
 def test_templates_pass(template: str, good: Callable[..., Laminate]) -> None:
     assert failing(good(template)) == set()
 

@@ -155,7 +155,7 @@ def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: St
 
 def test_templates_and_forms_are_whole(client: Client) -> None:
     start = client.get("/api/start", headers=HEADERS).json()
-    assert set(start["families"]) == {"1dof", "lobed", "radial"}
+    assert set(start["families"]) == {"1dof", "lobed", "radial", "drawn"}
     lobed = {field["key"]: field for field in start["families"]["lobed"]}
     assert lobed["chamber.diameter"]["unit"] == "mm"
     assert lobed["press.temperature_c"]["unit"] == "\u00b0C"

@@ -5,6 +5,7 @@ import { ask, withoutServer } from "./server.js";
 const ABOUT = {
   "1dof-5mm": "One stack of 5 mm balloons", "1dof-10mm": "One stack of 10 mm balloons",
   "3dof-15mm": "Three chambers round a lumen: bends every way", "radial-15mm": "Balloons on a tube: expands",
+  pouch: "Two films round a pocket, drawn layer by layer",
   aperture: "Assembly: 3-DoF arm on a magnet base", brace: "Assembly: brace, arm and cup on one tube", standing: "Assembly: three arms on a tube",
 };
 

@@ -10,6 +10,7 @@ const FAMILY_PICTURES = {
   "1dof": { words: "One stack", d: ["M12 20a15 15 0 1 0 30 0 15 15 0 1 0-30 0Z", "M25 20a2 2 0 1 0 4 0 2 2 0 1 0-4 0Z"] },
   lobed: { words: "Lobed", d: [0, 120, 240].map((t) => { const x = 27 + 8.4 * Math.cos((t * Math.PI) / 180), y = 20 - 8.4 * Math.sin((t * Math.PI) / 180); return `M${x - 8} ${y}a8 8 0 1 0 16 0 8 8 0 1 0-16 0Z`; }) },
   radial: { words: "On a tube", d: ["M4 6h46v28H4Z", ...[8, 22.5, 37].map((x) => `M${x} 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z`)] },
+  drawn: { words: "Drawn layers", d: [26, 19, 12].map((y) => `M5 ${y} 27 ${y - 8}l22 8-22 8Z`) },
 };
 
 export class Form {

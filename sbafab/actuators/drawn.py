@@ -1,0 +1,455 @@
+"""Laminates of drawn layers: each layer's role and shape stand in the design file.
+
+Shapes have names, and are made of others by name: a layer takes one, and so may several layers.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from sbafab.actuators.stacking import CutFilm, channel_pin, layers
+from sbafab.design.files import listed, shown
+from sbafab.design.outline import read_outline, refuse_crossings
+from sbafab.design.records import Design, Drawn, Form, Free
+from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.toml_table import Section
+from sbafab.design.units import LONGEST, Length, Millimetres
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Line, Point, unit
+from sbafab.geometry.offset import fillet, grow
+from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
+
+Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
+Place = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
+Angle = Annotated[float, Field(ge=-360, le=360)]
+DrawnRole = Literal["base", "wall", "cap", "chamber-mask", "separator-mask"]
+SHAPE_NAME = re.compile("[a-z][a-z0-9_-]{0,31}")
+MOST_SHAPES = 200
+MOST_LAYERS = 500
+
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "disc": (),
+    "ring": (),
+    "slot": ("width",),
+    "stadium": (),
+    "polygon": (),
+    "file": (),
+    "offset": ("by",),
+    "fillet": ("radius",),
+    "union": (),
+    "difference": (),
+    "pattern": ("count",),
+}
+"""Keys of a shape, of which it has just one, and the keys that this one needs beside it."""
+ORDER = (
+    "base, chamber-mask, for each further balloon wall, separator-mask, wall, chamber-mask, and cap"
+)
+MOST_EDGES = 5000
+"""Edges of one shape; patterns of patterns would have any number."""
+PLACING = ("at", "turned")
+PATTERNS = ("round", "step")
+
+
+class _Row(Section):
+    """A table in a list or under a name of the user's, which names the keys it does not know."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _knows_its_keys(cls, data: Any) -> Any:
+        strange = [key for key in data if key not in cls.model_fields] if _is_table(data) else []
+        if strange:
+            near = difflib.get_close_matches(strange[0], cls.model_fields, 1)
+            hint = f"did you mean {near[0]}" if near else f"known are {', '.join(cls.model_fields)}"
+            raise ValueError(f"has a key {shown(strange[0])} that is not known; {hint}?")
+        return data
+
+
+class Shape(_Row):
+    """A shape: a disc, ring, slot, stadium, polygon or drawing, or one made of other shapes."""
+
+    disc: Length | None = None
+    """Diameter of a disc."""
+    ring: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
+    """Outer and inner diameter of a ring."""
+    slot: Annotated[tuple[Place, Place], Field(strict=False)] | None = None
+    """Ends of a straight slot with square ends, as wide as ``width``."""
+    stadium: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
+    """Width along x and length along y of a slot with round ends."""
+    polygon: Annotated[tuple[Place, ...], Field(strict=False, min_length=3)] | None = None
+    """Corners, in either order."""
+    file: str | None = Field(default=None, min_length=1, max_length=1000)
+    """A closed path of a DXF or SVG file, round its origin, or else round its centroid."""
+    offset: str | None = None
+    """A shape that is grown ``by`` a distance; less than 0 shrinks it."""
+    fillet: str | None = None
+    """A shape whose concave corners are rounded to ``radius``."""
+    union: Names | None = None
+    """Shapes that are joined."""
+    difference: Names | None = None
+    """A shape, and those that are cut out of it."""
+    pattern: str | None = None
+    """A shape repeated ``count`` times, evenly ``round`` a point or in steps of ``step``."""
+    width: Length | None = None
+    """Width of a slot."""
+    by: Coordinate | None = None
+    """Distance of an offset."""
+    radius: Length | None = None
+    """Radius of a fillet."""
+    count: int | None = Field(default=None, ge=1, le=200)
+    """Copies in a pattern."""
+    round: Place | None = None
+    """The point that a pattern goes round."""
+    step: Place | None = None
+    """From one copy of a pattern to the next, along x and y."""
+    at: Place = (0.0, 0.0)
+    """Where the shape's origin comes to lie."""
+    turned: Angle = 0.0
+    """Degrees by which it is turned about its origin first, counter-clockwise."""
+
+    @property
+    def kind(self) -> str:
+        """The key that says what the shape is."""
+        return next(kind for kind in NEEDS if getattr(self, kind) is not None)
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
+        kinds = [key for key in given if key in NEEDS]
+        if len(kinds) != 1:
+            how = f"has {' and '.join(kinds)}" if kinds else "has none of its keys"
+            raise ValueError(f"{how}; a shape is one of {', '.join(NEEDS)}")
+        (kind,) = kinds
+        missing = [key for key in NEEDS[kind] if key not in given]
+        if missing:
+            raise ValueError(f"is a {kind} without {missing[0]}; add it")
+        ways = [key for key in PATTERNS if key in given]
+        if kind == "pattern" and len(ways) != 1:
+            raise ValueError("is a pattern, which has either round or step; give one of the two")
+        for key in given:
+            allowed = (kind, *NEEDS[kind], *PLACING, *(PATTERNS if kind == "pattern" else ()))
+            if key not in allowed:
+                raise ValueError(f"is a {kind}, which has no {key}; remove it")
+        if self.ring is not None and self.ring[0] <= self.ring[1]:
+            raise ValueError("is a ring whose outer diameter, the first, must be the larger one")
+        if self.stadium is not None and self.stadium[0] > self.stadium[1]:
+            raise ValueError("is a stadium wider than it is long; swap the two and add turned = 90")
+        if self.slot is not None and self.slot[0] == self.slot[1]:
+            raise ValueError("is a slot whose ends are one point; move one of them")
+        return self
+
+
+class NamedShapes(Section):
+    """The shapes by name, a table each."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Shape] = Field(init=False)
+
+    @model_validator(mode="after")
+    def _names_can_be_written(self) -> Self:
+        if len(self.by_name) > MOST_SHAPES:
+            raise ValueError(f"has {len(self.by_name)} shapes; at most {MOST_SHAPES} may be")
+        for name in self.by_name:
+            if not SHAPE_NAME.fullmatch(name):
+                raise ValueError(
+                    f"has a shape named {shown(name)}; a name is a small letter and up to 31 small "
+                    "letters, digits, - or _"
+                )
+        return self
+
+    @property
+    def by_name(self) -> Mapping[str, Shape]:
+        return self.__pydantic_extra__ or {}
+
+
+class DrawnLayer(_Row):
+    """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
+
+    role: DrawnRole
+    """What the layer is for."""
+    shape: str
+    """The name of its shape."""
+    film: str | None = None
+    """The film that it is cut from, as in ``layup``; by default that of its role there."""
+    pieces: int = Field(default=1, ge=1, le=1000)
+    """Separate parts that it is meant to have (rule piece-count)."""
+
+
+class DrawnChamber(_Row):
+    """A chamber, and the inlet strip through which it is filled."""
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """How findings and pages call it."""
+    centres: Annotated[tuple[Place, ...], Field(strict=False, min_length=1, max_length=100)]
+    """A point inside each of its pockets; where there are several balloons, that of its bore."""
+    mouth: Place
+    """The middle of the end of its inlet tab."""
+    angle: Angle
+    """Which way the mouth faces: degrees from x, counter-clockwise."""
+    width: Length | None = None
+    """Width of its inlet strip as drawn; by default what the tube needs."""
+
+
+class DrawnDesign(Design):
+    """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
+    and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
+    ``fillet.radius`` and ``bore.diameter`` move no shape: rules and pins read the last.
+    """
+
+    family: Literal["drawn"]
+    """Which kind of actuator this is."""
+    layers: Annotated[tuple[DrawnLayer, ...], Field(strict=False, max_length=MOST_LAYERS)] = ()
+    """The layers, bottom to top."""
+    shapes: NamedShapes = NamedShapes.model_construct()
+    chambers: Annotated[tuple[DrawnChamber, ...], Field(strict=False, max_length=100)] = ()
+    """The chambers, each with its inlet."""
+    body: str | None = None
+    """The shape of the films without tabs, for the outline's diameter; none by default."""
+    lumen: Length | None = None
+    """Diameter of the channel through all layers round (0, 0), and of its dowel pin."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _balloons_are_counted(cls, data: Any) -> Any:
+        """One balloon for each chamber mask, unless the file says how many there are."""
+        rows, stack = data.get("layers"), data.get("stack", {})
+        if not isinstance(rows, list | tuple) or not _is_table(stack) or "balloons" in stack:
+            return data
+        count = sum(_is_table(row) and row.get("role") == "chamber-mask" for row in rows)
+        return {**data, "stack": {**stack, "balloons": count}} if count else data
+
+    @property
+    def form(self) -> Form:
+        stacks = max(1, sum(len(chamber.centres) for chamber in self.chambers))
+        return Form("laminate of drawn layers", stacks, Drawn(), self.lumen, self.lumen)
+
+    @property
+    def layer_films(self) -> dict[int, str]:
+        rows = enumerate(self.layers, start=1)
+        return {number: row.film for number, row in rows if row.film is not None}
+
+    @property
+    def free(self) -> tuple[Free, ...]:
+        return ()
+
+    @property
+    def thickest_pin(self) -> float:
+        return max(super().thickest_pin, self.lumen or 0.0)
+
+    @property
+    def drawings(self) -> dict[str, Path]:
+        named = {name: shape.file for name, shape in self.shapes.by_name.items()}
+        files = {name: self.folder / file for name, file in named.items() if file is not None}
+        return {f"shapes.{name}.file": file for name, file in files.items()}
+
+    def drawn_from(self, key: str, file: str) -> Self:
+        _, name, _ = key.split(".")
+        shape = self.shapes.by_name[name].model_copy(update={"file": file})
+        return self.model_copy(update={"shapes": self.shapes.model_copy(update={name: shape})})
+
+
+def build(design: DrawnDesign) -> Laminate:
+    """Return the laminate of drawn layers. Raises DesignError, which names the key at fault."""
+    _check(design)
+    shapes = Shapes(design)
+    balloons = design.stack.balloons
+    cuts = _cuts(design, shapes)
+    chambers = tuple(Chamber(chamber.name, chamber.centres) for chamber in design.chambers)
+    bores = tuple(
+        Bore(chamber.name, centre, design.bore.diameter)
+        for chamber in chambers
+        for centre in chamber.centres
+        if balloons > 1
+    )
+    pins = [channel_pin(f"chamber{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
+    if design.lumen is not None:
+        pins.append(Pin("lumen", (0.0, 0.0), design.lumen))
+    return Laminate(
+        name=design.name,
+        family=design.family,
+        layers=layers(cuts, design),
+        chambers=chambers,
+        bores=bores,
+        inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
+        pins=tuple(pins),
+        lumen=design.lumen,
+        balloons=balloons,
+        registration=design.registration.method,
+        outline=Region() if design.body is None else shapes.of(design.body, "body"),
+    )
+
+
+def _is_table(value: object) -> bool:
+    return isinstance(value, Mapping)
+
+
+def _check(design: DrawnDesign) -> None:
+    """Raises DesignError for what no laminate can be made of."""
+    roles = [layer.role for layer in design.layers]
+    if not roles:
+        raise DesignError('layers is missing; add a list of {role = "...", shape = "..."}')
+    if not design.chambers:
+        raise DesignError("chambers is missing; add a list of {name, centres, mouth, angle}")
+    names = [chamber.name for chamber in design.chambers]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DesignError(f"chambers has {shown(twice)} twice; give each chamber its name")
+    if design.chamber.outline is not None:
+        raise DesignError(
+            "chamber.outline is not for drawn layers; name the file in a shape: "
+            f"shapes.pocket.file = {shown(design.chamber.outline)}"
+        )
+    if design.registration.method != "channel-pin":
+        raise DesignError(
+            f"registration.method = {shown(design.registration.method)} adds parts to layers, and "
+            'drawn ones stay as they are; set it to "channel-pin"'
+        )
+    if len(roles) % 4 != 3:
+        raise DesignError(f"layers has {len(roles)} rows, and a stack has 3, 7, 11 ...: {ORDER}")
+    for number, (role, asked) in enumerate(zip(roles, _order(len(roles)), strict=True), start=1):
+        if role != asked:
+            raise DesignError(f"layer {number} is a {role}, where a {asked} belongs: {ORDER}")
+    count = roles.count("chamber-mask")
+    if count != design.stack.balloons:
+        raise DesignError(
+            f"stack.balloons = {design.stack.balloons}, and layers has {count} chamber-mask; each "
+            "balloon has one: leave stack.balloons out, or correct the roles"
+        )
+
+
+def _order(count: int) -> list[str]:
+    """The roles of a stack of so many layers: 3, and 4 more for each further balloon."""
+    turn = ("wall", "separator-mask", "wall", "chamber-mask")
+    between = [turn[(number + 3) % 4] for number in range(count - 2)]
+    return ["base", *between, "cap"]
+
+
+def _cuts(design: DrawnDesign, shapes: Shapes) -> list[CutFilm]:
+    """The layers, each with the number of its balloon."""
+    cuts, balloon = [], 0
+    roles = [layer.role for layer in design.layers]
+    for number, layer in enumerate(design.layers, start=1):
+        # A film belongs to the pocket that it faces.
+        balloon += roles[number : number + 1] == ["chamber-mask"]
+        profile = shapes.of(layer.shape, f"layer {number}")
+        cuts.append(CutFilm(layer.role, profile, balloon, layer.pieces))
+    return cuts
+
+
+def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
+    settings = design.inlet
+    width = design.strip_width if chamber.width is None else chamber.width
+    return Inlet(
+        chamber.name,
+        chamber.mouth,
+        unit(chamber.angle),
+        width,
+        settings.tab_length,
+        settings.tube_outer_diameter,
+    )
+
+
+class Shapes:
+    """The shapes of a design as regions, each made once."""
+
+    def __init__(self, design: DrawnDesign) -> None:
+        self.shapes = design.shapes.by_name
+        self.files = design.drawings
+        self._regions: dict[str, Region] = {}
+        self._open: list[str] = []
+
+    def of(self, name: str, user: str) -> Region:
+        """Return the shape of this name for its ``user``, a key. Raises DesignError."""
+        if name not in self.shapes:
+            near = difflib.get_close_matches(name, self.shapes, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {listed(self.shapes)}"
+            raise DesignError(f"{user} names a shape {shown(name)} that is not there; {hint}")
+        if name in self._open:
+            raise DesignError(
+                f"shapes.{name} is made of itself, by way of {' and '.join(self._open)}; name "
+                "another shape"
+            )
+        if name not in self._regions:
+            self._open.append(name)
+            region = self._placed(name, self.shapes[name])
+            self._open.pop()
+            if region.is_empty:
+                raise DesignError(f"shapes.{name} encloses no area; change its sizes")
+            self._regions[name] = region
+        return self._regions[name]
+
+    def _placed(self, name: str, shape: Shape) -> Region:
+        region = self._drawn(name, shape) if shape.kind in PRIMITIVES else self._made(name, shape)
+        if shape.turned:
+            region = region.turned(shape.turned)
+        return region.moved(*shape.at) if shape.at != (0.0, 0.0) else region
+
+    def _drawn(self, name: str, shape: Shape) -> Region:
+        centre = (0.0, 0.0)
+        if shape.disc is not None:
+            return disc(centre, shape.disc / 2)
+        if shape.ring is not None:
+            outer, inner = shape.ring
+            return disc(centre, outer / 2) - disc(centre, inner / 2)
+        if shape.slot is not None and shape.width is not None:
+            return strip(*shape.slot, shape.width)
+        if shape.stadium is not None:
+            return stadium(centre, *shape.stadium)
+        if shape.polygon is not None:
+            return _polygon(name, shape.polygon)
+        return read_outline(self.files[f"shapes.{name}.file"])
+
+    def _made(self, name: str, shape: Shape) -> Region:
+        def region(other: str) -> Region:
+            return self.of(other, f"shapes.{name}.{shape.kind}")
+
+        if shape.offset is not None and shape.by is not None:
+            return grow(region(shape.offset), shape.by)
+        if shape.fillet is not None and shape.radius is not None:
+            return fillet(region(shape.fillet), shape.radius)
+        if shape.union is not None:
+            return union(map(region, shape.union))
+        if shape.difference is not None:
+            first, *others = map(region, shape.difference)
+            return difference(first, union(others))
+        assert shape.pattern is not None
+        assert shape.count is not None
+        repeated = region(shape.pattern)
+        if len(repeated.edges) * shape.count > MOST_EDGES:
+            raise DesignError(
+                f"shapes.{name}.count = {shape.count} makes more than {MOST_EDGES} edges; repeat "
+                "less"
+            )
+        return union(_copies(repeated, shape.count, shape.round, shape.step))
+
+
+PRIMITIVES = ("disc", "ring", "slot", "stadium", "polygon", "file")
+
+
+def _copies(
+    region: Region, count: int, about: Point | None, step: Point | None
+) -> Sequence[Region]:
+    if about is not None:
+        return [region.turned(360 * i / count, about) for i in range(count)]
+    x, y = step or (0.0, 0.0)
+    return [region.moved(i * x, i * y) for i in range(count)]
+
+
+def _polygon(name: str, points: Sequence[Point]) -> Region:
+    ends = zip(points, [*points[1:], points[0]], strict=True)
+    if any(start == end for start, end in ends):
+        raise DesignError(f"shapes.{name}.polygon has one corner twice in a row; remove one")
+    loop = tuple(Line(start, end) for start, end in pairwise([*points, points[0]]))
+    try:
+        refuse_crossings(loop)
+    except DesignError as error:
+        raise DesignError(f"shapes.{name}.polygon {error}") from None
+    return polygon(points)

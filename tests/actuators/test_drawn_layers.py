@@ -1,0 +1,217 @@
+"""Drawn layers: the regions and findings of a family's own, and what is refused in a sentence."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+
+from sbafab.actuators import build, load_design
+from sbafab.design.files import template_text
+from sbafab.design.identity import design_sha256
+from sbafab.errors import DesignError
+from sbafab.geometry.region import disc
+from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import PredictionRequest
+from sbafab.models.prediction import predict
+from sbafab.rules.deck import run_deck
+from sbafab.rules.limits import Limits
+from sbafab.runs.check_folder import check_folder
+from sbafab.runs.run import RunRequest, generate
+
+FEW = Limits(yield_builds=50)
+POCKET, BOND, OVERHANG, BORE = 5.0, 0.75, 0.5, 1.04
+END = POCKET / 2 + BOND + 5.0
+
+
+def failing(laminate: Laminate) -> set[str]:
+    return {finding.rule for finding in run_deck(laminate, FEW) if finding.verdict == "fail"}
+
+
+def tables() -> dict[str, Any]:
+    return tomllib.loads(template_text("pouch"))
+
+
+def drawn(folder: Path, data: dict[str, Any]) -> Laminate:
+    path = folder / "drawn.toml"
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    return build(load_design(path))
+
+
+def as_1dof(balloons: int, width: float) -> dict[str, Any]:
+    """The layers of 1dof-5mm as its geometry states them, drawn by shapes."""
+    beyond = END + OVERHANG
+    shapes = {
+        "pocket": {"disc": POCKET},
+        "bore": {"disc": BORE},
+        "plate": {"offset": "pocket", "by": BOND},
+        "tab": {"slot": [[0, 0], [END, 0]], "width": width + 2 * BOND},
+        "strip": {"slot": [[0, 0], [beyond, 0]], "width": width},
+        "sharp": {"union": ["plate", "tab"]},
+        "bottom": {"fillet": "sharp", "radius": 1},
+        "bottom-wall": {"difference": ["bottom", "bore"]},
+        "fed": {"union": ["pocket", "strip"]},
+        "fed-mask": {"difference": ["fed", "bore"]},
+        "wall": {"ring": [POCKET + 2 * BOND, BORE]},
+        "mask": {"difference": ["pocket", "bore"]},
+        "reach": {"offset": "plate", "by": OVERHANG},
+        "neck": {"offset": "bore", "by": BOND},
+        "separator": {"difference": ["reach", "neck"]},
+    }
+    rows = [("base", "bottom"), ("chamber-mask", "fed-mask"), ("wall", "bottom-wall")]
+    for _ in range(balloons - 1):
+        rows += [("separator-mask", "separator"), ("wall", "wall")]
+        rows += [("chamber-mask", "mask"), ("wall", "wall")]
+    rows[-1] = ("cap", "plate")
+    chamber = {"name": "chamber1", "centres": [[0, 0]], "mouth": [END, 0], "angle": 0}
+    return {
+        "name": "1dof-5mm",
+        "family": "drawn",
+        "layers": [{"role": role, "shape": shape} for role, shape in rows],
+        "chambers": [chamber],
+        "shapes": shapes,
+        "body": "plate",
+    }
+
+
+def test_1dof_5mm_drawn_is_the_familys_own_laminate(tmp_path: Path) -> None:
+    ours = build(load_design("1dof-5mm"))
+    theirs = drawn(tmp_path, as_1dof(ours.balloons, ours.inlets[0].width))
+    assert replace(theirs, family="1dof") == ours
+    assert run_deck(theirs, FEW) == run_deck(ours, FEW)
+    assert failing(ours) == set()
+
+
+def test_a_bond_drawn_too_narrow_fails_the_rule_of_bonds(tmp_path: Path) -> None:
+    data = as_1dof(2, 1.95)
+    data["shapes"]["plate"]["by"] = 0.7
+    laminate = drawn(tmp_path, data)
+    assert "bond-width" in failing(laminate)
+    (bond,) = (f for f in run_deck(laminate, FEW) if f.rule == "bond-width")
+    assert bond.measured == pytest.approx(0.7, abs=1e-6)
+
+
+def test_shapes_have_the_areas_of_closed_formulas(tmp_path: Path) -> None:
+    def area(shape: dict[str, Any], **others: dict[str, Any]) -> float:
+        data = tables()
+        data["shapes"] |= {**others, "body": shape}
+        return drawn(tmp_path, {**data, "body": "body"}).outline.area
+
+    hole = {"disc": 2, "at": [5, 0]}
+    assert area({"disc": 4}) == pytest.approx(4 * math.pi)
+    assert area({"ring": [4, 2]}) == pytest.approx(3 * math.pi)
+    assert area({"slot": [[0, 0], [3, 4]], "width": 2}) == pytest.approx(10)
+    assert area({"stadium": [2, 5], "turned": 30}) == pytest.approx(6 + math.pi)
+    assert area({"polygon": [[0, 0], [0, 3], [4, 0]]}) == pytest.approx(6)
+    assert area({"offset": "hole", "by": 1}, hole=hole) == pytest.approx(4 * math.pi)
+    around = {"pattern": "hole", "count": 6, "round": [0, 0]}
+    assert area(around, hole=hole) == pytest.approx(6 * math.pi)
+    line = {"pattern": "hole", "count": 3, "step": [0, 3]}
+    assert area(line, hole=hole) == pytest.approx(3 * math.pi)
+
+
+REFUSED: list[tuple[Sequence[str], object, str]] = [
+    (("layers", "1", "role"), "mask", "layers.1.role = 'mask' must be"),
+    (("layers", "1", "role"), "cap", "layer 2 is a cap, where a chamber-mask belongs: base, "),
+    (("layers", "1", "shape"), "msk", "layer 2 names a shape 'msk' that is not there; did you"),
+    (("layers", "0", "film"), "ptfe", "film of layer 1 = 'ptfe' is a mask film"),
+    (("layers", "0", "flim"), "tpe", "has a key 'flim' that is not known; did you mean film?"),
+    (("shapes", "mask", "union"), ["mask"], "shapes.mask is made of itself, by way of mask"),
+    (("shapes", "mask"), {"disc": 3, "ring": [3, 2]}, "has disc and ring; a shape is one of"),
+    (("shapes", "mask"), {"at": [0, 0]}, "has none of its keys; a shape is one of disc"),
+    (("shapes", "mask"), {"ring": [2, 3]}, "is a ring whose outer diameter, the first"),
+    (("shapes", "mask"), {"slot": [[0, 0], [0, 0]], "width": 1}, "whose ends are one point"),
+    (("shapes", "mask"), {"slot": [[0, 0], [1, 0]]}, "is a slot without width; add it"),
+    (("shapes", "mask"), {"disc": 3, "by": 1}, "is a disc, which has no by; remove it"),
+    (("shapes", "mask"), {"stadium": [3, 2]}, "is a stadium wider than it is long"),
+    (("shapes", "mask"), {"pattern": "tab", "count": 2}, "has either round or step"),
+    (("shapes", "mask"), {"offset": "pocket", "by": -20}, "shapes.mask encloses no area"),
+    (("shapes", "mask"), {"file": "no.dxf"}, "no.dxf does not exist as a file; check its path"),
+    (
+        ("shapes", "mask"),
+        {"polygon": [[0, 0], [5, 5], [5, 0], [0, 5]]},
+        "shapes.mask.polygon crosses or touches itself at x 2.5000, y 2.5000",
+    ),
+    (("shapes", "mask"), {"polygon": [[0, 0], [0, 0], [5, 0]]}, "has one corner twice in a row"),
+    (("shapes", "Mask"), {"disc": 3}, "has a shape named 'Mask'; a name is a small letter"),
+    (("chambers",), [], "chambers is missing; add a list of"),
+    (("layers",), [{"role": "base", "shape": "film"}], "layers has 1 rows, and a stack has 3"),
+    (("shapes", "mask"), {"pattern": "many", "count": 200, "step": [1, 0]}, "more than 5000 edges"),
+    (("layers",), [], "layers is missing; add a list of"),
+    (("stack",), {"balloons": 2}, "stack.balloons = 2, and layers has 1 chamber-mask"),
+    (("registration",), {"method": "ears"}, "'ears' adds parts to layers"),
+    (("chamber",), {"outline": "a.dxf"}, "chamber.outline is not for drawn layers"),
+]
+
+
+@pytest.mark.parametrize(("keys", "value", "sentence"), REFUSED)
+def test_a_bad_key_is_refused_in_a_sentence(
+    keys: Sequence[str], value: object, sentence: str, tmp_path: Path
+) -> None:
+    data: Any = tables()
+    data["shapes"]["many"] = {"pattern": "tab", "count": 200, "step": [9, 0]}
+    table = data
+    for key in keys[:-1]:
+        table = table[int(key) if key.isdigit() else key]
+    table[keys[-1]] = value
+    with pytest.raises(DesignError) as caught:
+        drawn(tmp_path, data)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_chambers_of_one_name_are_refused(tmp_path: Path) -> None:
+    data = tables()
+    data["chambers"] *= 2
+    with pytest.raises(DesignError, match="chambers has 'pouch' twice"):
+        drawn(tmp_path, data)
+
+
+def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: Path) -> None:
+    import ezdxf
+
+    def draw(radius: float) -> None:
+        drawing = ezdxf.new(units=4)
+        drawing.modelspace().add_circle((0, 0), radius)
+        drawing.saveas(tmp_path / "round.dxf")
+
+    data = tables()
+    data["shapes"]["pocket"] = {"file": "round.dxf"}
+    data["films"] = {"pet": {"kind": "structural", "product": "PET", "thickness": 0.1}}
+    data["layers"][2]["film"] = "pet"
+    draw(12)
+    laminate = drawn(tmp_path, data)
+    # The strip leaves the pocket within the disc, and reaches far beyond it.
+    mask = laminate.layers[1].profile
+    assert (mask & disc((0, 0), 12)).area == pytest.approx(144 * math.pi)
+    assert [layer.film.material for layer in laminate.layers] == ["TPE", "PTFE", "PET"]
+
+    folders = []
+    for out in ("once", "again"):
+        design = load_design(tmp_path / "drawn.toml", ["rules.yield_builds=100"])
+        folders.append(generate(RunRequest(design, tmp_path / out, ("cut",))).folder)
+    once, again = (
+        {path.relative_to(top): path.read_bytes() for path in top.rglob("*") if path.is_file()}
+        for top in folders
+    )
+    assert once == again
+    assert {finding.verdict for finding in check_folder(folders[0])} <= {"pass", "warn"}
+    assert (folders[0] / "pocket-file.dxf").read_bytes() == (tmp_path / "round.dxf").read_bytes()
+
+    before = design_sha256(load_design(tmp_path / "drawn.toml"))
+    draw(11)
+    assert design_sha256(load_design(tmp_path / "drawn.toml")) != before
+
+
+def test_predictions_leave_out_in_a_sentence_what_has_no_model() -> None:
+    prediction = predict(load_design("pouch"), PredictionRequest((100.0,)))
+    reasons = {item.reason for item in prediction.left_out}
+    assert {figure.group for figure in prediction.figures} <= {"size", "inlet"}
+    assert len(reasons) == 1
+    assert "no model knows the form of layers drawn one by one" in reasons.pop()
