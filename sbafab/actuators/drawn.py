@@ -28,7 +28,7 @@ from sbafab.geometry.region import Region, difference, disc, polygon, stadium, s
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
 
 Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
-Place = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+Coordinates = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 DrawnRole = Literal["base", "wall", "cap", "chamber-mask", "separator-mask"]
@@ -73,18 +73,18 @@ class _Row(Section):
         return data
 
 
-class Shape(_Row):
+class NamedShape(_Row):
     """A shape: a disc, ring, slot, stadium, polygon or drawing, or one made of other shapes."""
 
     disc: Length | None = None
     """Diameter of a disc."""
     ring: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
     """Outer and inner diameter of a ring."""
-    slot: Annotated[tuple[Place, Place], Field(strict=False)] | None = None
+    slot: Annotated[tuple[Coordinates, Coordinates], Field(strict=False)] | None = None
     """Ends of a straight slot with square ends, as wide as ``width``."""
     stadium: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
     """Width along x and length along y of a slot with round ends."""
-    polygon: Annotated[tuple[Place, ...], Field(strict=False, min_length=3)] | None = None
+    polygon: Annotated[tuple[Coordinates, ...], Field(strict=False, min_length=3)] | None = None
     """Corners, in either order."""
     file: str | None = Field(default=None, min_length=1, max_length=1000)
     """A closed path of a DXF or SVG file, round its origin, or else round its centroid."""
@@ -106,11 +106,11 @@ class Shape(_Row):
     """Radius of a fillet."""
     count: int | None = Field(default=None, ge=1, le=200)
     """Copies in a pattern."""
-    round: Place | None = None
+    round: Coordinates | None = None
     """The point that a pattern goes round."""
-    step: Place | None = None
+    step: Coordinates | None = None
     """From one copy of a pattern to the next, along x and y."""
-    at: Place = (0.0, 0.0)
+    at: Coordinates = (0.0, 0.0)
     """Where the shape's origin comes to lie."""
     turned: Angle = 0.0
     """Degrees by which it is turned about its origin first, counter-clockwise."""
@@ -151,7 +151,7 @@ class NamedShapes(Section):
     """The shapes by name, a table each."""
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Shape] = Field(init=False)
+    __pydantic_extra__: dict[str, NamedShape] = Field(init=False)
 
     @model_validator(mode="after")
     def _names_can_be_written(self) -> Self:
@@ -166,7 +166,7 @@ class NamedShapes(Section):
         return self
 
     @property
-    def by_name(self) -> Mapping[str, Shape]:
+    def by_name(self) -> Mapping[str, NamedShape]:
         return self.__pydantic_extra__ or {}
 
 
@@ -188,9 +188,9 @@ class DrawnChamber(_Row):
 
     name: str = Field(pattern=NAME_PATTERN)
     """How findings and pages call it."""
-    centres: Annotated[tuple[Place, ...], Field(strict=False, min_length=1, max_length=100)]
+    centres: Annotated[tuple[Coordinates, ...], Field(strict=False, min_length=1, max_length=100)]
     """A point inside each of its pockets; where there are several balloons, that of its bore."""
-    mouth: Place
+    mouth: Coordinates
     """The middle of the end of its inlet tab."""
     angle: Angle
     """Which way the mouth faces: degrees from x, counter-clockwise."""
@@ -259,7 +259,7 @@ class DrawnDesign(Design):
 def build(design: DrawnDesign) -> Laminate:
     """Return the laminate of drawn layers. Raises DesignError, which names the key at fault."""
     _check(design)
-    shapes = Shapes(design)
+    shapes = ShapeRegions(design)
     balloons = design.stack.balloons
     cuts = _cuts(design, shapes)
     chambers = tuple(Chamber(chamber.name, chamber.centres) for chamber in design.chambers)
@@ -332,7 +332,7 @@ def _order(count: int) -> list[str]:
     return ["base", *between, "cap"]
 
 
-def _cuts(design: DrawnDesign, shapes: Shapes) -> list[CutFilm]:
+def _cuts(design: DrawnDesign, shapes: ShapeRegions) -> list[CutFilm]:
     """The layers, each with the number of its balloon."""
     cuts, balloon = [], 0
     roles = [layer.role for layer in design.layers]
@@ -357,7 +357,7 @@ def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
     )
 
 
-class Shapes:
+class ShapeRegions:
     """The shapes of a design as regions, each made once."""
 
     def __init__(self, design: DrawnDesign) -> None:
@@ -386,13 +386,13 @@ class Shapes:
             self._regions[name] = region
         return self._regions[name]
 
-    def _placed(self, name: str, shape: Shape) -> Region:
+    def _placed(self, name: str, shape: NamedShape) -> Region:
         region = self._drawn(name, shape) if shape.kind in PRIMITIVES else self._made(name, shape)
         if shape.turned:
             region = region.turned(shape.turned)
         return region.moved(*shape.at) if shape.at != (0.0, 0.0) else region
 
-    def _drawn(self, name: str, shape: Shape) -> Region:
+    def _drawn(self, name: str, shape: NamedShape) -> Region:
         centre = (0.0, 0.0)
         if shape.disc is not None:
             return disc(centre, shape.disc / 2)
@@ -407,7 +407,7 @@ class Shapes:
             return _polygon(name, shape.polygon)
         return read_outline(self.files[f"shapes.{name}.file"])
 
-    def _made(self, name: str, shape: Shape) -> Region:
+    def _made(self, name: str, shape: NamedShape) -> Region:
         def region(other: str) -> Region:
             return self.of(other, f"shapes.{name}.{shape.kind}")
 
