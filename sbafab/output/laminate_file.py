@@ -30,20 +30,14 @@ from sbafab.output.laminate_validator import FIELDS, SCHEMA, faults
 FILE = "laminate.json"
 
 
-DECIMALS = 9
-"""Of numbers in the file: the last bits of a coordinate depend on the order of the work."""
-
-
 def laminate_json(laminate: Laminate) -> str:
-    """Return the contents of ``laminate.json``: a row a line, numbers to ``DECIMALS``."""
-    lines = (
-        f"{json.dumps(key)}: {_rows(_rounded(value))}" for key, value in _document(laminate).items()
-    )
+    """Return the contents of ``laminate.json``: a row a line."""
+    lines = (f"{json.dumps(key)}: {_rows(value)}" for key, value in _document(laminate).items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def read_laminate(path: Path) -> Laminate:
-    """Return the laminate of a ``laminate.json``: the one that was written, to ``DECIMALS``.
+    """Return the laminate of a ``laminate.json``, equal to the one that was written.
 
     Keys that the format does not know are passed over. Raises DesignError, which names the file and
     the place in it, for what is no such file.
@@ -70,20 +64,11 @@ class _Places:
 
     def of(self, value: Any) -> int:
         """The place of a value, told apart by its text in the file."""
-        text = json.dumps(_rounded(value))
+        text = json.dumps(value)
         if text not in self._places:
             self._places[text] = len(self.values)
             self.values.append(value)
         return self._places[text]
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        # No -0.0, whose sign is such a last bit.
-        return round(value, DECIMALS) + 0.0
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return [_rounded(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _document(laminate: Laminate) -> dict[str, Any]:
@@ -148,9 +133,11 @@ def _shape_rows(region: Region) -> list[list[list[float | bool]]]:
 
 
 def _edge_row(edge: Edge) -> list[float | bool]:
+    # A contour drawn with whole numbers, which compares equal, is written like any other.
+    ends = [*map(float, (*edge.start, *edge.end))]
     if isinstance(edge, Line):
-        return [*edge.start, *edge.end]
-    return [*edge.start, *edge.end, *edge.centre, edge.radius, edge.ccw]
+        return [*ends]
+    return [*ends, *map(float, edge.centre), float(edge.radius), edge.ccw]
 
 
 def _rows(value: Any) -> str:
