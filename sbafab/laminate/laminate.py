@@ -16,6 +16,7 @@ from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
+from sbafab.laminate.joints import Fold, Net, Port, Seam
 from sbafab.markup import escape
 from sbafab.notebook import table_html
 
@@ -214,7 +215,8 @@ class Laminate:
     only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
     ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
     the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
-    layers, mm.
+    layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join halves of one film, and
+    ``nets`` say which ``ports`` are meant to be joined.
     """
 
     name: str
@@ -232,6 +234,10 @@ class Laminate:
     pins_in_full_bonds: bool = False
     panel: SheetPanel | None = None
     tube: float | None = None
+    seams: tuple[Seam, ...] = ()
+    folds: tuple[Fold, ...] = ()
+    ports: tuple[Port, ...] = ()
+    nets: tuple[Net, ...] = ()
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
