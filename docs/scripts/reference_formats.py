@@ -48,7 +48,7 @@ layer's lower face. Films and shapes stand once each; `film`, `shape` and `outli
 | `chambers` | the nets of voids, to which `bores` and `inlets` belong by name |
 | `panel` | registered sheets, `null` without |
 
-`python -I sbafab/output/laminate_validator.py FILE` names every fault at its place, with the standard library alone.
+`python -I sbafab/laminate/laminate_validator.py FILE` names every fault at its place, with the standard library alone.
 
 ## Meshes
 

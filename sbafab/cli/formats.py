@@ -17,11 +17,11 @@ from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
+from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
-from sbafab.output.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule

@@ -28,6 +28,9 @@ from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate_file import FILE as LAMINATE_FILE
+from sbafab.laminate.laminate_file import laminate_json
+from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
 from sbafab.models.calibrated import NONE, load_calibration, shipped_names
@@ -45,9 +48,6 @@ from sbafab.output.checked import (
     limits,
     machine,
 )
-from sbafab.output.laminate_file import FILE as LAMINATE_FILE
-from sbafab.output.laminate_file import laminate_json
-from sbafab.output.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
 from sbafab.pressing.cycles import batch_json, design_runs

@@ -13,9 +13,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.identity import design_sha256
+from sbafab.laminate.laminate_file import read_laminate
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output import artefacts
-from sbafab.output.laminate_file import read_laminate
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Conforming, RunRequest, generate
 from tests.quick import few

@@ -25,7 +25,7 @@ from sbafab.laminate.laminate import (
     Pin,
     SheetPanel,
 )
-from sbafab.output.laminate_validator import FIELDS, SCHEMA, faults
+from sbafab.laminate.laminate_validator import FIELDS, SCHEMA, faults
 
 FILE = "laminate.json"
 

@@ -18,11 +18,11 @@ from sbafab.actuators import build, load_design
 from sbafab.cli.formats import schema_of
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, polygon
+from sbafab.laminate import laminate_validator
 from sbafab.laminate.laminate import ROLES, Laminate
-from sbafab.output import laminate_validator
-from sbafab.output.laminate_file import laminate_json, read_laminate
-from sbafab.output.laminate_validator import FIELDS, HEAD, PANEL, faults
-from sbafab.output.laminate_validator import ROLES as ROLES_OF_THE_FORMAT
+from sbafab.laminate.laminate_file import laminate_json, read_laminate
+from sbafab.laminate.laminate_validator import FIELDS, HEAD, PANEL, faults
+from sbafab.laminate.laminate_validator import ROLES as ROLES_OF_THE_FORMAT
 from tests.properties.designs import Draft, valid
 from tests.properties.test_designs import share
 from tests.site.formats import hold
