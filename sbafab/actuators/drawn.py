@@ -6,29 +6,38 @@ Shapes have names, and are made of others by name: a layer takes one, and so may
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers
 from sbafab.design.files import listed, shown
 from sbafab.design.outline import read_outline, refuse_crossings
 from sbafab.design.records import Design, Drawn, Form, Free
 from sbafab.design.sections import NAME_PATTERN
+from sbafab.design.strands import Strand, polyline
 from sbafab.design.toml_table import Section
 from sbafab.design.units import LONGEST, Length, Millimetres
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import Line, Point, unit
+from sbafab.geometry.contour import Mark, tidy
+from sbafab.geometry.edges import EPSILON, Point, unit
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
 
 Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
 Coordinates = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+Bulge = Annotated[float, Field(ge=-100, le=100)]
+BulgedCoordinates = Annotated[tuple[Coordinate, Coordinate, Bulge], Field(strict=False)]
+Vertex = Annotated[
+    Annotated[Coordinates, Tag("(x, y)")] | Annotated[BulgedCoordinates, Tag("(x, y, bulge)")],
+    Discriminator(lambda row: "(x, y)" if _entries(row) == 2 else "(x, y, bulge)"),
+]
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 DrawnRole = Literal["base", "wall", "cap", "chamber-mask", "separator-mask"]
@@ -42,6 +51,7 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "slot": ("width",),
     "stadium": (),
     "polygon": (),
+    "path": (),
     "file": (),
     "offset": ("by",),
     "fillet": ("radius",),
@@ -74,7 +84,7 @@ class _Row(Section):
 
 
 class NamedShape(_Row):
-    """A shape: a disc, ring, slot, stadium, polygon or drawing, or one made of other shapes."""
+    """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one made of others."""
 
     disc: Length | None = None
     """Diameter of a disc."""
@@ -86,6 +96,10 @@ class NamedShape(_Row):
     """Width along x and length along y of a slot with round ends."""
     polygon: Annotated[tuple[Coordinates, ...], Field(strict=False, min_length=3)] | None = None
     """Corners, in either order."""
+    path: Annotated[tuple[Vertex, ...], Field(strict=False, min_length=2)] | None = None
+    """Corners ``[x, y]`` in either order; ``[x, y, bulge]`` where an arc goes on to the next one.
+    Its bulge is the tangent of a quarter of its angle: 1 for half a circle, less than 0 clockwise.
+    """
     file: str | None = Field(default=None, min_length=1, max_length=1000)
     """A closed path of a DXF or SVG file, round its origin, or else round its centroid."""
     offset: str | None = None
@@ -291,6 +305,10 @@ def _is_table(value: object) -> bool:
     return isinstance(value, Mapping)
 
 
+def _entries(value: object) -> int:
+    return len(value) if isinstance(value, list | tuple) else 0
+
+
 def _check(design: DrawnDesign) -> None:
     """Raises DesignError for what no laminate can be made of."""
     roles = [layer.role for layer in design.layers]
@@ -405,6 +423,8 @@ class ShapeRegions:
             return stadium(centre, *shape.stadium)
         if shape.polygon is not None:
             return _polygon(name, shape.polygon)
+        if shape.path is not None:
+            return _path(name, shape.path)
         return read_outline(self.files[f"shapes.{name}.file"])
 
     def _made(self, name: str, shape: NamedShape) -> Region:
@@ -431,7 +451,7 @@ class ShapeRegions:
         return union(_copies(repeated, shape.count, shape.round, shape.step))
 
 
-PRIMITIVES = ("disc", "ring", "slot", "stadium", "polygon", "file")
+PRIMITIVES = ("disc", "ring", "slot", "stadium", "polygon", "path", "file")
 
 
 def _copies(
@@ -444,12 +464,32 @@ def _copies(
 
 
 def _polygon(name: str, points: Sequence[Point]) -> Region:
-    ends = zip(points, [*points[1:], points[0]], strict=True)
-    if any(start == end for start, end in ends):
-        raise DesignError(f"shapes.{name}.polygon has one corner twice in a row; remove one")
-    loop = tuple(Line(start, end) for start, end in pairwise([*points, points[0]]))
+    loop = _simple_loop(f"shapes.{name}.polygon", [(x, y, 0.0) for x, y in points])
+    return polygon([edge.start for edge in loop])
+
+
+def _path(name: str, vertices: Sequence[tuple[float, ...]]) -> Region:
+    key = f"shapes.{name}.path"
+    marks = []
+    for here, there in pairwise([*vertices, vertices[0]]):
+        x, y, bulge = (*here, 0.0)[:3]
+        # An arc that leaves its chord by nothing has a circle beyond all numbers.
+        height = abs(bulge) * math.dist((x, y), there[:2]) / 2
+        marks.append((x, y, bulge if height > EPSILON else 0.0))
+    contour = tidy(_simple_loop(key, marks))
+    if contour is None:
+        raise DesignError(f"{key} encloses no area; move a corner, or give an edge a bulge")
+    return Region((contour.reversed() if contour.is_hole else contour,))
+
+
+def _simple_loop(key: str, vertices: Sequence[Mark]) -> Strand:
+    """Return the closed loop through x, y and bulge of each corner. Raises DesignError."""
+    corners = [(x, y) for x, y, _ in vertices]
+    if any(start == end for start, end in pairwise([*corners, corners[0]])):
+        raise DesignError(f"{key} has one corner twice in a row; remove one")
+    loop = polyline(vertices, closed=True)
     try:
         refuse_crossings(loop)
     except DesignError as error:
-        raise DesignError(f"shapes.{name}.polygon {error}") from None
-    return polygon(points)
+        raise DesignError(f"{key} {error}") from None
+    return loop

@@ -16,7 +16,7 @@ from sbafab.actuators import build, load_design
 from sbafab.design.files import template_text
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
-from sbafab.geometry.region import disc
+from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
@@ -109,11 +109,34 @@ def test_shapes_have_the_areas_of_closed_formulas(tmp_path: Path) -> None:
     assert area({"slot": [[0, 0], [3, 4]], "width": 2}) == pytest.approx(10)
     assert area({"stadium": [2, 5], "turned": 30}) == pytest.approx(6 + math.pi)
     assert area({"polygon": [[0, 0], [0, 3], [4, 0]]}) == pytest.approx(6)
+    assert area({"path": [[0, 0], [0, 3], [4, 0]]}) == pytest.approx(6)
+    # Half a disc below a square; a segment of 270 degrees taken out of the side of a rectangle.
+    assert area({"path": [[0, 0, 1], [2, 0], [2, 2], [0, 2]]}) == pytest.approx(4 + math.pi / 2)
+    turn = math.radians(270)
+    dented = [[0, 0, -math.tan(turn / 4)], [0, 2**0.5], [0, 5], [-9, 5], [-9, -9], [0, -9]]
+    assert area({"path": dented}) == pytest.approx(9 * 14 - (turn - math.sin(turn)) / 2)
     assert area({"offset": "hole", "by": 1}, hole=hole) == pytest.approx(4 * math.pi)
     around = {"pattern": "hole", "count": 6, "round": [0, 0]}
     assert area(around, hole=hole) == pytest.approx(6 * math.pi)
     line = {"pattern": "hole", "count": 3, "step": [0, 3]}
     assert area(line, hole=hole) == pytest.approx(3 * math.pi)
+
+
+def test_a_path_has_exact_arcs(tmp_path: Path) -> None:
+    def shape(**keys: object) -> Region:
+        data = tables()
+        data["shapes"]["body"] = keys
+        return drawn(tmp_path, {**data, "body": "body"}).outline
+
+    assert shape(path=[[-2, 0, 1], [2, 0, 1]]) == shape(disc=4)
+    sides = [[1, -2], [1, 2, 1], [-1, 2], [-1, -2, 1]]
+    assert shape(path=sides) == shape(stadium=[2, 6])
+    back = [[-1, -2], [-1, 2, -1], [1, 2], [1, -2, -1]]
+    assert shape(path=back, turned=90) == shape(stadium=[2, 6], turned=90)
+    # More than half a turn, and a bulge that bends nothing.
+    arcs = [edge for edge in shape(path=[[0, 0, 2], [3, 0, 1e-300]]).edges if edge.bulge]
+    radius = 3 * (2**2 + 1) / (4 * 2)
+    assert sum(edge.length for edge in arcs) == pytest.approx(radius * 4 * math.atan(2))
 
 
 REFUSED: list[tuple[Sequence[str], object, str]] = [
@@ -139,6 +162,15 @@ REFUSED: list[tuple[Sequence[str], object, str]] = [
         "shapes.mask.polygon crosses or touches itself at x 2.5000, y 2.5000",
     ),
     (("shapes", "mask"), {"polygon": [[0, 0], [0, 0], [5, 0]]}, "has one corner twice in a row"),
+    (
+        ("shapes", "mask"),
+        {"path": [[0, 0], [5, 0], [5, 2, -1], [0, 2]]},
+        "shapes.mask.path crosses or touches itself at x 1.0000, y 0.0000",
+    ),
+    (("shapes", "mask"), {"path": [[0, 0], [9, 0], [9, 0]]}, "path has one corner twice in a row"),
+    (("shapes", "mask"), {"path": [[0, 0], [9, 0]]}, "shapes.mask.path encloses no area; move a"),
+    (("shapes", "mask"), {"path": [[0, 0], [9, 0, 1, 1]]}, "path.1 = [9, 0, 1, 1] must have at"),
+    (("shapes", "mask"), {"path": [[0, 0], [9, 0, 101]]}, "path.1.2 = 101 must be at most 100"),
     (("shapes", "Mask"), {"disc": 3}, "has a shape named 'Mask'; a name is a small letter"),
     (("chambers",), [], "chambers is missing; add a list of"),
     (("layers",), [{"role": "base", "shape": "film"}], "layers has 1 rows, and a stack has 3"),
