@@ -14,7 +14,7 @@ STATES = {
     "models/stack.py": {"Motion"},
     "models/stack_batch.py": {"BatchMotion"},
     "output/artefacts.py": {"DesignFolder"},
-    "rules/sealing.py": {"VoidGraph"},
+    "rules/voids.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},
     "studio/model.py": {"AnswerShapes"},
     "studio/workers.py": {"WaitingJob"},

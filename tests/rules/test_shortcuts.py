@@ -15,7 +15,7 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, freedoms, margins, registration_yield, sealing, tube_fit
+from sbafab.rules import boundary, freedoms, margins, registration_yield, tube_fit, voids
 from sbafab.rules.boundary import facing_films, outward_reach
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -35,7 +35,7 @@ from sbafab.rules.registration_yield import (
     rows_of,
     simulate,
 )
-from sbafab.rules.sealing import _around, _gap
+from sbafab.rules.voids import _around, _gap
 
 Good = Callable[..., Laminate]
 BUILDS = 400
@@ -259,9 +259,9 @@ def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
     laminate = good(*design)
     frame = rectangle((-50, -50), (50, 50))
     gaps = [(one.unbonded, one.contact, frame) for one in laminate.interfaces]
-    gap = sealing._gap.__wrapped__  # type: ignore[attr-defined]
+    gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
     found = [gap(*one) for one in gaps]
-    monkeypatch.setattr(sealing, "_follows", lambda *_: False)
+    monkeypatch.setattr(voids, "_follows", lambda *_: False)
     assert [gap(*one) for one in gaps] == found
     assert any(len(one.touching) > 3 for one in found)
 

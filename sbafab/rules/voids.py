@@ -1,0 +1,253 @@
+"""Voids of a laminate as a graph of the paths that air takes.
+
+Nodes are the connected pieces of unbonded film in each interface, the places in each interface
+where one of the films is missing, the openings of each film, and the outside. The masks seal
+nothing and are not in it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final, Literal, NamedTuple
+
+from sbafab.geometry.boolean import alone, turned_round
+from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import in_reading_order, tidy
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.nearby import widened
+from sbafab.geometry.region import Region, rectangle
+from sbafab.laminate.laminate import Inlet, Interface, Laminate
+from sbafab.rules.boundary import beside, edges_along
+from sbafab.rules.limits import TOLERANCE
+
+INSET: Final = 1e-5
+"""mm from an edge at which a point surely lies on one side of it."""
+
+
+class Void(NamedTuple):
+    """A node: ``level`` is an interface's index, or a layer's for an opening."""
+
+    kind: Literal["outside", "pocket", "separator", "gap", "opening"]
+    level: int = 0
+    piece: int = 0
+
+
+OUTSIDE = Void("outside")
+
+
+@dataclass
+class VoidGraph:
+    """Voids, the points at which they join, and the voids that inlets open into."""
+
+    pieces: dict[Void, Region] = field(default_factory=dict)
+    joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
+    mouths: dict[int, list[Void]] = field(default_factory=dict)
+    """By the inlet's place in ``laminate.inlets``."""
+
+    def join(self, a: Void, b: Void, p: Point) -> None:
+        self.joins.setdefault(a, {}).setdefault(b, p)
+        self.joins.setdefault(b, {}).setdefault(a, p)
+
+    def reached(self, starts: Iterable[Void]) -> dict[Void, Void | None]:
+        """Return every void joined to ``starts`` with its predecessor, nearest first.
+
+        The outside is entered but not passed through.
+        """
+        came: dict[Void, Void | None] = dict.fromkeys(starts)
+        queue = deque(came)
+        while queue:
+            here = queue.popleft()
+            if here == OUTSIDE:
+                continue
+            for there in self.joins.get(here, {}):
+                if there not in came:
+                    came[there] = here
+                    queue.append(there)
+        return came
+
+
+class _Gap(NamedTuple):
+    """Contribution of an interface, by its pattern: pieces by number, joins between them."""
+
+    unbonded: tuple[Region, ...]
+    missing: tuple[Region, ...]
+    touching: tuple[tuple[int, int, Point], ...]
+    outside: int
+
+
+def void_graph(laminate: Laminate) -> VoidGraph:
+    """The graph of all voids; equal interfaces and films are cut into pieces once."""
+    graph = VoidGraph()
+    low_x, low_y, high_x, high_y = laminate.bounds
+    frame = rectangle((low_x - 10, low_y - 10), (high_x + 10, high_y + 10))
+    openings = {
+        pattern: _around(layers[0].profile, frame).pieces
+        for pattern, layers in laminate.patterns.items()
+        if not layers[0].is_mask
+    }
+    outside = {pattern: _outside(pieces, frame) for pattern, pieces in openings.items()}
+    gaps: dict[tuple[str, ...], _Gap] = {}
+    homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
+    opened: dict[int, list[Void]] = {}
+    for interface in laminate.interfaces:
+        gap = gaps.get(interface.pattern)
+        if gap is None:
+            gap = gaps[interface.pattern] = _gap(interface.unbonded, interface.contact, frame)
+        missing = [_missing(interface, home, gap) for home in range(len(gap.missing))]
+        _add_gap(graph, interface, gap, missing, laminate.inlets)
+        for layer in (interface.below, interface.above):
+            key = interface.pattern, layer.pattern
+            if key not in homes:
+                homes[key] = [_home(piece, gap.missing) for piece in openings[layer.pattern]]
+            if layer.index not in opened:
+                opened[layer.index] = [
+                    _opening(layer.index, number, outside[layer.pattern])
+                    for number in range(len(openings[layer.pattern]))
+                ]
+            for opening, (home, p) in zip(opened[layer.index], homes[key], strict=True):
+                if opening is not OUTSIDE or missing[home] is not OUTSIDE:
+                    graph.join(opening, missing[home], p)
+    for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
+        for number, piece in enumerate(openings[layer.pattern]):
+            opening = _opening(layer.index, number, outside[layer.pattern])
+            if opening != OUTSIDE:
+                graph.join(opening, OUTSIDE, _middle(piece.bounds))
+    return graph
+
+
+@cached
+def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
+    pieces = unbonded.pieces
+    missing = _around(contact, frame).pieces
+    touching: list[tuple[int, int, Point]] = []
+    # Where no contours touch, one side of a circle is one void as far as edges go on along it.
+    goes_on = not (_touches_itself(unbonded) or _touches_itself(contact))
+    before: Edge | None = None
+    number = home = 0
+    for edge in edges_along(unbonded, contact):
+        p = edge.at(0.5)
+        if not (goes_on and _follows(before, edge)):
+            home = _holding(missing, beside(edge, -INSET))
+            number = _bounded(pieces, p)
+        touching.append((number, home, p))
+        before = edge
+    touching.sort(key=lambda entry: entry[0])
+    outside = _outside(missing, frame)
+    # Inlets open to the outside; of any other two voids it counts that they join, and first where.
+    joins: dict[tuple[int, int, Point | None], tuple[int, int, Point]] = {}
+    for number, home, p in touching:
+        joins.setdefault((number, home, p if home == outside else None), (number, home, p))
+    return _Gap(pieces, missing, tuple(joins.values()), outside)
+
+
+def _touches_itself(region: Region) -> bool:
+    """Return True if contours meet at a point."""
+    return len({edge.start for edge in region.edges}) < len(region.edges)
+
+
+def _follows(before: Edge | None, edge: Edge) -> bool:
+    """Return True if an arc continues the arc before it, on the same circle."""
+    return (
+        isinstance(before, Arc)
+        and isinstance(edge, Arc)
+        and before.end == edge.start
+        and before.centre == edge.centre
+        and before.radius == edge.radius
+        and before.ccw == edge.ccw
+    )
+
+
+def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
+    """The number of the piece that has ``p`` on an edge."""
+    # Most lie in the box of that piece alone.
+    inside = [
+        number
+        for number, piece in enumerate(pieces)
+        for left, low, right, high in [widened(piece.bounds, TOLERANCE)]
+        if left <= p[0] <= right and low <= p[1] <= high
+    ]
+    if len(inside) == 1:
+        return inside[0]
+    return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
+
+
+def _around(region: Region, frame: Region) -> Region:
+    """The rest of a frame well outside the region: the contours, turned round."""
+    if _touches_itself(region):
+        # Where contours touch at a point, what they leave may hang together otherwise.
+        return frame - region
+    turned = (
+        turned_round(contour) if alone(contour) is contour else tidy(contour.reversed().edges)
+        for contour in region.contours
+    )
+    return Region(
+        in_reading_order([*frame.contours, *(contour for contour in turned if contour is not None)])
+    )
+
+
+def _add_gap(
+    graph: VoidGraph,
+    interface: Interface,
+    gap: _Gap,
+    missing: list[Void],
+    inlets: tuple[Inlet, ...],
+) -> None:
+    voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
+    graph.pieces.update(zip(voids, gap.unbonded, strict=True))
+    for number, home, p in gap.touching:
+        inlet = None
+        if interface.kind == "chamber" and home == gap.outside:
+            inlet = _inlet_at(p, inlets)
+        if inlet is None:
+            graph.join(voids[number], missing[home], p)
+        else:
+            graph.mouths.setdefault(inlet, []).append(voids[number])
+
+
+def _inlet_at(p: Point, inlets: tuple[Inlet, ...]) -> int | None:
+    for number, inlet in enumerate(inlets):
+        dx, dy = p[0] - inlet.mouth[0], p[1] - inlet.mouth[1]
+        along = dx * inlet.direction[0] + dy * inlet.direction[1]
+        across = dx * inlet.direction[1] - dy * inlet.direction[0]
+        if abs(along) <= TOLERANCE and abs(across) <= inlet.width / 2 + TOLERANCE:
+            return number
+    return None
+
+
+def _unbonded(interface: Interface, number: int) -> Void:
+    kind: Literal["pocket", "separator"] = "pocket" if interface.kind == "chamber" else "separator"
+    return Void(kind, interface.index, number)
+
+
+def _missing(interface: Interface, number: int, gap: _Gap) -> Void:
+    return OUTSIDE if number == gap.outside else Void("gap", interface.index, number)
+
+
+def _opening(layer: int, number: int, outside: int) -> Void:
+    return OUTSIDE if number == outside else Void("opening", layer, number)
+
+
+def _outside(pieces: tuple[Region, ...], frame: Region) -> int:
+    """The number of the piece that reaches the frame."""
+    return next(n for n, piece in enumerate(pieces) if piece.bounds[0] == frame.bounds[0])
+
+
+def _home(opening: Region, missing: tuple[Region, ...]) -> tuple[int, Point]:
+    """The piece of a gap that an opening lies over: just one, as film is missing all over it."""
+    edge = max(opening.edges, key=lambda edge: edge.length)
+    return _holding(missing, beside(edge, INSET)), _middle(opening.bounds)
+
+
+def _holding(pieces: tuple[Region, ...], p: Point) -> int:
+    x, y = p
+    for number, piece in enumerate(pieces):
+        left, low, right, high = piece.bounds
+        if left <= x <= right and low <= y <= high and piece.contains(p):
+            return number
+    return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
+
+
+def _middle(box: Bounds) -> Point:
+    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
