@@ -8,21 +8,22 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers
+from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
-from sbafab.design.outline import read_outline, refuse_crossings
-from sbafab.design.records import Design, Drawn, Form, Free
+from sbafab.design.outline import refuse_crossings
+from sbafab.design.records import Design, Drawn, Form, Free, Wrap
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.strands import Strand, polyline
-from sbafab.design.toml_table import Section
-from sbafab.design.units import LONGEST, Length, Millimetres
+from sbafab.design.toml_table import Section, writable
+from sbafab.design.units import LONGEST, Length, LengthOrZero, Millimetres
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Mark, tidy
 from sbafab.geometry.edges import EPSILON, Point, unit
@@ -39,6 +40,7 @@ Vertex = Annotated[
     Discriminator(lambda row: "(x, y)" if _entries(row) == 2 else "(x, y, bulge)"),
 ]
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
+NoteText = Annotated[str, Field(min_length=1, max_length=400), AfterValidator(writable)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
 DrawnRole = Literal["base", "wall", "cap", "chamber-mask", "separator-mask"]
 SHAPE_NAME = re.compile("[a-z][a-z0-9_-]{0,31}")
@@ -67,6 +69,8 @@ MOST_EDGES = 5000
 """Edges of one shape; patterns of patterns would have any number."""
 PLACING = ("at", "turned")
 PATTERNS = ("round", "step")
+FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",)}
+"""Keys that a shape of this kind may have beside those that it needs."""
 
 
 class _Row(Section):
@@ -101,7 +105,11 @@ class NamedShape(_Row):
     Its bulge is the tangent of a quarter of its angle: 1 for half a circle, less than 0 clockwise.
     """
     file: str | None = Field(default=None, min_length=1, max_length=1000)
-    """A closed path of a DXF or SVG file, round its origin, or else round its centroid."""
+    """A DXF or SVG file, or a ``laminate.json``: all that its closed contours enclose, where they
+    lie in it; a contour within another is a hole."""
+    layer: str | None = Field(default=None, min_length=1, max_length=255)
+    """The layer of a DXF file, the group of an SVG file (label or id) or the pattern of a
+    ``laminate.json`` that is the shape; by default all that a drawing shows."""
     offset: str | None = None
     """A shape that is grown ``by`` a distance; less than 0 shrinks it."""
     fillet: str | None = None
@@ -149,7 +157,7 @@ class NamedShape(_Row):
         if kind == "pattern" and len(ways) != 1:
             raise ValueError("is a pattern, which has either round or step; give one of the two")
         for key in given:
-            allowed = (kind, *NEEDS[kind], *PLACING, *(PATTERNS if kind == "pattern" else ()))
+            allowed = (kind, *NEEDS[kind], *PLACING, *FURTHER.get(kind, ()))
             if key not in allowed:
                 raise ValueError(f"is a {kind}, which has no {key}; remove it")
         if self.ring is not None and self.ring[0] <= self.ring[1]:
@@ -210,6 +218,34 @@ class DrawnChamber(_Row):
     """Which way the mouth faces: degrees from x, counter-clockwise."""
     width: Length | None = None
     """Width of its inlet strip as drawn; by default what the tube needs."""
+    length: Length | None = None
+    """Straight run of its inlet strip inward from the mouth; by default ``inlet.tab_length``."""
+
+
+class DrawnPin(_Row):
+    """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """How the fixture and the pages call it."""
+    at: Coordinates
+    """Its place."""
+    diameter: Length
+    """Diameter of the pin."""
+    clearance: LengthOrZero = 0.0
+    """By how much the layers' holes for it are wider."""
+
+
+class DrawnTube(_Row):
+    """The tube that the finished laminate is wrapped round."""
+
+    outer_diameter: Length
+    """Diameter of the tube."""
+    pitch: Length
+    """Distance between neighbouring stacks of balloons round it."""
+    overlap: LengthOrZero = 0.0
+    """Width by which the ends of the wrapped sheet overlap."""
+    glue: str = Field(min_length=1, max_length=120)
+    """What holds the sheet round the tube."""
 
 
 class DrawnDesign(Design):
@@ -229,6 +265,12 @@ class DrawnDesign(Design):
     """The shape of the films without tabs, for the outline's diameter; none by default."""
     lumen: Length | None = None
     """Diameter of the channel through all layers round (0, 0), and of its dowel pin."""
+    pins: Annotated[tuple[DrawnPin, ...], Field(strict=False, max_length=200)] | None = None
+    """The dowel pins, by default one in every bore and in the lumen."""
+    tube: DrawnTube | None = None
+    """The tube that the laminate is wrapped round; none by default."""
+    notes: Annotated[tuple[NoteText, ...], Field(strict=False, max_length=20)] | None = None
+    """Sentences that pictures and pages print; none by default."""
 
     @model_validator(mode="before")
     @classmethod
@@ -243,7 +285,17 @@ class DrawnDesign(Design):
     @property
     def form(self) -> Form:
         stacks = max(1, sum(len(chamber.centres) for chamber in self.chambers))
-        return Form("laminate of drawn layers", stacks, Drawn(), self.lumen, self.lumen)
+        tube = self.tube
+        wrap = None
+        if tube is not None:
+            wrap = Wrap(tube.outer_diameter, tube.pitch, tube.glue, tube.overlap)
+        return Form("laminate of drawn layers", stacks, Drawn(), self.lumen, self.lumen_pin, wrap)
+
+    @property
+    def lumen_pin(self) -> float | None:
+        """Diameter of the pin in the lumen, if there is one."""
+        middle = (pin.diameter for pin in self.pins or () if pin.at == (0.0, 0.0))
+        return next(middle, self.lumen) if self.lumen is not None else None
 
     @property
     def layer_films(self) -> dict[int, str]:
@@ -256,13 +308,19 @@ class DrawnDesign(Design):
 
     @property
     def thickest_pin(self) -> float:
-        return max(super().thickest_pin, self.lumen or 0.0)
+        pins = [pin.diameter for pin in self.pins or ()]
+        return max([super().thickest_pin, self.lumen_pin or 0.0, *pins])
 
     @property
     def drawings(self) -> dict[str, Path]:
         named = {name: shape.file for name, shape in self.shapes.by_name.items()}
         files = {name: self.folder / file for name, file in named.items() if file is not None}
         return {f"shapes.{name}.file": file for name, file in files.items()}
+
+    def outlines(self) -> Iterator[Region]:
+        named = self.shapes.by_name
+        for key, file in self.drawings.items():
+            yield read_drawing(file, named[key.split(".")[1]].layer)
 
     def drawn_from(self, key: str, file: str) -> Self:
         _, name, _ = key.split(".")
@@ -283,9 +341,6 @@ def build(design: DrawnDesign) -> Laminate:
         for centre in chamber.centres
         if balloons > 1
     )
-    pins = [channel_pin(f"chamber{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
-    if design.lumen is not None:
-        pins.append(Pin("lumen", (0.0, 0.0), design.lumen))
     return Laminate(
         name=design.name,
         family=design.family,
@@ -293,10 +348,13 @@ def build(design: DrawnDesign) -> Laminate:
         chambers=chambers,
         bores=bores,
         inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
-        pins=tuple(pins),
+        pins=_pins(design, bores),
         lumen=design.lumen,
         balloons=balloons,
         registration=design.registration.method,
+        notes=design.notes or (),
+        pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        tube=None if design.tube is None else design.tube.outer_diameter,
         outline=Region() if design.body is None else shapes.of(design.body, "body"),
     )
 
@@ -325,10 +383,12 @@ def _check(design: DrawnDesign) -> None:
             "chamber.outline is not for drawn layers; name the file in a shape: "
             f"shapes.pocket.file = {shown(design.chamber.outline)}"
         )
-    if design.registration.method != "channel-pin":
+    method = design.registration.method
+    if method == "sheet" or (method == "ears" and design.pins is None):
+        remedy = ", or draw the ears and list their pins" if method == "ears" else ""
         raise DesignError(
-            f"registration.method = {shown(design.registration.method)} adds parts to layers, and "
-            'drawn ones stay as they are; set it to "channel-pin"'
+            f"registration.method = {shown(method)} adds parts to layers, and drawn ones stay as "
+            f'they are; set it to "channel-pin"{remedy}'
         )
     if len(roles) % 4 != 3:
         raise DesignError(f"layers has {len(roles)} rows, and a stack has 3, 7, 11 ...: {ORDER}")
@@ -362,6 +422,15 @@ def _cuts(design: DrawnDesign, shapes: ShapeRegions) -> list[CutFilm]:
     return cuts
 
 
+def _pins(design: DrawnDesign, bores: Sequence[Bore]) -> tuple[Pin, ...]:
+    if design.pins is not None:
+        return tuple(Pin(pin.name, pin.at, pin.diameter, pin.clearance) for pin in design.pins)
+    pins = [channel_pin(f"chamber{n}", b.centre, design.bore) for n, b in enumerate(bores, 1)]
+    if design.lumen is not None:
+        pins.append(Pin("lumen", (0.0, 0.0), design.lumen))
+    return tuple(pins)
+
+
 def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
     settings = design.inlet
     width = design.strip_width if chamber.width is None else chamber.width
@@ -370,7 +439,7 @@ def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
         chamber.mouth,
         unit(chamber.angle),
         width,
-        settings.tab_length,
+        settings.tab_length if chamber.length is None else chamber.length,
         settings.tube_outer_diameter,
     )
 
@@ -425,7 +494,7 @@ class ShapeRegions:
             return _polygon(name, shape.polygon)
         if shape.path is not None:
             return _path(name, shape.path)
-        return read_outline(self.files[f"shapes.{name}.file"])
+        return read_drawing(self.files[f"shapes.{name}.file"], shape.layer)
 
     def _made(self, name: str, shape: NamedShape) -> Region:
         def region(other: str) -> Region:

@@ -47,7 +47,6 @@ from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
 from sbafab.design.identity import design_sha256
-from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
@@ -355,8 +354,7 @@ def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]
 def _drawn_in_chords(design: Design) -> bool:
     """Return True if an outline of the user's has chords in place of arcs."""
     try:
-        outlines = map(read_outline, design.drawings.values())
-        return any(chords_for_arc(outline) is not None for outline in outlines)
+        return any(chords_for_arc(outline) is not None for outline in design.outlines())
     except (DesignError, OSError):
         return False
 

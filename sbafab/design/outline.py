@@ -16,6 +16,7 @@ from sbafab.design.strands import (
     Traced,
     counted,
     joined,
+    nothing_on,
     place,
     polyline,
     refuse_more_than_limit,
@@ -62,7 +63,7 @@ def read_outline(path: Path) -> Region:
 def understood(path: Path) -> Outline:
     """Return a drawn outline with its size in words. Raises DesignError."""
     try:
-        return _understood(path, _content(path))
+        return _understood(path, content(path))
     except FitError as error:
         raise DesignError(f"outline {path} has a {error}; round it off") from None
     except DesignError as error:
@@ -72,7 +73,7 @@ def understood(path: Path) -> Outline:
 @lru_cache(maxsize=4)
 def _understood(path: Path, content: bytes) -> Outline:
     """The outline of a file that holds this; a run asks for it more than once."""
-    strands, scale = _traced(path)
+    strands, scale = traced(path)
     region, moved = _on_its_axis(_checked(sealed(_one_loop(list(counted(strands))))))
     low_x, low_y, high_x, high_y = region.bounds
     size = f"{high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
@@ -80,12 +81,12 @@ def _understood(path: Path, content: bytes) -> Outline:
     return Outline(region, f"drawn outline: {size}, {scale}{moved}")
 
 
-def _content(path: Path) -> bytes:
-    """Content of the file, if it is no larger than an outline may be."""
+def content(path: Path) -> bytes:
+    """Return the content of a drawing. Raises DesignError if it cannot be read, or is too large."""
     try:
         is_file = path.is_file()
         size = path.stat().st_size if is_file else 0
-        content = path.read_bytes() if is_file and size <= MOST_BYTES else b""
+        text = path.read_bytes() if is_file and size <= MOST_BYTES else b""
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DesignError(f"cannot be read ({reason}); check its path") from None
@@ -93,21 +94,23 @@ def _content(path: Path) -> bytes:
         raise DesignError("does not exist as a file; check its path")
     if size > MOST_BYTES:
         raise DesignError(f"has {size:,} bytes, where at most {MOST_BYTES:,} are allowed")
-    return content
+    return text
 
 
-def _traced(path: Path) -> Traced:
+def traced(path: Path, layer: str | None = None) -> Traced:
+    """Return the strands of a DXF or SVG file, or of one of its layers. Raises DesignError."""
     # Each reader brings its own library, loaded for the format at hand only.
     if path.suffix.lower() == ".dxf":
-        return dxf_strands(path)
+        return dxf_strands(path, layer)
     if path.suffix.lower() == ".svg":
         from sbafab.design.outline_svg import svg_strands
 
-        return svg_strands(path)
+        return svg_strands(path, layer)
     raise DesignError("is neither .dxf nor .svg; export it as one of them")
 
 
-def _one_loop(strands: list[Strand]) -> Strand:
+def closed_loops(strands: list[Strand]) -> list[Strand]:
+    """Return the loops that strands close to. Raises DesignError where one is open or doubled."""
     _refuse_doubles(strands)
     loops, opens = joined(strands)
     if opens:
@@ -120,6 +123,11 @@ def _one_loop(strands: list[Strand]) -> Strand:
         raise DesignError(
             "holds no closed path; draw one of lines, arcs or curves, and explode blocks"
         )
+    return loops
+
+
+def _one_loop(strands: list[Strand]) -> Strand:
+    loops = closed_loops(strands)
     if len(loops) > 1:
         raise DesignError(f"holds {len(loops)} closed paths; keep only the pocket's outline")
     return loops[0]
@@ -227,11 +235,11 @@ MOST_ITEMS = 20_000
 """Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
 
 
-def dxf_strands(path: Path) -> Traced:
+def dxf_strands(path: Path, layer: str | None = None) -> Traced:
     """Every line, arc, circle, polyline, ellipse and spline that the model space shows.
 
-    They must lie in one plane at one height. Raises DesignError, also for what draws by other
-    means, such as block references.
+    They must lie in one plane at one height. Only what lies on ``layer`` counts where that is
+    given. Raises DesignError, also for what draws by other means, such as block references.
     """
     content = path.read_bytes()
     _refuse_excess(content)
@@ -244,12 +252,19 @@ def dxf_strands(path: Path) -> Traced:
             f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
             "inches (1)"
         )
-    return Traced(_strands(drawing, space, MM_PER_UNIT[unit]), SCALES[unit])
+    return Traced(_strands(drawing, space, MM_PER_UNIT[unit], layer), SCALES[unit])
 
 
-def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Strand]:
+def _strands(
+    drawing: Drawing, space: Modelspace, factor: float, layer: str | None
+) -> Iterator[Strand]:
     level: float | None = None
     drawn = [entity for entity in space if entity.dxftype() not in NO_PATHS]
+    if layer is not None:
+        on_layer = [entity for entity in drawn if _layer_of(entity) == layer]
+        if not on_layer:
+            raise nothing_on(layer, sorted({_layer_of(entity) for entity in drawn}))
+        drawn = on_layer
     shown = [entity for entity in drawn if _is_shown(entity, drawing)]
     if drawn and not shown:
         raise DesignError("holds hidden entities only; thaw and switch on the outline's layer")
@@ -268,6 +283,10 @@ def _strands(drawing: Drawing, space: Modelspace, factor: float) -> Iterator[Str
                     "the whole outline flat"
                 )
         yield _read(entity, factor)
+
+
+def _layer_of(entity: Any) -> str:
+    return str(entity.dxf.get("layer", "0")) if entity.dxf.is_supported("layer") else "0"
 
 
 def _is_shown(entity: Any, drawing: Drawing) -> bool:

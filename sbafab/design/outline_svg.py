@@ -13,7 +13,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.design.strands import MOST_EDGES, Strand, Traced, place, refuse_more_than_limit
+from sbafab.design.strands import (
+    MOST_OF_ENTITY,
+    Strand,
+    Traced,
+    nothing_on,
+    place,
+    refuse_more_than_limit,
+)
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import bezier, elliptical_arc, fit_arcs
 from sbafab.geometry.edges import EPSILON, Edge, Line, Point
@@ -411,14 +418,18 @@ class DrawnShape(NamedTuple):
     matrix: Matrix
 
 
-def svg_strands(path: Path) -> Traced:
+def svg_strands(path: Path, layer: str | None = None) -> Traced:
     """Every path and basic shape that is drawn, transforms applied. Raises DesignError.
+
+    Only what stands in the group of the label or id ``layer`` counts where that is given.
 
     The origin is that of the user coordinates, wherever the viewBox begins. A page without a size
     in mm, cm or the like is read as 1 unit = 1 mm, unless lengths in it have such a unit: then 96
     units are an inch, as SVG says.
     """
     root = _root(path)
+    if layer is not None:
+        _keep_layer(root, layer)
     drawn = list(_drawn(root))
     page = page_of(root)
     if any(shape.is_physical for shape, _ in drawn):
@@ -479,7 +490,7 @@ def _refuse_excess(root: ElementTree.Element) -> None:
         for key in ("d", "points"):
             count += len(MARK.findall(element.get(key, "")))
     # A letter and seven numbers make the longest segment, an arc.
-    if count > 8 * MOST_EDGES:
+    if count > 8 * MOST_OF_ENTITY:
         refuse_more_than_limit(count)
 
 
@@ -507,6 +518,30 @@ def _drawn(root: ElementTree.Element) -> Iterator[DrawnShape]:
             waiting += [(inner, matrix, shown) for inner in reversed(element)]
         elif shown:
             yield DrawnShape(sized(element), matrix)
+
+
+LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+"""The name that Inkscape shows of a layer or group."""
+
+
+def _keep_layer(root: ElementTree.Element, layer: str) -> None:
+    """Take all but one layer, and the groups that it stands in, out of a drawing."""
+    groups = [element for element in root.iter() if local(element) in GROUPS]
+    named = [group for group in groups if layer in (group.get(LABEL), group.get("id"))]
+    if not named:
+        others = sorted({name for group in groups if (name := group.get(LABEL) or group.get("id"))})
+        raise nothing_on(layer, others)
+    holder_of = {child: element for element in root.iter() for child in element}
+    holders = set()
+    for group in named:
+        inner = group
+        while (holder := holder_of.get(inner)) is not None:
+            holders.add(holder)
+            inner = holder
+    for holder in holders.difference(named):
+        for child in list(holder):
+            if child not in holders and child not in named:
+                holder.remove(child)
 
 
 def _refuse_undrawn(root: ElementTree.Element) -> None:

@@ -39,6 +39,7 @@ from sbafab.design.films import (
     without_other_products,
 )
 from sbafab.design.kits import inlet_of_kit, load_kit, under_kit
+from sbafab.design.outline import read_outline
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -60,6 +61,7 @@ from sbafab.design.sections import (
 )
 from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
+from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.notebook import table_html
 
@@ -115,6 +117,10 @@ class Design(Section):
     def drawings(self) -> dict[str, Path]:
         """The files of all drawn outlines, by the keys that name them."""
         return {} if self.drawing is None else {OUTLINE: self.drawing}
+
+    def outlines(self) -> Iterator[Region]:
+        """Return the regions of all drawings. Raises DesignError if one cannot be read."""
+        return map(read_outline, self.drawings.values())
 
     @property
     def layer_films(self) -> dict[int, str]:

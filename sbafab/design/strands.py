@@ -17,6 +17,9 @@ Strand = tuple[Edge, ...]
 JOIN = 0.001
 """Ends at most this far apart, in mm, are joined."""
 MOST_EDGES = 500
+"""Edges of an outline."""
+MOST_OF_ENTITY = 5000
+"""Edges of anything that a drawing holds."""
 FARTHEST = 10_000.0
 """No coordinate of a drawing may be larger, in mm."""
 
@@ -38,20 +41,24 @@ def place(x: float, y: float) -> Point:
     return float(x), float(y)
 
 
-def counted(strands: Iterable[Strand]) -> Iterator[Strand]:
-    """The strands as they come, until they have too many edges: then DesignError."""
+def nothing_on(layer: str, others: Sequence[str]) -> DesignError:
+    """Return the error of a layer that holds nothing, with the names of ``others`` that do."""
+    hint = f"paths lie on {', '.join(others)}" if others else "no layer has any"
+    return DesignError(f"has no paths on a layer {layer!r}; {hint}")
+
+
+def counted(strands: Iterable[Strand], most: int = MOST_EDGES) -> Iterator[Strand]:
+    """The strands as they come, until they have more than ``most`` edges: then DesignError."""
     total = 0
     for strand in strands:
         total += len(strand)
-        refuse_more_than_limit(total)
+        refuse_more_than_limit(total, most)
         yield strand
 
 
-def refuse_more_than_limit(edges: int) -> None:
-    if edges > MOST_EDGES:
-        raise DesignError(
-            f"has more than {MOST_EDGES} edges; draw the outline with fewer, longer curves"
-        )
+def refuse_more_than_limit(edges: int, most: int = MOST_OF_ENTITY) -> None:
+    if edges > most:
+        raise DesignError(f"has more than {most} edges; draw the outline with fewer, longer curves")
 
 
 def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Strand:

@@ -158,7 +158,7 @@ BAD_SVG = {
     "no width": ('<circle r="2"/>', 'width="0mm" viewBox="0 0 1 1"', "width or height"),
     "many elements": ("<g/>" * 2001, PAGE, "more than 2000 elements"),
     "nested deeply": ("<g>" * 1500 + "</g>" * 1500, PAGE, "no closed path"),
-    "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 500 edges"),
+    "long path": (f'<path d="M0 0{"c1 1 2 2 3 3" * 3000}"/>', PAGE, "more than 5000 edges"),
     "broken": ("<circle", PAGE, "not valid SVG"),
 }
 
