@@ -9,6 +9,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -26,10 +27,18 @@ from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import LONGEST, Length, LengthOrZero, Millimetres
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Mark, tidy
-from sbafab.geometry.edges import EPSILON, Point, unit
+from sbafab.geometry.edges import EPSILON, Edge, Point, unit
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
-from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Pin
+from sbafab.laminate.joints import (
+    Fold,
+    Seam,
+    SeamKind,
+    SeamTool,
+    balloon_numbers,
+    chamber_gaps,
+)
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, Role
 
 Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
 Coordinates = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
@@ -42,7 +51,7 @@ Vertex = Annotated[
 Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 NoteText = Annotated[str, Field(min_length=1, max_length=400), AfterValidator(writable)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
-DrawnRole = Literal["base", "wall", "cap", "chamber-mask", "separator-mask"]
+LayerPair = Annotated[tuple[int, int], Field(strict=False)]
 SHAPE_NAME = re.compile("[a-z][a-z0-9_-]{0,31}")
 MOST_SHAPES = 200
 MOST_LAYERS = 500
@@ -62,9 +71,6 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "pattern": ("count",),
 }
 """Keys of a shape, of which it has just one, and the keys that this one needs beside it."""
-ORDER = (
-    "base, chamber-mask, for each further balloon wall, separator-mask, wall, chamber-mask, and cap"
-)
 MOST_EDGES = 5000
 """Edges of one shape; patterns of patterns would have any number."""
 PLACING = ("at", "turned")
@@ -195,14 +201,16 @@ class NamedShapes(Section):
 class DrawnLayer(_Row):
     """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
 
-    role: DrawnRole
-    """What the layer is for."""
+    role: Role
+    """What the layer is for: base, wall, cap or sheet of a structural film, or a mask."""
     shape: str
     """The name of its shape."""
     film: str | None = None
     """The film that it is cut from, as in ``layup``; by default that of its role there."""
     pieces: int = Field(default=1, ge=1, le=1000)
     """Separate parts that it is meant to have (rule piece-count)."""
+    turned: bool | None = None
+    """Whether it lies with its upper face down; the upper half of a fold does, by itself."""
 
 
 class DrawnChamber(_Row):
@@ -220,6 +228,8 @@ class DrawnChamber(_Row):
     """Width of its inlet strip as drawn; by default what the tube needs."""
     length: Length | None = None
     """Straight run of its inlet strip inward from the mouth; by default ``inlet.tab_length``."""
+    balloons: Annotated[tuple[int, ...], Field(strict=False, min_length=1)] | None = None
+    """The chamber gaps that it has pockets in, from 1 at the bottom; all by default."""
 
 
 class DrawnPin(_Row):
@@ -248,6 +258,53 @@ class DrawnTube(_Row):
     """What holds the sheet round the tube."""
 
 
+class DrawnSeam(_Row):
+    """A seam: two films bonded by a moving tool along a path."""
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """How findings, pages and files call it."""
+    layers: LayerPair
+    """The two films, by their numbers in ``layers``; only masks may lie between them."""
+    shape: str | None = None
+    """The shape whose boundary is the path of the tool's middle."""
+    path: Annotated[tuple[Vertex, ...], Field(strict=False, min_length=2)] | None = None
+    """Or the corners of the path, in order; a third number bulges the edge to the next into an
+    arc."""
+    closed: bool = False
+    """Whether the path goes back to its first corner."""
+    width: Length
+    """Width of the bond, half of it on either side of the path."""
+    tool: SeamTool
+    """What makes it: laser, hot-tip, ultrasonic or roller; a roller's ends are square."""
+    kind: SeamKind = "lap"
+    """How the films lie: lap, flat on each other; fin, with their edges standing out."""
+
+    @model_validator(mode="after")
+    def _has_one_path(self) -> Self:
+        if (self.shape is None) == (self.path is None):
+            raise ValueError("has either a shape or a path; give one of the two")
+        if self.shape is not None and self.closed:
+            raise ValueError("has a shape, whose boundary is closed; remove closed")
+        if self.path is not None and any(a[:2] == b[:2] for a, b in pairwise(self.path)):
+            raise ValueError("has one corner of its path twice in a row; remove one")
+        return self
+
+
+class DrawnFold(_Row):
+    """A film folded along a straight line into two layers."""
+
+    layers: LayerPair
+    """The halves, by their numbers in ``layers``, the lower one first."""
+    line: Annotated[tuple[Coordinates, Coordinates], Field(strict=False)]
+    """Two points of the line, which both halves end at."""
+
+    @model_validator(mode="after")
+    def _has_a_line(self) -> Self:
+        if self.line[0] == self.line[1]:
+            raise ValueError("has a line whose ends are one point; move one of them")
+        return self
+
+
 class DrawnDesign(Design):
     """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
     and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
@@ -261,6 +318,10 @@ class DrawnDesign(Design):
     shapes: NamedShapes = NamedShapes.model_construct()
     chambers: Annotated[tuple[DrawnChamber, ...], Field(strict=False, max_length=100)] = ()
     """The chambers, each with its inlet."""
+    seams: Annotated[tuple[DrawnSeam, ...], Field(strict=False, max_length=200)] | None = None
+    """The seams, in the order in which they are made; none by default."""
+    folds: Annotated[tuple[DrawnFold, ...], Field(strict=False, max_length=100)] | None = None
+    """The folds; none by default."""
     body: str | None = None
     """The shape of the films without tabs, for the outline's diameter; none by default."""
     lumen: Length | None = None
@@ -275,11 +336,18 @@ class DrawnDesign(Design):
     @model_validator(mode="before")
     @classmethod
     def _balloons_are_counted(cls, data: Any) -> Any:
-        """One balloon for each chamber mask, unless the file says how many there are."""
+        """One balloon for each gap with a chamber, unless the file says how many there are."""
         rows, stack = data.get("layers"), data.get("stack", {})
         if not isinstance(rows, list | tuple) or not _is_table(stack) or "balloons" in stack:
             return data
-        count = sum(_is_table(row) and row.get("role") == "chamber-mask" for row in rows)
+        roles = [str(row.get("role")) if _is_table(row) else "" for row in rows]
+        seams = data.get("seams")
+        pairs = {
+            tuple(row["layers"])
+            for row in (seams if isinstance(seams, list | tuple) else ())
+            if _is_table(row) and isinstance(row.get("layers"), list | tuple)
+        }
+        count = sum(chamber_gaps(roles, pairs).values())
         return {**data, "stack": {**stack, "balloons": count}} if count else data
 
     @property
@@ -301,6 +369,14 @@ class DrawnDesign(Design):
     def layer_films(self) -> dict[int, str]:
         rows = enumerate(self.layers, start=1)
         return {number: row.film for number, row in rows if row.film is not None}
+
+    @property
+    def layer_roles(self) -> tuple[str, ...]:
+        return tuple(row.role for row in self.layers)
+
+    @property
+    def seamed_layers(self) -> frozenset[tuple[int, int]]:
+        return frozenset(seam.layers for seam in self.seams or ())
 
     @property
     def free(self) -> tuple[Free, ...]:
@@ -334,17 +410,20 @@ def build(design: DrawnDesign) -> Laminate:
     shapes = ShapeRegions(design)
     balloons = design.stack.balloons
     cuts = _cuts(design, shapes)
-    chambers = tuple(Chamber(chamber.name, chamber.centres) for chamber in design.chambers)
+    chambers = tuple(
+        Chamber(chamber.name, chamber.centres, chamber.balloons or ())
+        for chamber in design.chambers
+    )
     bores = tuple(
         Bore(chamber.name, centre, design.bore.diameter)
         for chamber in chambers
         for centre in chamber.centres
-        if balloons > 1
+        if len(chamber.balloons or range(balloons)) > 1
     )
     return Laminate(
         name=design.name,
         family=design.family,
-        layers=layers(cuts, design),
+        layers=_turned(layers(cuts, design), design),
         chambers=chambers,
         bores=bores,
         inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
@@ -356,6 +435,19 @@ def build(design: DrawnDesign) -> Laminate:
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
         tube=None if design.tube is None else design.tube.outer_diameter,
         outline=Region() if design.body is None else shapes.of(design.body, "body"),
+        seams=tuple(
+            Seam(
+                seam.name,
+                *seam.layers,
+                _seam_path(seam, shapes),
+                seam.width,
+                seam.tool,
+                seam.kind,
+                number,
+            )
+            for number, seam in enumerate(design.seams or (), start=1)
+        ),
+        folds=tuple(Fold(*fold.layers, fold.line) for fold in design.folds or ()),
     )
 
 
@@ -390,36 +482,88 @@ def _check(design: DrawnDesign) -> None:
             f"registration.method = {shown(method)} adds parts to layers, and drawn ones stay as "
             f'they are; set it to "channel-pin"{remedy}'
         )
-    if len(roles) % 4 != 3:
-        raise DesignError(f"layers has {len(roles)} rows, and a stack has 3, 7, 11 ...: {ORDER}")
-    for number, (role, asked) in enumerate(zip(roles, _order(len(roles)), strict=True), start=1):
-        if role != asked:
-            raise DesignError(f"layer {number} is a {role}, where a {asked} belongs: {ORDER}")
-    count = roles.count("chamber-mask")
+    _check_order(roles)
+    pairs = chamber_gaps(roles, design.seamed_layers)
+    _check_seams(design, list(pairs))
+    count = sum(pairs.values())
+    if not count:
+        raise DesignError(
+            "layers has no gap with a chamber; lay a chamber-mask between two films, or bond them "
+            "by seams"
+        )
     if count != design.stack.balloons:
         raise DesignError(
-            f"stack.balloons = {design.stack.balloons}, and layers has {count} chamber-mask; each "
-            "balloon has one: leave stack.balloons out, or correct the roles"
+            f"stack.balloons = {design.stack.balloons}, and layers has {count} gaps with a "
+            "chamber; each balloon has one: leave stack.balloons out, or correct the roles"
         )
+    for number, chamber in enumerate(design.chambers):
+        strange = [balloon for balloon in chamber.balloons or () if not 1 <= balloon <= count]
+        if strange:
+            raise DesignError(
+                f"chambers.{number}.balloons = {strange[0]} is none of the {count} gaps with a "
+                "chamber; they count from 1 at the bottom"
+            )
 
 
-def _order(count: int) -> list[str]:
-    """The roles of a stack of so many layers: 3, and 4 more for each further balloon."""
-    turn = ("wall", "separator-mask", "wall", "chamber-mask")
-    between = [turn[(number + 3) % 4] for number in range(count - 2)]
-    return ["base", *between, "cap"]
+def _check_order(roles: Sequence[str]) -> None:
+    """Raises DesignError for layers that no stack can be made of."""
+    masks = [role.endswith("-mask") for role in roles]
+    if masks.count(False) < 2:
+        raise DesignError(
+            f"layers has {masks.count(False)} structural films; a laminate has two at least"
+        )
+    for number in (1, len(roles)):
+        if masks[number - 1]:
+            raise DesignError(
+                f"layer {number} is a {roles[number - 1]} with no film on its other side; masks "
+                "lie between films: add one, or remove the mask"
+            )
+    for number, (role, mask) in enumerate(zip(roles[1:], roles, strict=False), start=2):
+        if role.endswith("-mask") and mask.endswith("-mask") and role != mask:
+            raise DesignError(
+                f"layer {number} is a {role} on a {mask}: masks between two films have one role, "
+                "that of the gap"
+            )
+
+
+def _check_seams(design: DrawnDesign, pairs: Sequence[tuple[int, int]]) -> None:
+    """Raises DesignError for seams and folds that do not lie between neighbouring films."""
+    seams = design.seams or ()
+    names = [seam.name for seam in seams]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DesignError(f"seams has {shown(twice)} twice; give each seam its name")
+    for seam in seams:
+        if seam.layers not in pairs:
+            raise DesignError(
+                f"seam {seam.name}: layers {list(seam.layers)} are not two films that lie next to "
+                f"each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
+            )
+
+
+def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
+    """The layers, those turned that lie face down."""
+    return tuple(
+        replace(layer, turned=True) if row.turned else layer
+        for layer, row in zip(stack, design.layers, strict=True)
+    )
+
+
+def _seam_path(seam: DrawnSeam, shapes: ShapeRegions) -> tuple[tuple[Edge, ...], ...]:
+    if seam.shape is not None:
+        region = shapes.of(seam.shape, f"seam {seam.name}")
+        return tuple(contour.edges for contour in region.contours)
+    marks = _marks(seam.path or ())
+    return (polyline(marks, closed=seam.closed and marks[0][:2] != marks[-1][:2]),)
 
 
 def _cuts(design: DrawnDesign, shapes: ShapeRegions) -> list[CutFilm]:
     """The layers, each with the number of its balloon."""
-    cuts, balloon = [], 0
-    roles = [layer.role for layer in design.layers]
-    for number, layer in enumerate(design.layers, start=1):
-        # A film belongs to the pocket that it faces.
-        balloon += roles[number : number + 1] == ["chamber-mask"]
-        profile = shapes.of(layer.shape, f"layer {number}")
-        cuts.append(CutFilm(layer.role, profile, balloon, layer.pieces))
-    return cuts
+    balloons = balloon_numbers(design.layer_roles, design.seamed_layers)
+    return [
+        CutFilm(row.role, shapes.of(row.shape, f"layer {number}"), balloon, row.pieces)
+        for number, (row, balloon) in enumerate(zip(design.layers, balloons, strict=True), start=1)
+    ]
 
 
 def _pins(design: DrawnDesign, bores: Sequence[Bore]) -> tuple[Pin, ...]:
@@ -539,16 +683,21 @@ def _polygon(name: str, points: Sequence[Point]) -> Region:
 
 def _path(name: str, vertices: Sequence[tuple[float, ...]]) -> Region:
     key = f"shapes.{name}.path"
+    contour = tidy(_simple_loop(key, _marks(vertices)))
+    if contour is None:
+        raise DesignError(f"{key} encloses no area; move a corner, or give an edge a bulge")
+    return Region((contour.reversed() if contour.is_hole else contour,))
+
+
+def _marks(vertices: Sequence[tuple[float, ...]]) -> list[Mark]:
+    """Return x, y and bulge of each corner of a path."""
     marks = []
     for here, there in pairwise([*vertices, vertices[0]]):
         x, y, bulge = (*here, 0.0)[:3]
         # An arc that leaves its chord by nothing has a circle beyond all numbers.
         height = abs(bulge) * math.dist((x, y), there[:2]) / 2
         marks.append((x, y, bulge if height > EPSILON else 0.0))
-    contour = tidy(_simple_loop(key, marks))
-    if contour is None:
-        raise DesignError(f"{key} encloses no area; move a corner, or give an edge a bulge")
-    return Region((contour.reversed() if contour.is_hole else contour,))
+    return marks
 
 
 def _simple_loop(key: str, vertices: Sequence[Mark]) -> Strand:

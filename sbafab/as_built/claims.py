@@ -19,6 +19,7 @@ from sbafab.cutting.properties import (
     warning_property,
 )
 from sbafab.design.records import Design
+from sbafab.laminate.joints import chamber_gaps
 from sbafab.laminate.laminate import Layer
 from sbafab.output.checked import kerf_widths, limits, warnings
 from sbafab.output.manifest import (
@@ -102,8 +103,9 @@ def _links(folder: Path) -> list[str]:
 def order_problems(claims: Manifest, design: Design) -> list[Problem]:
     """Return indices, names, roles and films that do not fit their place in the stack."""
     problems = []
-    expected = _roles([layer.role for layer in claims.layers])
-    for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=True), start=1):
+    expected = [*design.layer_roles] or _roles([layer.role for layer in claims.layers])
+    expected += ["none"] * (len(claims.layers) - len(expected))
+    for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=False), start=1):
         if layer.index != position:
             problems.append(
                 claim(f"layer {position} of the manifest has index {layer.index}", position)
@@ -194,7 +196,8 @@ def _film_problems(claims: Manifest, stock: Mapping[str, float]) -> list[Problem
 
 def design_problems(claims: Manifest, design: Design, digest: str) -> list[Problem]:
     """Return differences of the manifest from the design beside it."""
-    balloons = sum(layer.role == "chamber-mask" for layer in claims.layers)
+    gaps = chamber_gaps([layer.role for layer in claims.layers], design.seamed_layers)
+    balloons = sum(gaps.values())
     agree = (
         ("design_sha256", claims.design_sha256[:12], digest[:12]),
         ("name", claims.name, design.name),

@@ -14,6 +14,7 @@ from sbafab.geometry.contour import Contour, tidy
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film
+from sbafab.laminate.joints import balloon_numbers
 from sbafab.laminate.laminate import (
     LOOSE,
     Bore,
@@ -87,13 +88,10 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
     """Return the layers of readable files in order; equal profiles share a pattern."""
     patterns: dict[tuple[str, str], str] = {}
     layers = []
-    z, balloon = 0.0, 0
-    for number, file in enumerate(files):
+    z = 0.0
+    balloons = balloon_numbers([file.claim.role for file in files], design.seamed_layers)
+    for file, balloon in zip(files, balloons, strict=True):
         claim = file.claim
-        following = files[number + 1].claim.role if number + 1 < len(files) else None
-        balloon += claim.role == "chamber-mask"
-        is_below = not claim.role.endswith("-mask") and following == "chamber-mask"
-        layer_balloon = balloon + 1 if is_below else balloon
         if file.part is not None:
             shape = (claim.material, file.part.region.key)
             layers.append(
@@ -102,7 +100,7 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
                     role=claim.role,
                     film=_film(claim, design),
                     profile=file.part.region,
-                    balloon=None if claim.role == "sheet" or layer_balloon == 0 else layer_balloon,
+                    balloon=balloon,
                     z=round(z, 9),
                     pieces=1,
                     pattern=patterns.setdefault(shape, f"P{len(patterns) + 1:02d}"),

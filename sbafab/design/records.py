@@ -128,6 +128,16 @@ class Design(Section):
         return {}
 
     @property
+    def layer_roles(self) -> tuple[str, ...]:
+        """The roles of all layers, bottom to top, where the design lists them; else none."""
+        return ()
+
+    @property
+    def seamed_layers(self) -> frozenset[tuple[int, int]]:
+        """Pairs of layers, by index, that seams bond."""
+        return frozenset()
+
+    @property
     def thickest_pin(self) -> float:
         """Diameter of the thickest dowel pin that the design may need, mm."""
         return max(self.bore.pin, self.registration.pin_diameter)

@@ -25,7 +25,7 @@ from sbafab.geometry.edges import (
     meeting_points,
 )
 from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
-from sbafab.geometry.region import Region, enclosed, wound
+from sbafab.geometry.region import Region, enclosed, union, wound
 
 CUSP = 3.0
 """Radians: a path that turns by more is taken to turn back on itself."""
@@ -590,3 +590,37 @@ def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
             edges[0] = edges[0].part(start, edges[0].end)
             edges[-1] = edges[-1].part(edges[-1].start, end)
             yield from edges
+
+
+# Strips: what a tool of some width covers on its way along a path.
+
+
+def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
+    """Return what a tool of a ``width``, mm, covers along a chain of edges, with exact arcs.
+
+    A closed chain is covered by half the width on both sides. An open one ends round, or square;
+    where it bends the tool turns on the spot, so corners are round outside.
+    """
+    half = width / 2
+    if math.dist(path[0].start, path[-1].end) < EPSILON:
+        loop = Contour(tuple(path))
+        inside = Region((loop if loop.area > 0 else loop.reversed(),))
+        return grow(inside, half) - shrink(inside, half)
+    joints = [edge.start for edge in path[1:]]
+    ends = [path[0].start, path[-1].end] if has_round_ends else []
+    discs = [Region((circle(p, half),)) for p in (*joints, *ends)]
+    return union([*(_band(edge, half) for edge in path), *discs])
+
+
+def _band(edge: Edge, half: float) -> Region:
+    """Return what lies within ``half`` of an edge, mm, on normals of it."""
+    right, left = edge.offset(half), edge.offset(-half)
+    if right is not None and left is not None:
+        sides: list[Edge] = [right, Line(right.end, left.end), left.reversed()]
+        return Region((Contour((*sides, Line(left.start, right.start))),))
+    # The inner side of an arc of a small radius shrinks to its centre.
+    outer = right if right is not None else left
+    assert isinstance(edge, Arc)
+    assert outer is not None
+    loop = Contour((outer, Line(outer.end, edge.centre), Line(edge.centre, outer.start)))
+    return Region((loop if loop.area > 0 else loop.reversed(),))

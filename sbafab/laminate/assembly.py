@@ -80,14 +80,23 @@ def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
         )
     films = [layer for layer in laminate.layers if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
-    upper = tuple(index for index in indices if base < index <= base + 2)
+    wall = next((layer.index for layer in films if layer.index > base), base)
+    upper = tuple(index for index in indices if base < index <= wall)
     bottom = (base, *upper)
     under = tuple(index for index in indices if index < base)
-    over = tuple(index for index in indices if index > base + 2)
+    over = tuple(index for index in indices if index > wall)
     middle, cap = over[:-1], over[-1:]
+    if len(upper) < 2:
+        first = [_Plan("bond_bottom", "full", (bottom,), bottom)]
+    else:
+        first = [
+            _Plan("flash_bottom", "flash", (upper,), upper),
+            _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+        ]
+    if len(middle) < 2:
+        middle, cap = (), over
     return (
-        _Plan("flash_bottom", "flash", (upper,), upper),
-        _Plan("bond_bottom", "full", ((base,), upper), (base,)),
+        *first,
         _Plan("flash_middle", "flash", (middle,), middle),
         _Plan("bond_all", "full", (under, bottom, middle, cap), under + cap),
     )

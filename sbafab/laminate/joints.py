@@ -6,15 +6,42 @@ their index, counted from 1 at the bottom.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
+from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Edge, Point
+from sbafab.geometry.offset import swept
+from sbafab.geometry.region import Region, union
 
 SeamTool = Literal["laser", "hot-tip", "ultrasonic", "roller"]
 """A moving tool that bonds two films along a path."""
 SeamKind = Literal["lap", "fin"]
 """A lap seam bonds films that lie flat on each other; a fin seam bonds edges that stand out."""
+BondProcess = Literal["press", "laser", "hot-tip", "ultrasonic", "roller"]
+"""What bonds two faces: the heat press, or the tool of a seam."""
+PRESS: BondProcess = "press"
+
+
+@dataclass(frozen=True)
+class FaceBond:
+    """Two face materials that bond to each other, in either order, and what bonds them.
+
+    ``temperature_c`` is that at which they bond, C, None if nobody stated it; ``after`` names the
+    bond that must be made before.
+    """
+
+    name: str
+    faces: tuple[str, str]
+    by: BondProcess
+    temperature_c: float | None = None
+    after: str | None = None
+
+    def joins(self, a: str, b: str) -> bool:
+        """Return True for these two faces."""
+        return {a, b} == set(self.faces)
 
 
 @dataclass(frozen=True)
@@ -33,6 +60,12 @@ class Seam:
     tool: SeamTool
     kind: SeamKind = "lap"
     order: int = 1
+
+    @cached_attribute
+    def region(self) -> Region:
+        """What the tool covers: half of the width on both sides of the path."""
+        is_round = self.tool != "roller"
+        return union([swept(chain, self.width, is_round) for chain in self.path])
 
 
 @dataclass(frozen=True)
@@ -67,3 +100,46 @@ class Net:
 
     name: str
     ports: tuple[str, ...]
+
+
+# Gaps that hold chambers, and the balloons that films belong to, by roles from the bottom up.
+
+
+def chamber_gaps(
+    roles: Sequence[str], seams: Collection[tuple[int, int]] = ()
+) -> dict[tuple[int, int], bool]:
+    """Return the gaps between structural layers, by their layers' indices: True if a chamber.
+
+    A chamber mask makes a chamber, and so do seams without any mask, unless one of the layers is a
+    sheet, or a cap lies below or a base above: these end balloons. ``seams`` are pairs of layers.
+    """
+    films = [index for index, role in enumerate(roles, 1) if not role.endswith("-mask")]
+    gaps = {}
+    for below, above in pairwise(films):
+        masks = roles[below : above - 1]
+        ends = {"sheet", "cap"} & {roles[below - 1]} or {"sheet", "base"} & {roles[above - 1]}
+        gaps[below, above] = "chamber-mask" in masks or (
+            not masks and (below, above) in seams and not ends
+        )
+    return gaps
+
+
+def balloon_numbers(
+    roles: Sequence[str], seams: Collection[tuple[int, int]] = ()
+) -> list[int | None]:
+    """Return the balloon of every layer, counted from 1 at the bottom.
+
+    A film belongs to the chamber above it, or else to the one below. A sheet belongs to none, and
+    neither does a mask beside it.
+    """
+    numbers: list[int | None] = [None] * len(roles)
+    count = 0
+    for (below, above), is_chamber in chamber_gaps(roles, seams).items():
+        count += is_chamber
+        is_beside = not is_chamber and "sheet" in (roles[below - 1], roles[above - 1])
+        for index in range(below, above):
+            is_none = roles[index - 1] == "sheet" or (is_beside and index > below)
+            numbers[index - 1] = None if is_none else max(1, count)
+    if roles and roles[-1] != "sheet":
+        numbers[-1] = max(1, count)
+    return numbers

@@ -16,7 +16,7 @@ from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
-from sbafab.laminate.joints import Fold, Net, Port, Seam
+from sbafab.laminate.joints import PRESS, FaceBond, Fold, Net, Port, Seam, chamber_gaps
 from sbafab.markup import escape
 from sbafab.notebook import table_html
 
@@ -118,7 +118,7 @@ class Layer:
     ``index`` counts from 1 at the bottom; ``balloon`` likewise (None for a sheet and its mask);
     ``z`` is the height of the layer's lower face with every film at its nominal thickness.
     ``pieces`` is the number of separate parts of its role. ``pattern`` names the shape: equal
-    profiles of one material share it.
+    profiles of one material share it. A layer that is ``turned`` lies with its upper face down.
     """
 
     index: int
@@ -129,6 +129,7 @@ class Layer:
     z: float
     pieces: int
     pattern: str
+    turned: bool = False
 
     @property
     def name(self) -> str:
@@ -142,6 +143,12 @@ class Layer:
     def is_mask(self) -> bool:
         """True if nothing bonds to it."""
         return self.film.is_mask
+
+    @property
+    def faces(self) -> tuple[str, str]:
+        """What its faces are of as it lies, the upper one first."""
+        upper, lower = self.film.faces or (self.film.material, self.film.material)
+        return (lower, upper) if self.turned else (upper, lower)
 
     def _repr_html_(self) -> str:
         return layer_html(self)
@@ -164,11 +171,17 @@ class Chamber:
     """A chamber: balloons that share one inlet.
 
     ``centres`` holds a point (x, y) in mm inside the pocket of every stack the chamber feeds: one,
-    or several where pockets are joined by a manifold.
+    or several where pockets are joined by a manifold. ``balloons`` are those with pockets of it,
+    counted from 1 at the bottom; all if empty.
     """
 
     name: str
     centres: tuple[Point, ...]
+    balloons: tuple[int, ...] = ()
+
+    def is_in(self, balloon: int) -> bool:
+        """Return True if the chamber has a pocket in a balloon."""
+        return not self.balloons or balloon in self.balloons
 
 
 @dataclass(frozen=True)
@@ -216,7 +229,8 @@ class Laminate:
     ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
     the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
     layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join halves of one film, and
-    ``nets`` say which ``ports`` are meant to be joined.
+    ``nets`` say which ``ports`` are meant to be joined. ``bonds`` say which faces bond, and by
+    what; without any all structural faces bond in the press, but where seams bond them.
     """
 
     name: str
@@ -238,6 +252,7 @@ class Laminate:
     folds: tuple[Fold, ...] = ()
     ports: tuple[Port, ...] = ()
     nets: tuple[Net, ...] = ()
+    bonds: tuple[FaceBond, ...] = ()
 
     def __repr__(self) -> str:
         return f"Laminate({self.name!r}, {self.family!r}, {len(self.layers)} layers)"
@@ -245,7 +260,7 @@ class Laminate:
     @cached_attribute
     def interfaces(self) -> tuple[Interface, ...]:
         """One between every two consecutive TPE layers, bottom to top."""
-        regions: dict[tuple[str, str, tuple[str, ...]], tuple[Region, Region, Region, Region]] = {}
+        regions: dict[tuple[object, ...], tuple[Region, Region, Region, Region]] = {}
         interfaces: list[Interface] = []
         below: Layer | None = None
         masks: list[Layer] = []
@@ -254,16 +269,50 @@ class Laminate:
                 masks.append(layer)
                 continue
             if below is not None:
+                seams, is_pressed = self.seams_between(below, layer), self.presses(below, layer)
                 key = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
-                if key not in regions:
-                    regions[key] = interface_regions(
-                        below.profile, layer.profile, [mask.profile for mask in masks]
+                joined = *key, is_pressed, seams
+                if joined not in regions:
+                    regions[joined] = joined_regions(
+                        interface_regions(
+                            below.profile, layer.profile, [mask.profile for mask in masks]
+                        ),
+                        seams,
+                        is_pressed,
                     )
                 interfaces.append(
-                    Interface.between(len(interfaces) + 1, below, layer, masks, regions[key])
+                    Interface.between(
+                        len(interfaces) + 1,
+                        below,
+                        layer,
+                        masks,
+                        regions[joined],
+                        seams,
+                        is_pressed,
+                    )
                 )
             below, masks = layer, []
         return tuple(interfaces)
+
+    def seams_between(self, below: Layer, above: Layer) -> tuple[Seam, ...]:
+        """The seams that bond two structural layers, in the order in which they are made."""
+        pair = below.index, above.index
+        seams = (seam for seam in self.seams if (seam.below, seam.above) == pair)
+        return tuple(sorted(seams, key=lambda seam: seam.order))
+
+    def bond_of(self, below: Layer, above: Layer, by: str) -> FaceBond | None:
+        """Return what ``bonds`` say of the faces of two layers and a process, if anything."""
+        faces = below.faces[0], above.faces[1]
+        return next((b for b in self.bonds if b.by == by and b.joins(*faces)), None)
+
+    def presses(self, below: Layer, above: Layer) -> bool:
+        """Return True if the facing faces of two structural layers bond in the press.
+
+        Where ``bonds`` say nothing, all do, but faces that seams bond.
+        """
+        if self.bonds:
+            return self.bond_of(below, above, PRESS) is not None
+        return not self.seams_between(below, above)
 
     @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:
@@ -340,7 +389,7 @@ class Laminate:
 
 
 InterfaceKind = Literal["chamber", "separator", "bond"]
-"""``bond`` is an interface without a mask: the films bond all over."""
+"""``bond`` is an interface that is pressed without a mask: the films bond all over."""
 
 
 @dataclass(frozen=True)
@@ -348,7 +397,8 @@ class Interface:
     """Two TPE layers, below and above, and the masks between them.
 
     contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
-    ``balloon`` is the balloon a chamber interface lies in, or the one below a separator.
+    ``seams`` bond within their regions alone; an interface that is not ``pressed`` bonds in them
+    and nowhere else.
     """
 
     index: int
@@ -360,6 +410,8 @@ class Interface:
     contact: Region
     bond: Region
     unbonded: Region
+    seams: tuple[Seam, ...] = ()
+    pressed: bool = True
 
     @staticmethod
     def between(
@@ -368,11 +420,22 @@ class Interface:
         above: Layer,
         masks: Sequence[Layer],
         regions: tuple[Region, Region, Region, Region],
+        seams: tuple[Seam, ...] = (),
+        pressed: bool = True,
     ) -> Interface:
+        roles = [below.role, *(mask.role for mask in masks), above.role]
         kind: InterfaceKind = "bond"
-        if masks:
-            kind = "chamber" if masks[0].role == "chamber-mask" else "separator"
-        return Interface(index, kind, below, above, tuple(masks), *regions)
+        if not pressed or masks:
+            (is_chamber,) = chamber_gaps(roles, [(1, len(roles))] if seams else ()).values()
+            kind = "chamber" if is_chamber else "separator"
+        return Interface(index, kind, below, above, tuple(masks), *regions, seams, pressed)
+
+    @property
+    def masked(self) -> Region:
+        """Contact that the press would weld, were it not for the masks."""
+        return (
+            (self.contact & self.mask if self.seams else self.unbonded) if self.pressed else NOTHING
+        )
 
     @property
     def gap(self) -> float:
@@ -390,11 +453,13 @@ class Interface:
 
     @cached_attribute
     def pattern(self) -> tuple[str, ...]:
-        """Equal for interfaces made of equal profiles."""
+        """Equal for interfaces made of equal profiles and bonded by equal seams."""
         return (
             self.below.pattern,
             *(mask.pattern for mask in self.masks),
             self.above.pattern,
+            *(f"{seam.width} {seam.tool} {seam.path}" for seam in self.seams),
+            *(() if self.pressed else ("not pressed",)),
         )
 
 
@@ -405,6 +470,21 @@ def interface_regions(
     mask = union(masks)
     _, contact = (None, below) if below.contours == above.contours else divided(below, above)
     return mask, contact, *divided(contact, mask)
+
+
+def joined_regions(
+    regions: tuple[Region, Region, Region, Region], seams: Sequence[Seam], is_pressed: bool
+) -> tuple[Region, Region, Region, Region]:
+    """The regions of an interface, bonded by ``seams`` as well, or by them alone.
+
+    No seam bonds through a mask.
+    """
+    mask, contact, bond, _ = regions
+    if is_pressed or not seams:
+        return regions if is_pressed else (mask, contact, NOTHING, contact)
+    bond, _ = divided(contact, mask)
+    bond = bond & union([seam.region for seam in seams])
+    return mask, contact, bond, contact - bond
 
 
 # Diameters and mass.

@@ -85,7 +85,7 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
     """Bonds between neighbouring balloons that reach an edge of film that is no bore's."""
     for distinct in distinct_interfaces(laminate):
         gap = distinct.interface
-        if gap.kind == "chamber":
+        if gap.kind == "chamber" or not gap.pressed or _is_of_one_balloon(gap):
             continue
         rim = Region(tuple(c for c in gap.contact.contours if not _is_bore(c, laminate)))
         for piece in without_slivers(gap.bond).pieces:
@@ -93,6 +93,12 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
                 continue
             if edges_along(piece, rim):
                 yield _Weld(piece, gap, distinct.number)
+
+
+def _is_of_one_balloon(gap: Interface) -> bool:
+    """Return True if films without a mask between them belong together: they bond all over."""
+    of = {gap.below.balloon, gap.above.balloon}
+    return gap.kind == "bond" and (len(of) == 1 or None in of)
 
 
 def _is_apart(piece: Region, rim: Region) -> bool:

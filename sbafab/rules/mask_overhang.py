@@ -32,7 +32,8 @@ def check(measures: Measures) -> list[Finding]:
     pinned: dict[str, list[_Overhang]] = {}
     bare: list[DistinctInterface] = []
     for distinct in distinct_interfaces(laminate):
-        if distinct.interface.kind != "bond" and distinct.interface.unbonded.is_empty:
+        gap = distinct.interface
+        if gap.masks and gap.pressed and gap.masked.is_empty:
             bare.append(distinct)
         for edge, reach in measures.reaches(distinct.interface):
             overhang = _Overhang(reach.value, edge.nearest(reach.at), distinct)

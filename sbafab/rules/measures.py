@@ -60,7 +60,7 @@ class Measures:
 
     def reaches(self, interface: Interface) -> tuple[tuple[Edge, Reach], ...]:
         """Return film edges that bound unbonded film, each with its distance to the mask's edge."""
-        return self._reaches(interface.unbonded, interface.contact, interface.mask)
+        return self._reaches(interface.masked, interface.contact, interface.mask)
 
     @cached_property
     def moves(self) -> Freedoms:

@@ -15,7 +15,7 @@ from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
-from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, void_graph
+from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, chambers_by_level, void_graph
 
 NAME = "sealing"
 
@@ -70,6 +70,7 @@ RULE = Rule(
 def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
     """The chambers whose centres each pocket holds; equal pockets are examined once."""
     names_by_id: dict[int, frozenset[str]] = {}
+    by_level = chambers_by_level(laminate)
     owners = {}
     for void, piece in graph.pieces.items():
         if void.kind == "pocket":
@@ -80,8 +81,38 @@ def _owners(laminate: Laminate, graph: VoidGraph) -> dict[Void, frozenset[str]]:
                     for chamber in laminate.chambers
                     if any(_holds(piece, centre) for centre in chamber.centres)
                 )
-            owners[void] = names_by_id[id(piece)]
+            in_balloon = by_level[void.level]
+            owners[void] = names_by_id[id(piece)] & in_balloon
+    for interface in laminate.interfaces:
+        if interface.kind == "chamber" and not interface.pressed:
+            _leave_to_innermost(laminate, graph, owners, interface.index)
     return owners
+
+
+def _leave_to_innermost(
+    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], level: int
+) -> None:
+    """Leave chambers between seams to the pocket inside; what lies outside all seams is a flap.
+
+    A closed seam parts the films round it in two: a pocket, and a flap that holds no pressure.
+    """
+    voids = sorted(
+        (void for void in owners if void.level == level),
+        key=lambda void: Region(graph.pieces[void].outers).area,
+    )
+    taken: set[Point] = set()
+    for void in voids:
+        names = owners[void]
+        centres = {
+            (chamber.name, centre)
+            for chamber in laminate.chambers
+            for centre in chamber.centres
+            if chamber.name in names and _holds(graph.pieces[void], centre)
+        }
+        owners[void] = frozenset(name for name, centre in centres if centre not in taken)
+        taken |= {centre for _, centre in centres}
+        if not owners[void] and OUTSIDE in graph.joins.get(void, {}):
+            del owners[void]
 
 
 def _holds(piece: Region, p: Point) -> bool:
@@ -99,8 +130,10 @@ def _missing_pockets(
             pockets.setdefault((void.level, name), []).append(graph.pieces[void])
     offences = []
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
-    for interface in levels:
+    for balloon, interface in enumerate(levels, start=1):
         for chamber in laminate.chambers:
+            if not chamber.is_in(balloon):
+                continue
             pieces = pockets.get((interface.index, chamber.name), [])
             for centre in chamber.centres:
                 if not any(_holds(piece, centre) for piece in pieces):

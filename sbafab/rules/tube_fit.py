@@ -116,6 +116,9 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     inner = (x - dx * inlet.length, y - dy * inlet.length)
     beside = strip(inner, inlet.mouth, 2 * inlet.width)
     near = [piece for piece in interface.unbonded.pieces if boxes_meet(piece.bounds, beside.bounds)]
+    if not interface.pressed:
+        # Films go on beside a seam; their other side is no part of the strip.
+        near = [piece for piece in near if piece.contains((x - dx * TOLERANCE, y - dy * TOLERANCE))]
     every = Region(tuple(contour for piece in near for contour in piece.contours))
     run = _straight_run(every, inlet, beside) or every & beside
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
@@ -123,7 +126,8 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
         outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))
         for edge in sides
     ]
-    bonds = [outward_reach(edge, interface.contact.index) for edge in sides]
+    rims = interface.contact.index if interface.pressed else EdgeIndex(())
+    bonds = [outward_reach(edge, rims) for edge in sides]
     fits = []
     for reaches, feature, limit, remedy in (
         (widths, "the strip", needed, REMEDY),

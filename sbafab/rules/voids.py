@@ -8,7 +8,7 @@ nothing and are not in it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
@@ -91,12 +91,20 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     gaps: dict[tuple[str, ...], _Gap] = {}
     homes: dict[tuple[tuple[str, ...], str], list[tuple[int, Point]]] = {}
     opened: dict[int, list[Void]] = {}
+    chambers = chambers_by_level(laminate)
+    named = {chamber.name for chamber in laminate.chambers}
     for interface in laminate.interfaces:
         gap = gaps.get(interface.pattern)
         if gap is None:
             gap = gaps[interface.pattern] = _gap(interface.unbonded, interface.contact, frame)
         missing = [_missing(interface, home, gap) for home in range(len(gap.missing))]
-        _add_gap(graph, interface, gap, missing, laminate.inlets)
+        inlets = {
+            number: inlet
+            for number, inlet in enumerate(laminate.inlets)
+            if interface.kind == "chamber"
+            and (inlet.chamber in chambers[interface.index] or inlet.chamber not in named)
+        }
+        _add_gap(graph, interface, gap, missing, inlets)
         for layer in (interface.below, interface.above):
             key = interface.pattern, layer.pattern
             if key not in homes:
@@ -115,6 +123,15 @@ def void_graph(laminate: Laminate) -> VoidGraph:
             if opening != OUTSIDE:
                 graph.join(opening, OUTSIDE, _middle(piece.bounds))
     return graph
+
+
+def chambers_by_level(laminate: Laminate) -> dict[int, frozenset[str]]:
+    """The chambers that have a pocket in each chamber interface, by its index."""
+    levels = [interface.index for interface in laminate.interfaces if interface.kind == "chamber"]
+    return {
+        level: frozenset(chamber.name for chamber in laminate.chambers if chamber.is_in(balloon))
+        for balloon, level in enumerate(levels, start=1)
+    }
 
 
 @cached
@@ -192,7 +209,7 @@ def _add_gap(
     interface: Interface,
     gap: _Gap,
     missing: list[Void],
-    inlets: tuple[Inlet, ...],
+    inlets: Mapping[int, Inlet],
 ) -> None:
     voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
     graph.pieces.update(zip(voids, gap.unbonded, strict=True))
@@ -206,8 +223,8 @@ def _add_gap(
             graph.mouths.setdefault(inlet, []).append(voids[number])
 
 
-def _inlet_at(p: Point, inlets: tuple[Inlet, ...]) -> int | None:
-    for number, inlet in enumerate(inlets):
+def _inlet_at(p: Point, inlets: Mapping[int, Inlet]) -> int | None:
+    for number, inlet in inlets.items():
         dx, dy = p[0] - inlet.mouth[0], p[1] - inlet.mouth[1]
         along = dx * inlet.direction[0] + dy * inlet.direction[1]
         across = dx * inlet.direction[1] - dy * inlet.direction[0]

@@ -141,7 +141,7 @@ def test_a_path_has_exact_arcs(tmp_path: Path) -> None:
 
 REFUSED: list[tuple[Sequence[str], object, str]] = [
     (("layers", "1", "role"), "mask", "layers.1.role = 'mask' must be"),
-    (("layers", "1", "role"), "cap", "layer 2 is a cap, where a chamber-mask belongs: base, "),
+    (("layers", "1", "role"), "cap", "layers has no gap with a chamber; lay a chamber-mask"),
     (("layers", "1", "shape"), "msk", "layer 2 names a shape 'msk' that is not there; did you"),
     (("layers", "0", "film"), "ptfe", "film of layer 1 = 'ptfe' is a mask film"),
     (("layers", "0", "flim"), "tpe", "has a key 'flim' that is not known; did you mean film?"),
@@ -173,10 +173,14 @@ REFUSED: list[tuple[Sequence[str], object, str]] = [
     (("shapes", "mask"), {"path": [[0, 0], [9, 0, 101]]}, "path.1.2 = 101 must be at most 100"),
     (("shapes", "Mask"), {"disc": 3}, "has a shape named 'Mask'; a name is a small letter"),
     (("chambers",), [], "chambers is missing; add a list of"),
-    (("layers",), [{"role": "base", "shape": "film"}], "layers has 1 rows, and a stack has 3"),
+    (
+        ("layers",),
+        [{"role": "base", "shape": "film"}],
+        "layers has 1 structural films; a laminate has",
+    ),
     (("shapes", "mask"), {"pattern": "many", "count": 200, "step": [1, 0]}, "more than 5000 edges"),
     (("layers",), [], "layers is missing; add a list of"),
-    (("stack",), {"balloons": 2}, "stack.balloons = 2, and layers has 1 chamber-mask"),
+    (("stack",), {"balloons": 2}, "stack.balloons = 2, and layers has 1 gaps with"),
     (("registration",), {"method": "ears"}, "'ears' adds parts to layers"),
     (("chamber",), {"outline": "a.dxf"}, "chamber.outline is not for drawn layers"),
 ]
