@@ -45,7 +45,12 @@ layer's lower face. Films and shapes stand once each; `film`, `shape` and `outli
 | shape | contours, each a list of edges; holes run clockwise |
 | line | `[x0, y0, x1, y1]`, from start to end |
 | arc | `[x0, y0, x1, y1, xc, yc, r, ccw]`: start, end, centre, radius, and `true` if counter-clockwise |
-| `chambers` | the nets of voids, to which `bores` and `inlets` belong by name |
+| `chambers` | voids, to which `bores` and `inlets` belong by name, in all `balloons` or those listed |
+| `faces`, `turned` | what a film's upper and lower face are of; a turned layer lies upper face down |
+| `bonds` | pairs of faces that bond, and by what; without any all structural films bond in the press |
+| `seams` | bonds of a tool between two layers: half of `width` on both sides of `path`, in `order` |
+| `folds` | `lower` and `upper` are halves of one film, which goes on at `line` |
+| `ports`, `nets` | places in the gap between two layers, and which of them are joined |
 | `panel` | registered sheets, `null` without |
 
 `python -I sbafab/laminate/laminate_validator.py FILE` names every fault at its place, with the standard library alone.

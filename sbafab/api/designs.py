@@ -20,6 +20,7 @@ from sbafab.cutting.order import cutting_order
 from sbafab.design.files import Change, template_names, template_text
 from sbafab.design.records import Design
 from sbafab.design.records import resolved as written_out
+from sbafab.laminate import laminate_file
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.solid import solid as surface_of
 from sbafab.meshing.surface import Surface
@@ -104,6 +105,14 @@ def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     (Sec. 2).
     """
     return actuators.build(load(source, *changes, **tables))
+
+
+def read_laminate(path: str | Path) -> Laminate:
+    """Return the laminate of a ``laminate.json``, equal to the one that was written.
+
+    Raises DesignError, which names the file and the place in it, for what is no such file.
+    """
+    return laminate_file.read_laminate(Path(path))
 
 
 def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:

@@ -16,6 +16,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
+from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
 from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
@@ -391,7 +392,9 @@ def _laminate() -> dict[str, Any]:
     contour = {**array({"oneOf": [line, arc]}), "description": "closed; holes run clockwise"}
     regions = ("outline", "sheets", "second", "window")
     panel = of(SheetPanel, *regions, **{**dict.fromkeys(regions, shape), "sheets": array(shape)})
-    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", "panel")
+    chains = {**array(array({"oneOf": [line, arc]})), "description": "chains, open or closed"}
+    joints = ("seams", "folds", "ports", "nets", "bonds")
+    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", "panel", *joints)
     return of(
         Laminate,
         *lists,
@@ -405,6 +408,11 @@ def _laminate() -> dict[str, Any]:
         bores=array(of(Bore)),
         inlets=array(of(Inlet)),
         pins=array(of(Pin)),
+        seams=array(of(Seam, "path", path=chains)),
+        folds=array(of(Fold)),
+        ports=array(of(Port)),
+        nets=array(of(Net)),
+        bonds=array(of(FaceBond)),
         outline=shape,
         panel={**panel, "type": ["object", "null"]},
         shapes={**array(array(contour)), "description": "mm, the actuator's axis at 0, 0"},

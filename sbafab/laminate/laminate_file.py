@@ -16,6 +16,7 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, Line
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Film
+from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam
 from sbafab.laminate.laminate import (
     Bore,
     Chamber,
@@ -25,7 +26,7 @@ from sbafab.laminate.laminate import (
     Pin,
     SheetPanel,
 )
-from sbafab.laminate.laminate_validator import FIELDS, SCHEMA, faults
+from sbafab.laminate.laminate_validator import FIELDS, SCHEMA, completed, faults
 
 FILE = "laminate.json"
 
@@ -49,7 +50,7 @@ def read_laminate(path: Path) -> Laminate:
     fault = next(faults(document), None)
     if fault is not None:
         raise DesignError(f"{path} is not a sound laminate; {fault}")
-    return _laminate(document)
+    return _laminate(completed(document))
 
 
 # Out.
@@ -91,6 +92,7 @@ def _document(laminate: Laminate) -> dict[str, Any]:
             "z": layer.z,
             "pieces": layer.pieces,
             "pattern": layer.pattern,
+            "turned": layer.turned,
         }
         for layer in laminate.layers
     ]
@@ -122,6 +124,14 @@ def _document(laminate: Laminate) -> dict[str, Any]:
         "bores": [asdict(bore) for bore in laminate.bores],
         "inlets": [asdict(inlet) for inlet in laminate.inlets],
         "pins": [asdict(pin) for pin in laminate.pins],
+        "seams": [
+            {**asdict(seam), "path": [[*map(_edge_row, chain)] for chain in seam.path]}
+            for seam in laminate.seams
+        ],
+        "folds": [asdict(fold) for fold in laminate.folds],
+        "ports": [asdict(port) for port in laminate.ports],
+        "nets": [asdict(net) for net in laminate.nets],
+        "bonds": [asdict(bond) for bond in laminate.bonds],
         "outline": outline,
         "panel": sheets,
         "shapes": shapes.values,
@@ -154,7 +164,10 @@ def _laminate(document: dict[str, Any]) -> Laminate:
         key: [{name: row[name] for name in fields} for row in document[key]]
         for key, fields in FIELDS.items()
     }
-    films = [Film(**_with_points(row)) for row in rows["films"]]
+    films = [
+        Film(**_with_points({**row, "faces": row["faces"] and tuple(row["faces"])}))
+        for row in rows["films"]
+    ]
     shapes = [_region(shape) for shape in document["shapes"]]
     layers = []
     for row in rows["layers"]:
@@ -166,7 +179,8 @@ def _laminate(document: dict[str, Any]) -> Laminate:
         family=document["family"],
         layers=tuple(layers),
         chambers=tuple(
-            Chamber(row["name"], tuple(map(_point, row["centres"]))) for row in rows["chambers"]
+            Chamber(row["name"], tuple(map(_point, row["centres"])), tuple(row["balloons"]))
+            for row in rows["chambers"]
         ),
         bores=tuple(Bore(**_with_points(row)) for row in rows["bores"]),
         inlets=tuple(Inlet(**_with_points(row)) for row in rows["inlets"]),
@@ -179,6 +193,20 @@ def _laminate(document: dict[str, Any]) -> Laminate:
         pins_in_full_bonds=document["pins_in_full_bonds"],
         panel=None if panel is None else _panel(panel, shapes),
         tube=document["tube"],
+        seams=tuple(
+            Seam(**{**row, "path": tuple(tuple(map(_edge, chain)) for chain in row["path"])})
+            for row in rows["seams"]
+        ),
+        folds=tuple(
+            Fold(row["lower"], row["upper"], (_point(row["line"][0]), _point(row["line"][1])))
+            for row in rows["folds"]
+        ),
+        ports=tuple(Port(**_with_points(row)) for row in rows["ports"]),
+        nets=tuple(Net(row["name"], tuple(row["ports"])) for row in rows["nets"]),
+        bonds=tuple(
+            FaceBond(**{**row, "faces": (row["faces"][0], row["faces"][1])})
+            for row in rows["bonds"]
+        ),
     )
 
 

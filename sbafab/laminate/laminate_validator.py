@@ -19,6 +19,7 @@ JOINED = 1e-5
 
 _TEXT, _NUMBER, _SIZE, _COUNT, _INDEX = "text", "number", "size", "count", "index"
 _YES, _POINT, _POINTS, _TEXTS = "yes or no", "point", "points", "texts"
+_COUNTS, _PAIR, _PATH = "counts", "pair of texts", "path"
 ROLES = ("base", "wall", "cap", "sheet", "chamber-mask", "separator-mask")
 
 FIELDS: Mapping[str, Mapping[str, str]] = {
@@ -34,6 +35,7 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "warning": _TEXT,
         "elastic": "point?",
         "stays_solid": _YES,
+        "faces": "pair of texts?",
     },
     "layers": {
         "index": _COUNT,
@@ -44,8 +46,9 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "z": _NUMBER,
         "pieces": _COUNT,
         "pattern": _TEXT,
+        "turned": _YES,
     },
-    "chambers": {"name": _TEXT, "centres": _POINTS},
+    "chambers": {"name": _TEXT, "centres": _POINTS, "balloons": _COUNTS},
     "bores": {"chamber": _TEXT, "centre": _POINT, "diameter": _SIZE},
     "inlets": {
         "chamber": _TEXT,
@@ -56,8 +59,37 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "tube_diameter": _SIZE,
     },
     "pins": {"name": _TEXT, "centre": _POINT, "diameter": _SIZE, "clearance": _NUMBER},
+    "seams": {
+        "name": _TEXT,
+        "below": _COUNT,
+        "above": _COUNT,
+        "path": _PATH,
+        "width": _SIZE,
+        "tool": _TEXT,
+        "kind": _TEXT,
+        "order": _COUNT,
+    },
+    "folds": {"lower": _COUNT, "upper": _COUNT, "line": _POINTS},
+    "ports": {"name": _TEXT, "below": _COUNT, "above": _COUNT, "at": _POINT},
+    "nets": {"name": _TEXT, "ports": _TEXTS},
+    "bonds": {
+        "name": _TEXT,
+        "faces": _PAIR,
+        "by": _TEXT,
+        "temperature_c": "number?",
+        "after": "text?",
+    },
 }
 """Of each list of objects: its keys and what stands there; ``?`` where it may be null."""
+LATER: Mapping[str, Mapping[str, Any]] = {
+    "": {"seams": [], "folds": [], "ports": [], "nets": [], "bonds": []},
+    "films": {"faces": None},
+    "layers": {"turned": False},
+    "chambers": {"balloons": []},
+}
+"""Keys that files of earlier versions lack, and what holds there."""
+TOOLS = ("laser", "hot-tip", "ultrasonic", "roller")
+SEAM_KINDS = ("lap", "fin")
 HEAD: Mapping[str, str] = {
     "name": _TEXT,
     "family": _TEXT,
@@ -81,6 +113,16 @@ PANEL: Mapping[str, str] = {
 }
 
 
+def completed(document: dict[str, Any]) -> dict[str, Any]:
+    """Return the document with the keys that files of earlier versions lack."""
+    whole = {**LATER[""], **document}
+    for key, values in LATER.items():
+        rows = whole.get(key)
+        if isinstance(rows, list):
+            whole[key] = [{**values, **row} if isinstance(row, dict) else row for row in rows]
+    return whole
+
+
 def faults(document: Any) -> Iterator[str]:
     """Yield the faults of a parsed ``laminate.json``, each with its place; none if it is sound.
 
@@ -89,11 +131,13 @@ def faults(document: Any) -> Iterator[str]:
     if not isinstance(document, dict):
         yield "the file: is not an object"
         return
+    document = completed(document)
     shape_faults = list(_forms(document))
     yield from shape_faults
     if not shape_faults:
         yield from _shapes(document["shapes"])
         yield from _references(document)
+        yield from _joints(document)
 
 
 def _forms(document: dict[str, Any]) -> Iterator[str]:
@@ -173,6 +217,12 @@ _KINDS: Mapping[str, Callable[[Any], bool]] = {
     _POINTS: lambda value: _is_list_of(value, _POINT),
     _TEXTS: lambda value: _is_list_of(value, _TEXT),
     "indices": lambda value: _is_list_of(value, _INDEX),
+    _COUNTS: lambda value: _is_list_of(value, _COUNT),
+    _PAIR: lambda value: _is_list_of(value, _TEXT) and len(value) == 2,
+    _PATH: lambda value: (
+        isinstance(value, list)
+        and all(isinstance(c, list) and c and all(map(_is_edge, c)) for c in value)
+    ),
 }
 
 
@@ -185,15 +235,121 @@ def _is_edge(edge: Any) -> bool:
 def _shapes(shapes: list[list[list[list[Any]]]]) -> Iterator[str]:
     for i, shape in enumerate(shapes):
         for j, contour in enumerate(shape):
-            for k, edge in enumerate(contour):
-                where = f"shapes[{i}][{j}][{k}]"
-                if math.dist(contour[k - 1][2:4], edge[:2]) > JOINED:
-                    yield f"{where}: does not begin where the edge before it ends"
-                if len(edge) == 8:
-                    radius = edge[6]
-                    ends = (math.dist(edge[4:6], edge[at : at + 2]) for at in (0, 2))
-                    if radius <= 0 or any(abs(end - radius) > JOINED for end in ends):
-                        yield f"{where}: the arc's ends do not lie on its circle"
+            yield from _chain(f"shapes[{i}][{j}]", contour, is_closed=True)
+        edges = [
+            (f"[{j}][{k}]", edge)
+            for j, contour in enumerate(shape)
+            for k, edge in enumerate(contour)
+        ]
+        crossing = _crossing(edges)
+        if crossing is not None:
+            (a, b), (x, y) = crossing
+            yield f"shapes[{i}]{a}: crosses {b} at x {x:.4f}, y {y:.4f}"
+
+
+def _chain(where: str, edges: list[list[Any]], is_closed: bool) -> Iterator[str]:
+    for k, edge in enumerate(edges):
+        if (k or is_closed) and math.dist(edges[k - 1][2:4], edge[:2]) > JOINED:
+            yield f"{where}[{k}]: does not begin where the edge before it ends"
+        if len(edge) == 8:
+            radius = edge[6]
+            ends = (math.dist(edge[4:6], edge[at : at + 2]) for at in (0, 2))
+            if radius <= 0 or any(abs(end - radius) > JOINED for end in ends):
+                yield f"{where}[{k}]: the arc's ends do not lie on its circle"
+
+
+# Edges that cross, in a sweep along x. Edges that only touch, or share an end, do not cross.
+
+
+_Place = tuple[float, float]
+
+
+def _crossing(edges: list[tuple[str, list[Any]]]) -> tuple[tuple[str, str], _Place] | None:
+    """Return the names of two edges that cross, and where; None if no two do."""
+    rows = sorted((_box(edge), name, edge) for name, edge in edges)
+    open_rows: list[tuple[tuple[float, ...], str, list[Any]]] = []
+    for box, name, edge in rows:
+        open_rows = [row for row in open_rows if row[0][1] > box[0]]
+        for other, other_name, other_edge in open_rows:
+            if other[2] < box[3] and box[2] < other[3]:
+                for p in _common(edge, other_edge):
+                    if _is_crossed(edge, other_edge, p):
+                        return (other_name, name), p
+        open_rows.append((box, name, edge))
+    return None
+
+
+def _box(edge: list[Any]) -> tuple[float, float, float, float]:
+    """Least and largest x, least and largest y."""
+    places = [tuple(edge[:2]), tuple(edge[2:4])]
+    if len(edge) == 8:
+        x, y, r = edge[4:7]
+        ways = ((x + r, y), (x, y + r), (x - r, y), (x, y - r))
+        places += [p for p in ways if _is_on(edge, p)]
+    xs, ys = zip(*places, strict=True)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+def _is_on(edge: list[Any], p: _Place) -> bool:
+    """Return True if a point of the edge's line or circle lies between its ends."""
+    (x0, y0), (x1, y1) = edge[:2], edge[2:4]
+    if len(edge) == 4:
+        along = (p[0] - x0) * (x1 - x0) + (p[1] - y0) * (y1 - y0)
+        return bool(0 <= along <= (x1 - x0) ** 2 + (y1 - y0) ** 2)
+    x, y, _, ccw = edge[4:]
+    start, end, here = (math.atan2(q[1] - y, q[0] - x) for q in ((x0, y0), (x1, y1), p))
+    if not ccw:
+        start, end = end, start
+    return (here - start) % math.tau <= ((end - start) % math.tau or math.tau)
+
+
+def _common(a: list[Any], b: list[Any]) -> Iterator[_Place]:
+    """Yield the points that the lines or circles of two edges share."""
+    if len(a) == 4 and len(b) == 8:
+        a, b = b, a
+    if len(a) == 4:
+        (x, y), (u, v) = a[:2], (a[2] - a[0], a[3] - a[1])
+        (p, q), (r, s) = b[:2], (b[2] - b[0], b[3] - b[1])
+        cross = u * s - v * r
+        if cross:
+            t = ((p - x) * s - (q - y) * r) / cross
+            yield x + t * u, y + t * v
+        return
+    x, y, radius = a[4:7]
+    if len(b) == 4:
+        length = math.dist(b[:2], b[2:4])
+        if not length:
+            return
+        u, v = (b[2] - b[0]) / length, (b[3] - b[1]) / length
+        along = (x - b[0]) * u + (y - b[1]) * v
+        foot = b[0] + along * u, b[1] + along * v
+    else:
+        gap = math.dist(b[4:6], (x, y))
+        if not gap:
+            return
+        u, v = -(b[5] - y) / gap, (b[4] - x) / gap
+        along = (gap * gap + radius * radius - b[6] * b[6]) / (2 * gap)
+        foot = x + v * along, y - u * along
+    rest = radius * radius - math.dist(foot, (x, y)) ** 2
+    if rest > 0:
+        half = math.sqrt(rest)
+        yield foot[0] + half * u, foot[1] + half * v
+        yield foot[0] - half * u, foot[1] - half * v
+
+
+def _is_crossed(a: list[Any], b: list[Any], p: _Place) -> bool:
+    """Return True if both edges pass through a point, at an angle and away from their ends."""
+    ways = []
+    for edge in (a, b):
+        is_at_end = any(math.dist(p, edge[at : at + 2]) < JOINED for at in (0, 2))
+        if is_at_end or not _is_on(edge, p):
+            return False
+        way = (edge[2] - edge[0], edge[3] - edge[1])
+        if len(edge) == 8:
+            way = (edge[5] - p[1], p[0] - edge[4])
+        ways.append((way[0] / math.hypot(*way), way[1] / math.hypot(*way)))
+    (u, v), (r, s) = ways
+    return bool(abs(u * s - v * r) > 1e-3)
 
 
 def _references(document: dict[str, Any]) -> Iterator[str]:
@@ -217,6 +373,42 @@ def _references(document: dict[str, Any]) -> Iterator[str]:
     for where, shape in used.items():
         if shape >= len(document["shapes"]):
             yield f"{where}: there is no shape {shape}"
+
+
+def _joints(document: dict[str, Any]) -> Iterator[str]:
+    """Yield the faults of seams, folds, ports, nets and bonds."""
+    count = len(document["layers"])
+    for key, ends in (("seams", ("below", "above")), ("folds", ("lower", "upper"))):
+        for i, row in enumerate(document[key]):
+            yield from _pair(f"{key}[{i}]", [row[end] for end in ends], count)
+    for i, row in enumerate(document["ports"]):
+        yield from _pair(f"ports[{i}]", [row["below"], row["above"]], count)
+    yield from _seams(document["seams"])
+    for i, row in enumerate(document["folds"]):
+        if len(row["line"]) != 2 or row["line"][0] == row["line"][1]:
+            yield f"folds[{i}].line: is not two points apart from each other"
+    for i, row in enumerate(document["bonds"]):
+        if row["by"] not in ("press", *TOOLS):
+            yield f"bonds[{i}].by: is none of press, {', '.join(TOOLS)}"
+    ports = {row["name"] for key in ("ports", "chambers") for row in document[key]}
+    for i, row in enumerate(document["nets"]):
+        for name in row["ports"]:
+            if name not in ports:
+                yield f"nets[{i}].ports: there is no port or chamber {json.dumps(name)}"
+
+
+def _seams(rows: list[dict[str, Any]]) -> Iterator[str]:
+    for i, row in enumerate(rows):
+        for key, known in (("tool", TOOLS), ("kind", SEAM_KINDS)):
+            if row[key] not in known:
+                yield f"seams[{i}].{key}: is none of {', '.join(known)}"
+        for j, chain in enumerate(row["path"]):
+            yield from _chain(f"seams[{i}].path[{j}]", chain, is_closed=False)
+
+
+def _pair(where: str, layers: list[int], count: int) -> Iterator[str]:
+    if not 1 <= layers[0] < layers[1] <= count:
+        yield f"{where}: lies between layers {layers[0]} and {layers[1]} of {count}"
 
 
 def _layers(layers: list[dict[str, Any]], films: list[dict[str, Any]]) -> Iterator[str]:

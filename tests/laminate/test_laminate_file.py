@@ -17,8 +17,11 @@ from hypothesis import given, settings
 from sbafab.actuators import build, load_design
 from sbafab.cli.formats import schema_of
 from sbafab.errors import DesignError
+from sbafab.geometry.contour import circle
+from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, polygon
 from sbafab.laminate import laminate_validator
+from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam
 from sbafab.laminate.laminate import ROLES, Laminate
 from sbafab.laminate.laminate_file import laminate_json, read_laminate
 from sbafab.laminate.laminate_validator import FIELDS, HEAD, PANEL, faults
@@ -183,3 +186,68 @@ def test_a_contour_of_whole_numbers_is_written_like_any_other() -> None:
     whole = replace(laminate, outline=polygon(corners))
     parts = replace(laminate, outline=polygon([(float(x), float(y)) for x, y in corners]))
     assert laminate_json(whole) == laminate_json(parts)
+
+
+JOINED = {
+    "seam": (lambda d: d["seams"][0].update(tool="glue"), "seams[0].tool: is none of laser"),
+    "kind": (lambda d: d["seams"][0].update(kind="butt"), "seams[0].kind: is none of lap"),
+    "layers": (lambda d: d["seams"][0].update(above=9), "seams[0]: lies between layers 1 and 9"),
+    "path": (lambda d: d["seams"][0]["path"][0].append([9.0, 9, 9, 8]), "seams[0].path[0][1]: "),
+    "line": (lambda d: d["folds"][0].update(line=[[0, 0], [0, 0]]), "folds[0].line: "),
+    "bond": (lambda d: d["bonds"][0].update(by="glue"), "bonds[0].by: is none of press"),
+    "net": (lambda d: d["nets"][0].update(ports=["x"]), "nets[0].ports: there is no port"),
+    "port": (lambda d: d["ports"][0].update(below=3), "ports[0]: lies between layers 3 and 3"),
+    "crossing": (
+        lambda d: d["shapes"].append([[[0, 0, 2, 2], [2, 2, 2, 0], [2, 0, 0, 2], [0, 2, 0, 0]]]),
+        "crosses",
+    ),
+}
+"""Faults of seams, folds, ports, nets and bonds, and edges that cross."""
+
+
+def with_joints(laminate: Laminate) -> Laminate:
+    """The laminate of two films and a mask with one of each joint."""
+    path = ((Line((0.0, 0.0), (0.1, 0.7)),), circle((0.3, 0.1), 1.7).edges)
+    lower, mask, upper = laminate.layers
+    coated = replace(lower, film=replace(lower.film, faces=("tpu", "textile")))
+    return replace(
+        laminate,
+        layers=(coated, mask, replace(upper, turned=True)),
+        chambers=tuple(replace(chamber, balloons=(1,)) for chamber in laminate.chambers),
+        seams=(Seam("rim", 1, 3, path, 0.9, "roller", "fin", 1),),
+        folds=(Fold(1, 3, ((-1.0, 0.3), (1.0, 0.1))),),
+        ports=(Port("a", 1, 3, (0.1, 0.2)),),
+        nets=(Net("n", ("a", "pouch")),),
+        bonds=(FaceBond("coated", ("tpu", "tpu"), "hot-tip", 150.0, "press"),),
+    )
+
+
+def test_seams_folds_faces_and_nets_are_read_back_exactly(tmp_path: Path) -> None:
+    laminate = with_joints(build(load_design("pouch")))
+    assert_read_back(laminate, tmp_path)
+    hold("laminate", json.loads(laminate_json(laminate)))
+
+
+@pytest.mark.parametrize("name", JOINED)
+def test_a_fault_of_a_joint_is_named_at_its_place(name: str) -> None:
+    spoil, where = JOINED[name]
+    document = json.loads(laminate_json(with_joints(build(load_design("pouch")))))
+    assert list(faults(document)) == []
+    spoil(document)
+    assert any(where in fault for fault in faults(document)), list(faults(document))
+
+
+def test_a_file_without_later_keys_is_read_as_before(tmp_path: Path) -> None:
+    laminate = build(load_design("pouch"))
+    document = json.loads(laminate_json(laminate))
+    for key in ("seams", "folds", "ports", "nets", "bonds"):
+        del document[key]
+    for row in document["films"]:
+        del row["faces"]
+    for row in document["layers"]:
+        del row["turned"]
+    for row in document["chambers"]:
+        del row["balloons"]
+    path = tmp_path / "laminate.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert read_laminate(path) == laminate
