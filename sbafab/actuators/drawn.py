@@ -20,7 +20,7 @@ from sbafab.actuators.stacking import CutFilm, channel_pin, layers
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
 from sbafab.design.outline import refuse_crossings
-from sbafab.design.records import Design, Drawn, Form, Free, Wrap
+from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.strands import Strand, polyline
 from sbafab.design.toml_table import Section, writable
@@ -305,6 +305,26 @@ class DrawnFold(_Row):
         return self
 
 
+class DrawnMechanism(_Row):
+    """What the pockets do when they fill, for the closed forms of ``predict``; none by default."""
+
+    kind: MechanismKind
+    """"pouch-motor" pulls, "hinge" bends two plates, "beam" bears a load at its end, "jamming"
+    stiffens under a vacuum, "push" presses against a plate."""
+    direction: Angle = 0.0
+    """Degrees from x, counter-clockwise: motors shorten along it; plates and beams lie along it."""
+    friction: float | None = Field(default=None, gt=0, le=2)
+    """Coefficient of friction between the sheets; jamming needs it."""
+
+    @model_validator(mode="after")
+    def _friction_is_of_sheets(self) -> Self:
+        if self.kind == "jamming" and self.friction is None:
+            raise ValueError("is jamming without friction; add it, such as 0.3")
+        if self.kind != "jamming" and self.friction is not None:
+            raise ValueError(f"is a {self.kind}, which has no friction; remove it")
+        return self
+
+
 class DrawnDesign(Design):
     """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
     and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
@@ -332,6 +352,8 @@ class DrawnDesign(Design):
     """The tube that the laminate is wrapped round; none by default."""
     notes: Annotated[tuple[NoteText, ...], Field(strict=False, max_length=20)] | None = None
     """Sentences that pictures and pages print; none by default."""
+    mechanism: DrawnMechanism | None = None
+    """What its pockets do, such as {kind = "pouch-motor", direction = 90}."""
 
     @model_validator(mode="before")
     @classmethod
@@ -353,11 +375,14 @@ class DrawnDesign(Design):
     @property
     def form(self) -> Form:
         stacks = max(1, sum(len(chamber.centres) for chamber in self.chambers))
-        tube = self.tube
-        wrap = None
+        tube, asked = self.tube, self.mechanism
+        wrap = mechanism = None
         if tube is not None:
             wrap = Wrap(tube.outer_diameter, tube.pitch, tube.glue, tube.overlap)
-        return Form("laminate of drawn layers", stacks, Drawn(), self.lumen, self.lumen_pin, wrap)
+        if asked is not None:
+            mechanism = Mechanism(asked.kind, asked.direction, asked.friction)
+        words = "laminate of drawn layers"
+        return Form(words, stacks, Drawn(), self.lumen, self.lumen_pin, wrap, mechanism)
 
     @property
     def lumen_pin(self) -> float | None:

@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 from pydantic import (
     Field,
@@ -280,13 +280,30 @@ class Wrap:
     overlap: float = 0.0
 
 
+MechanismKind = Literal["pouch-motor", "hinge", "beam", "jamming", "push"]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """What drawn pockets do when they fill, for the models that know it.
+
+    ``direction`` in degrees from x, counter-clockwise: along it a pouch motor shortens, the two
+    plates of a hinge lie, and a beam or jammed stack reaches. ``friction`` is the coefficient
+    between jammed sheets.
+    """
+
+    kind: MechanismKind
+    direction: float = 0.0
+    friction: float | None = None
+
+
 @dataclass(frozen=True)
 class Form:
     """Form of an actuator of any family.
 
     ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
     same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
-    ``lumen_pin`` its dowel pin's.
+    ``lumen_pin`` its dowel pin's; ``mechanism`` what drawn pockets do, where the design says so.
     """
 
     words: str
@@ -295,6 +312,7 @@ class Form:
     lumen: float | None = None
     lumen_pin: float | None = None
     wrap: Wrap | None = None
+    mechanism: Mechanism | None = None
 
     @property
     def is_parallel(self) -> bool:

@@ -391,9 +391,11 @@ def _rounded(value: float) -> float:
 
 
 LEFT_OUT = "left out"
-STROKES = ("full stroke", "free stroke at ", "reached diameter")
-CALIBRATED_STROKES = ("free stroke at ", "full stroke", "reached diameter")
-BENDS = ("bend at ", "bend with one chamber")
+STROKES = ("full stroke", "free stroke at ", "reached diameter", "free contraction")
+CALIBRATED_STROKES = ("free stroke at ", "full stroke", "reached diameter", "free contraction")
+BENDS = ("bend at ", "bend with one chamber", "free bend")
+PULLS = ("pull", "moment", "load")
+"""Beginnings of the names of drawn mechanisms' forces."""
 RADIUS = 2.5
 """Pocket radius in mm of the actuators whose forces were measured."""
 INTERVAL_NOTE = (
@@ -449,6 +451,12 @@ def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
         # Of the highest pressure that was asked for.
         at = f"at {max(prediction.asked.pressures_kpa):g} kPa"
         yield "force", next(item for item in blocked if at in item.name)
+    for begins in PULLS:
+        pulls = [item for item in to_design_with if item.name.startswith(begins)]
+        at = f"at {max(prediction.asked.pressures_kpa, default=0):g} kPa"
+        at_highest = [item for item in pulls if at in item.name]
+        # Where the film does not stand the highest pressure, at the most it stands.
+        yield from (("force", item) for item in (at_highest or pulls)[:1])
 
 
 def _first(figures: list[Figure], begins: str) -> list[Figure]:

@@ -17,7 +17,7 @@ from sbafab.design.records import Design, Slots, Wrap
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models import elastic, paper
+from sbafab.models import elastic, mechanisms, paper
 from sbafab.models.drawn_pockets import (
     bounded,
     flat_forces,
@@ -55,6 +55,7 @@ from sbafab.models.formulas import (
 from sbafab.models.intervals import factors_of, uncertainty_of
 from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics
 from sbafab.models.kinematics import actuator as actuator_of
+from sbafab.models.mechanisms import mechanism_figures
 from sbafab.models.paper import counterpart
 from sbafab.models.parabola import fullest
 from sbafab.models.pneumatics import seconds
@@ -564,6 +565,12 @@ def _geometric_figures(
     yield from _tubes(actuator)
     pushed = list(flat_forces(actuator, request))
     yield from pushed
+    mechanism = actuator.form.mechanism
+    if mechanism is not None:
+        yield from mechanism_figures(mechanism, actuator.laminate, request)
+        for quantity in mechanisms.LEFT_OUT[mechanism.kind]:
+            yield LeftOut(quantity, f"no closed form of a {mechanism.kind} gives it")
+        return
     if not actuator.kinematics:
         force = "force once the plates part" if pushed else "force"
         for quantity in ("stroke", force, "actuation", "bending", "folded diameter"):

@@ -12,13 +12,15 @@ from typing import Any
 import pytest
 import tomli_w
 
-from sbafab.actuators import build, load_design
+from sbafab.actuators import FAMILIES, build, load_design
 from sbafab.design.files import template_text
 from sbafab.design.identity import design_sha256
+from sbafab.design.records import validated
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import PredictionRequest
+from sbafab.models.pouch import half_angle
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
@@ -246,8 +248,50 @@ def test_a_drawing_and_a_film_of_its_own_go_into_the_folder_and_back(tmp_path: P
 
 
 def test_predictions_leave_out_in_a_sentence_what_has_no_model() -> None:
-    prediction = predict(load_design("pouch"), PredictionRequest((100.0,)))
+    data = tables()
+    del data["mechanism"]
+    design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
+    prediction = predict(design, PredictionRequest((100.0,)))
     reasons = {item.reason for item in prediction.left_out}
     assert {figure.group for figure in prediction.figures} <= {"size", "inlet"}
     assert len(reasons) == 1
     assert "no model knows the form of layers drawn one by one" in reasons.pop()
+
+
+def test_a_pouch_motor_pulls_by_the_closed_form_of_its_pocket_as_drawn() -> None:
+    """40 x 30 mm along x: at t = 1.0 rad, 15.853 % shorter, p D L cos t / t."""
+    prediction = predict(load_design("pouch"), PredictionRequest((0.5,)))
+    assert prediction.value("free contraction") == pytest.approx(40 * (1 - 2 / math.pi))
+    angle = float(half_angle(0.1))
+    by_hand = 0.5e-3 * 30 * 40 * math.cos(angle) / angle
+    assert prediction.value("pull at 0.5 kPa, 10 % shorter") == pytest.approx(by_hand, rel=1e-6)
+    assert all("not calibrated" in f.model.trust for f in prediction.figures if f.group == "force")
+    quantities = [line.quantity for line in prediction.verdict]
+    assert {"stroke", "force"} <= set(quantities)
+
+
+def test_a_pouch_motor_turned_by_90_degrees_pulls_along_the_other_side() -> None:
+    design = load_design("pouch").with_({"mechanism.direction": 90})
+    prediction = predict(design, PredictionRequest((0.5,)))
+    assert prediction.value("free contraction") == pytest.approx(30 * (1 - 2 / math.pi))
+
+
+def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds() -> None:
+    """T = p L / 2 t, stretched by 5 % at E h / 20 = 0.019 N/mm."""
+    prediction = predict(load_design("pouch"), PredictionRequest((10.0,)))
+    angle = float(half_angle(0.1))
+    most = 1000 * 0.05 * 10 * 0.038 * 2 * angle / 40
+    (reason,) = {o.reason for o in prediction.left_out if "10 kPa, 10 % shorter" in o.name}
+    assert f"holds to {most:.3g} kPa" in reason
+    assert any(f.name.startswith("pull at 0.7") for f in prediction.figures)
+
+
+def test_a_mechanism_of_straight_seams_leaves_a_round_pocket_out() -> None:
+    data = as_1dof(1, 1.7)
+    data["mechanism"] = {"kind": "pouch-motor"}
+    design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
+    prediction = predict(design, PredictionRequest((1.0,)))
+    assert any(
+        " % of the rectangle round it, less than 90 %" in item.reason
+        for item in prediction.left_out
+    )

@@ -1,0 +1,368 @@
+"""What drawn pockets do, by the closed forms of their mechanism: pouch motor, hinge, inflated beam,
+jammed sheets, or a pouch that pushes.
+
+Lengths and widths are measured on the laminate itself: a pocket is what is left of the open region
+round its chamber's centre where inlet strips are taken away. None of these designs is calibrated:
+no figure has an interval. Lengths mm, pressures kPa.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sbafab.design.records import Mechanism, MechanismKind
+from sbafab.geometry.edges import Point, unit
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region, strip
+from sbafab.laminate.laminate import Chamber, Interface, Laminate
+from sbafab.models import inflated_beam, jamming, pouch
+from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest
+from sbafab.models.formulas import force
+
+NOT_CALIBRATED = "not calibrated: no interval"
+SHARES = (0.1, 0.2, 0.3)
+"""Contractions at which a pull is given."""
+MOST_STRETCH = 0.05
+"""Strain of the film up to which it is taken not to stretch; ours."""
+RECTANGULAR = 0.9
+"""Least share of its bounding box that a pocket fills for models of straight seams; ours."""
+ATMOSPHERE = 101.325
+"""kPa, the largest vacuum."""
+SEPARATE = 1e-3
+"""mm between places that count as different."""
+
+
+class MeasuredPocket(NamedTuple):
+    """A pocket as models take it: ``length`` along the mechanism and ``width`` across it, mm;
+    ``area`` in mm2, the ``share`` of its bounding box that it fills, and its interface.
+    """
+
+    region: Region
+    interface: Interface
+    length: float
+    width: float
+    share: float
+
+    @property
+    def area(self) -> float:
+        return self.region.area
+
+    @property
+    def is_rectangular(self) -> bool:
+        return self.share >= RECTANGULAR
+
+    @property
+    def film_stiffness(self) -> float | None:
+        """Young's modulus times thickness of the weaker film in N/mm; None if one is unknown."""
+        films = self.interface.below.film, self.interface.above.film
+        known = [film.elastic[0] * film.thickness for film in films if film.elastic is not None]
+        return min(known) if len(known) == len(films) else None
+
+
+@dataclass(frozen=True)
+class FilledChamber:
+    """A chamber with its pockets, all of one size, at the ``pressures`` asked for in kPa.
+
+    ``of`` names the chamber in a figure's name, where there are several.
+    """
+
+    mechanism: Mechanism
+    chamber: Chamber
+    pockets: Sequence[MeasuredPocket]
+    pressures: Sequence[float]
+    of: str
+
+    @property
+    def rows(self) -> tuple[int, int]:
+        """Numbers of pockets one after the other along the direction, and side by side."""
+        x, y = unit(self.mechanism.direction)
+        centres = self.chamber.centres
+        places = {round((px * x + py * y) / SEPARATE) for px, py in centres}
+        return len(places), len(centres) // len(places)
+
+
+def pockets_of(
+    laminate: Laminate, chamber: Chamber, direction: float
+) -> list[MeasuredPocket] | None:
+    """Return the pockets at a chamber's centres; None where one has no room beside its strips."""
+    strips = [inlet.width for inlet in laminate.inlets if inlet.chamber == chamber.name]
+    back = max(strips, default=0.0) / 2 + SEPARATE
+    found = [_pocket(laminate, centre, back, direction) for centre in chamber.centres]
+    return [pocket for pocket in found if pocket] if all(found) else None
+
+
+def _pocket(
+    laminate: Laminate, centre: Point, back: float, direction: float
+) -> MeasuredPocket | None:
+    for interface in laminate.interfaces:
+        if interface.unbonded.contains(centre):
+            cores = [p for p in grow(interface.unbonded, -back).pieces if p.contains(centre)]
+            if cores:
+                region = grow(cores[0], back)
+                lying = region.turned(-direction)
+                low_x, low_y, high_x, high_y = lying.bounds
+                share = region.area / ((high_x - low_x) * (high_y - low_y))
+                sizes = _chord(lying, 0), _chord(lying, 1)
+                return MeasuredPocket(region, interface, *sizes, share)
+    return None
+
+
+def _chord(region: Region, axis: int) -> float:
+    """Return the median length of three chords along x (``axis`` 0) or y, past mouths of strips."""
+    low, high = region.bounds[:2], region.bounds[2:]
+    across = 1 - axis
+    lengths = []
+    for share in (0.25, 0.5, 0.75):
+        at = low[across] + share * (high[across] - low[across])
+        start, end = (low[0] - 1.0, at), (high[0] + 1.0, at)
+        if axis:
+            start, end = (at, low[1] - 1.0), (at, high[1] + 1.0)
+        box = (region & strip(start, end, SEPARATE)).bounds
+        lengths.append(box[2 + axis] - box[axis])
+    return sorted(lengths)[1]
+
+
+def mechanism_figures(
+    mechanism: Mechanism, laminate: Laminate, request: PredictionRequest
+) -> Iterator[Figure | LeftOut]:
+    """Yield the figures of a mechanism, chamber by chamber, and those left out with the reason."""
+    several = len(laminate.chambers) > 1
+    for chamber in laminate.chambers:
+        of = f" of {chamber.name}" if several else ""
+        pockets = pockets_of(laminate, chamber, mechanism.direction)
+        if not pockets:
+            yield LeftOut(
+                f"what chamber {chamber.name} does", "it has no pocket wider than a strip"
+            )
+            continue
+        if len({(round(p.length, 6), round(p.width, 6)) for p in pockets}) > 1:
+            reason = "its pockets are of different sizes, and the model is of equal ones"
+            yield LeftOut(f"what chamber {chamber.name} does", reason)
+            continue
+        filled = FilledChamber(mechanism, chamber, pockets, request.pressures_kpa, of)
+        yield from FIGURES[mechanism.kind](filled)
+
+
+def _not_straight(pocket: MeasuredPocket, name: str, of: str) -> LeftOut:
+    return LeftOut(
+        f"{name}{of}",
+        f"the model is of straight seams, and the pocket fills {100 * pocket.share:.0f} % of the "
+        f"rectangle round it, less than {100 * RECTANGULAR:g} %",
+    )
+
+
+def _most_pressure(stiffness: float | None, tension_at_1_kpa: float) -> float:
+    """Return the pressure in kPa at which the film is stretched by ``MOST_STRETCH``."""
+    return math.inf if stiffness is None else MOST_STRETCH * stiffness / tension_at_1_kpa
+
+
+def _up_to_stretch(
+    name: Callable[[float], str],
+    most: float,
+    pressures: Sequence[float],
+    figure: Callable[[float], Figure],
+) -> Iterator[Figure | LeftOut]:
+    """Yield a figure at each pressure that the film stands, and at the most it stands otherwise."""
+    for pressure in pressures:
+        if pressure <= most:
+            yield figure(pressure)
+        else:
+            yield LeftOut(
+                name(pressure),
+                f"the film would stretch by more than {100 * MOST_STRETCH:g} %: the model holds to "
+                f"{most:.3g} kPa, and further for a film of more modulus x thickness",
+            )
+    if pressures and most < min(pressures):
+        yield figure(float(f"{most * 0.999:.3g}"))
+
+
+def _stretch_note(stiffness: float | None) -> str:
+    if stiffness is None:
+        return "films are taken not to stretch, and the modulus of one is not known"
+    return f"films that stretch less than {100 * MOST_STRETCH:g} %"
+
+
+def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+    of = filled.of
+    pocket = filled.pockets[0]
+    if not pocket.is_rectangular:
+        yield _not_straight(pocket, "contraction and pull", of)
+        return
+    series, beside = filled.rows
+    length, width = pocket.length, pocket.width
+    model = Model(
+        pouch.MOTOR,
+        "Niiyama et al., Soft Robotics 2 (2015) 59",
+        f"two arcs of constant length, {length:.4g} long and {width:.4g} mm wide: contraction 0 to "
+        f"36.3 %; seams do not hold it back, {_stretch_note(pocket.film_stiffness)}; "
+        f"{NOT_CALIBRATED}",
+    )
+    most = pouch.LARGEST_CONTRACTION
+    yield Figure("stroke", f"free contraction{of}", series * length * most, "mm", model)
+    yield Figure("stroke", f"free contraction{of}, share", 100 * most, "%", model)
+    for share in SHARES:
+        angle = float(pouch.half_angle(share))
+        limit = _most_pressure(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
+
+        def name(pressure: float, share: float = share) -> str:
+            return f"pull{of} at {pressure:g} kPa, {100 * share:g} % shorter"
+
+        def figure(pressure: float, share: float = share) -> Figure:
+            value = beside * float(pouch.pull(pressure, share, length, width))
+            return Figure("force", name(pressure, share), value, "N", model)
+
+        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+    content = len(filled.pockets) * float(pouch.volume(most, length, width))
+    yield Figure("actuation", f"volume at free contraction{of}", content, "ul", model)
+
+
+def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+    of = filled.of
+    pocket = filled.pockets[0]
+    if not pocket.is_rectangular:
+        yield _not_straight(pocket, "bend and moment", of)
+        return
+    length, width = pocket.length, pocket.width
+    model = Model(
+        pouch.HINGE,
+        "statics of an arc over two stiff plates; the angular pouch motor of Niiyama et al., Soft "
+        "Robotics 2 (2015) 59",
+        f"a pouch {length:.4g} long and {width:.4g} mm wide, its joint in the middle: 0 to "
+        f"{math.degrees(pouch.free_bend()):.1f} deg; plates that do not bend, a joint that does "
+        f"not resist, {_stretch_note(pocket.film_stiffness)}; an upper bound; {NOT_CALIBRATED}",
+    )
+    count = len(filled.pockets)
+    each = math.degrees(pouch.free_bend())
+    joints = f", {count} hinges" if count > 1 else ""
+    yield Figure("bending", f"free bend{of}{joints}", count * each, "deg", model)
+    angle = float(pouch.half_angle(1 - math.cos(pouch.free_bend() / 4)))
+    limit = _most_pressure(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
+    for share, at in ((0.0, "straight"), (0.5, "half bent")):
+
+        def name(pressure: float, at: str = at) -> str:
+            return f"moment{of} at {pressure:g} kPa, {at}"
+
+        def figure(pressure: float, share: float = share, at: str = at) -> Figure:
+            bend = share * pouch.free_bend()
+            value = float(pouch.moment(pressure, bend, length, width))
+            return Figure("force", name(pressure, at), value, "N mm", model)
+
+        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+
+
+def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+    of = filled.of
+    pocket = filled.pockets[0]
+    length, width = pocket.length, pocket.width
+    across = 2 * inflated_beam.radius(width)
+    if length < inflated_beam.SLENDER * across:
+        reason = (
+            f"{length:.4g} mm is less than {inflated_beam.SLENDER:g} times the inflated diameter, "
+            f"{across:.3g} mm: no beam"
+        )
+        yield LeftOut(f"inflated beam{of}", reason)
+        return
+    model = Model(
+        inflated_beam.MODEL,
+        "Comer and Levy, AIAA J. 1 (1963) 1652",
+        f"a tube {length:.4g} long of flat width {width:.4g} mm, held at one end, its load at the "
+        f"other; {_stretch_note(pocket.film_stiffness)}; {NOT_CALIBRATED}",
+    )
+    yield Figure("size", f"inflated diameter of a beam{of}", across, "mm", model)
+    limit = _most_pressure(pocket.film_stiffness, inflated_beam.hoop_tension(1.0, width))
+    loads = (
+        ("load that wrinkles", inflated_beam.wrinkling_moment),
+        ("load that collapses", inflated_beam.collapse_moment),
+    )
+    for words, law in loads:
+
+        def name(pressure: float, words: str = words) -> str:
+            return f"{words} a beam{of} at {pressure:g} kPa"
+
+        def figure(
+            pressure: float,
+            words: str = words,
+            law: Callable[[float, float], float] = law,
+        ) -> Figure:
+            return Figure("force", name(pressure, words), law(pressure, width) / length, "N", model)
+
+        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+
+
+def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+    of = filled.of
+    pocket = filled.pockets[0]
+    sheets = pocket.interface.masks
+    films = {sheet.film for sheet in sheets}
+    if len(films) != 1 or len(sheets) < 2:
+        yield LeftOut(
+            f"stiffness{of}", f"jamming needs two sheets of one film; it has {len(sheets)}"
+        )
+        return
+    (film,) = films
+    assert filled.mechanism.friction is not None
+    count, width, length, thick = len(sheets), pocket.width, pocket.length, film.thickness
+    model = Model(
+        jamming.MODEL,
+        "Narang, Vlassak and Howe, Adv. Funct. Mater. 28 (2018) 1707136",
+        f"{count} sheets of {thick:g} mm as one beam {width:.4g} mm wide until they slip, friction "
+        f"{filled.mechanism.friction:g} as given; the bag's films not counted; {NOT_CALIBRATED}",
+    )
+    ratio = float(count**2)
+    yield Figure("stiffness", f"jammed over loose stiffness{of}", ratio, "", model)
+    if film.elastic is None:
+        yield LeftOut(f"bending stiffness{of}", f"the modulus of {film.material} is not known")
+    else:
+        modulus = film.elastic[0]
+        for words, law in (
+            ("loose", jamming.loose_stiffness),
+            ("jammed", jamming.jammed_stiffness),
+        ):
+            value = law(modulus, width, thick, count)
+            yield Figure("stiffness", f"bending stiffness{of}, {words}", value, "N mm2", model)
+    for pressure in filled.pressures:
+        name = f"load at the end that slips{of}, {length:.4g} mm out, vacuum of {pressure:g} kPa"
+        if pressure > ATMOSPHERE:
+            yield LeftOut(name, f"no vacuum is larger than {ATMOSPHERE:.0f} kPa")
+            continue
+        value = jamming.slip_force(pressure, filled.mechanism.friction, width, thick, count)
+        yield Figure("force", name, value, "N", model)
+
+
+PUSH = Model(
+    "pressure x pocket area",
+    "statics of a stiff plate",
+    "an upper bound, for a plate that lies flat on the whole pocket and for a wall without "
+    "stiffness. Pouches of coated textile, 8 mm at 1 mm gaps, pushed with 2.1 N at 230 kPa (arXiv "
+    "2602.18992): 0.18 of this bound, 0.27 of Eq. 4, which is of thin film that bends and folds "
+    f"freely; {NOT_CALIBRATED}",
+)
+
+
+def _push(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
+    of = filled.of
+    each = " a pouch" if len(filled.pockets) > 1 else ""
+    for pressure in filled.pressures:
+        name = f"blocked force{of}{each} at {pressure:g} kPa, flat, at most"
+        yield Figure("force", name, float(force(pressure, filled.pockets[0].area)), "N", PUSH)
+
+
+FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | LeftOut]]] = {
+    "pouch-motor": _motor,
+    "hinge": _hinge,
+    "beam": _beam,
+    "jamming": _jammed,
+    "push": _push,
+}
+
+LEFT_OUT: Mapping[MechanismKind, tuple[str, ...]] = {
+    "pouch-motor": ("bending", "folded diameter"),
+    "hinge": ("stroke", "folded diameter"),
+    "beam": ("stroke", "bending", "folded diameter"),
+    "jamming": ("stroke", "bending", "folded diameter"),
+    "push": ("stroke", "bending", "folded diameter"),
+}
+"""Quantities that a mechanism has no figure for."""

@@ -1,0 +1,102 @@
+"""Pouches of film that does not stretch: as a motor that shortens, and as a hinge that bends.
+
+A pouch of length L between two seams of width D fills to two arcs of half angle t that keep their
+length. The motor is the model of Niiyama et al., Soft Robotics 2 (2015) 59, doi
+10.1089/soro.2014.0023: length L sin t / t, volume D L^2 (t - sin t cos t) / 2 t^2, pull
+p D L cos t / t. The hinge is its pouch across the joint of two stiff plates: one film lies on them,
+the other is an arc over both. Its moment is our statics of that section: film tension p L / 2t at
+the plates' ends, less the pressure on a plate. Lengths mm, pressures kPa, forces N, moments N mm.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sbafab.models.parabola import BISECTIONS, inverse, within
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+MOTOR = "pouch motor"
+HINGE = "pouch hinge"
+LARGEST_CONTRACTION = 1 - 2 / math.pi
+"""Share of the flat length: both arcs are then half circles."""
+SHALLOW = 1e-4
+"""Half angle below which series are exact to 1e-9."""
+
+
+def contraction(angle: ArrayLike) -> NDArray[np.float64]:
+    """Return by what share of its length a pouch is shorter at half angles up to pi/2."""
+    t = within(angle, math.pi / 2, "half angle", "rad", MOTOR)
+    safe = np.maximum(t, SHALLOW)
+    return np.asarray(np.where(t > SHALLOW, 1 - np.sin(safe) / safe, t**2 / 6))
+
+
+def half_angle(share: ArrayLike) -> NDArray[np.float64]:
+    """Return the half angle at a contraction, a share. Raises DesignError out of range."""
+    shares = within(share, LARGEST_CONTRACTION, "contraction", "of its length", MOTOR)
+    return inverse(contraction, shares, math.pi / 2)
+
+
+def volume(share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+    """Return the volume in ul at a contraction."""
+    t = half_angle(share)
+    safe = np.maximum(t, SHALLOW)
+    section = np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
+    return np.asarray(width * length**2 / 2 * section)
+
+
+def pull(pressure: float, share: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+    """Return the pull in N at contractions above 0: flat it grows beyond every limit."""
+    t = half_angle(share)
+    return np.asarray(pressure / 1000 * width * length * np.cos(t) / t)
+
+
+def tension(pressure: float, angle: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Return the tension in N/mm of an arc of this length and half angle."""
+    return np.asarray(pressure / 1000 * length / (2 * np.asarray(angle, dtype=float)))
+
+
+# The hinge: plates of half the pouch's length on both sides of the joint.
+
+
+def bent(angle: ArrayLike) -> NDArray[np.float64]:
+    """Return the bend in rad at which the free film's half angle is ``angle``."""
+    return np.asarray(2 * np.arccos(1 - contraction(angle)))
+
+
+def hinge_section(bend: ArrayLike, length: float) -> NDArray[np.float64]:
+    """Return the section's area in mm2: the triangle over the joint and the arc over that."""
+    b = np.asarray(bend, dtype=float)
+    t = _angle_at(b)
+    safe = np.maximum(t, SHALLOW)
+    arc = np.where(t > SHALLOW, (safe - np.sin(safe) * np.cos(safe)) / safe**2, 2 * t / 3)
+    return np.asarray(length**2 / 8 * np.sin(b) + length**2 / 4 * arc)
+
+
+def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> NDArray[np.float64]:
+    """Return the moment in N mm that bends the hinge on, at bends up to the free one."""
+    b = within(bend, free_bend(), "bend of a hinge", "rad", HINGE)
+    t = _angle_at(b)
+    safe = np.maximum(t, SHALLOW)
+    lever = np.where(t > SHALLOW, np.sin(safe + b / 2) / safe, 1 + 1 / math.sqrt(3))
+    return np.asarray(pressure / 1000 * width * length**2 / 4 * (lever - 0.5))
+
+
+@cache
+def free_bend() -> float:
+    """Return the bend in rad at which the moment is 0: of any pouch, at any pressure."""
+    low, high = 1.0, math.pi / 2
+    for _ in range(BISECTIONS):
+        t = (low + high) / 2
+        is_pulling = math.sin(t + float(bent(t)) / 2) > t / 2
+        low, high = (t, high) if is_pulling else (low, t)
+    return float(bent(low))
+
+
+def _angle_at(bend: NDArray[np.float64]) -> NDArray[np.float64]:
+    return half_angle(1 - np.cos(bend / 2))
