@@ -287,8 +287,8 @@ def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds
 
 
 def test_a_mechanism_of_straight_seams_leaves_a_round_pocket_out() -> None:
-    data = as_1dof(1, 1.7)
-    data["mechanism"] = {"kind": "pouch-motor"}
+    data = tables()
+    data["shapes"]["pocket"] = {"disc": 30}
     design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
     prediction = predict(design, PredictionRequest((1.0,)))
     assert any(
