@@ -25,7 +25,7 @@ from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.strands import Strand, polyline
 from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import LONGEST, Length, LengthOrZero, Millimetres
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, SbafabError
 from sbafab.geometry.contour import Mark, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point, unit
 from sbafab.geometry.offset import fillet, grow
@@ -423,6 +423,16 @@ class DrawnDesign(Design):
         for key, file in self.drawings.items():
             yield read_drawing(file, named[key.split(".")[1]].layer)
 
+    def drawn_shapes(self) -> Mapping[str, Region | None]:
+        shapes = ShapeRegions(self)
+        regions: dict[str, Region | None] = {}
+        for name in self.shapes.by_name:
+            try:
+                regions[name] = shapes.of(name, f"shapes.{name}")
+            except SbafabError:
+                regions[name] = None
+        return regions
+
     def drawn_from(self, key: str, file: str) -> Self:
         _, name, _ = key.split(".")
         shape = self.shapes.by_name[name].model_copy(update={"file": file})
@@ -635,8 +645,10 @@ class ShapeRegions:
             )
         if name not in self._regions:
             self._open.append(name)
-            region = self._placed(name, self.shapes[name])
-            self._open.pop()
+            try:
+                region = self._placed(name, self.shapes[name])
+            finally:
+                self._open.pop()
             if region.is_empty:
                 raise DesignError(f"shapes.{name} encloses no area; change its sizes")
             self._regions[name] = region

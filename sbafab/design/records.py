@@ -193,6 +193,10 @@ class Design(Section):
             Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
         )
 
+    def drawn_shapes(self) -> Mapping[str, Region | None]:
+        """Return the shapes that the design file names; None for one that cannot be made."""
+        return {}
+
     def drawn_from(self, key: str, file: str) -> Self:
         """Return the design with another file under one of the keys of ``drawings``."""
         assert key == OUTLINE, key

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, MutableMapping
+from collections.abc import Iterable, MutableMapping, MutableSequence
 from typing import Any
 
 import tomlkit
@@ -13,7 +13,10 @@ from tomlkit.exceptions import TOMLKitError
 from sbafab.errors import DesignError
 
 Edit = tuple[str, str | None]
-"""A dotted key and its value as TOML writes it; None takes the key out."""
+"""A dotted key and its value as TOML writes it; None takes the key out.
+
+A whole number in a key counts the rows of a list, from 0: ``layers.2.shape``.
+"""
 MOST_EDITS = 200
 
 
@@ -45,8 +48,16 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
 def _has_table(table: Any, parts: list[str]) -> bool:
     """Return True if the table of the key exists."""
     for part in parts[:-1]:
-        table = table.get(part) if isinstance(table, MutableMapping) else None
+        table = _inner(table, part)
     return isinstance(table, MutableMapping)
+
+
+def _inner(table: Any, part: str) -> Any:
+    """Return what a table has under a name, or a list at a number; None where it has nothing."""
+    if isinstance(table, MutableMapping):
+        return table.get(part)
+    is_row = isinstance(table, MutableSequence) and part.isdecimal() and int(part) < len(table)
+    return table[int(part)] if is_row else None
 
 
 def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:
@@ -55,10 +66,10 @@ def _holds(document: tomlkit.TOMLDocument, parts: list[str]) -> bool:
         written: Any = tomllib.loads(tomlkit.dumps(document))
         intended: Any = document.unwrap()
         for part in parts:
-            written, intended = written[part], intended[part]
-    except (tomllib.TOMLDecodeError, KeyError, TypeError):
+            written, intended = _inner(written, part), _inner(intended, part)
+    except tomllib.TOMLDecodeError:
         return False
-    return bool(written == intended)
+    return intended is not None and bool(written == intended)
 
 
 def _value(key: str, text: str) -> Any:
@@ -73,20 +84,27 @@ def _put(
 ) -> None:
     *above, last = parts
     for depth, part in enumerate(above):
-        inner = table.get(part)
+        inner = _inner(table, part)
         if inner is None and dotted and isinstance(table, tomlkit.items.Table):
             table.append(tomlkit.key(parts[depth:]), value)
             return
-        if inner is None:
-            table[part] = tomlkit.table()
+        if inner is None and isinstance(table, MutableMapping):
+            within = isinstance(table, tomlkit.items.InlineTable)
+            table[part] = tomlkit.inline_table() if within else tomlkit.table()
             inner = table[part]
-        if not isinstance(inner, MutableMapping):
-            raise DesignError(f"{'.'.join(parts)}: {part} is a value, not a table")
+        if not isinstance(inner, MutableMapping | MutableSequence):
+            missing = "is not there" if inner is None else "is a value, not a table"
+            raise DesignError(f"{'.'.join(parts)}: {part} {missing}; change it in the text")
         table = inner
+    if not isinstance(table, MutableMapping):
+        raise DesignError(f"{'.'.join(parts)} is no key of a table; change it in the text")
     old = table.get(last)
     if old is not None and hasattr(old, "trivia") and hasattr(value, "trivia"):
         _comment_like(old, value)
-    table[last] = value
+    if isinstance(table, tomlkit.items.InlineTable) and last not in table:
+        table.append(last, value)
+    else:
+        table[last] = value
 
 
 def _comment_like(old: Any, value: Any) -> None:
@@ -98,10 +116,8 @@ def _comment_like(old: Any, value: Any) -> None:
 
 
 def _take_out(table: MutableMapping[str, Any], parts: list[str]) -> None:
-    above: list[MutableMapping[str, Any]] = [table]
+    inner: Any = table
     for part in parts[:-1]:
-        inner = above[-1].get(part)
-        if not isinstance(inner, MutableMapping):
-            return
-        above.append(inner)
-    above[-1].pop(parts[-1], None)
+        inner = _inner(inner, part)
+    if isinstance(inner, MutableMapping):
+        inner.pop(parts[-1], None)

@@ -18,7 +18,7 @@ from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.forms import keys
-from sbafab.studio.model import CancelCheck, finding_model, laminate_model, parts_model
+from sbafab.studio.model import CancelCheck, finding_model, laminate_model, parts_model, shapes_model
 from sbafab.studio.moving import (
     Filling,
     moving_parts,
@@ -57,8 +57,12 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
         return
     yield {"kind": "design", "name": design.name, "family": design.family, **_values(design)}
     pause()
+    has = frozenset(job.get("has", ()))
+    drawn = design.drawn_shapes()
+    if drawn:
+        yield shapes_model(drawn, has)
     laminate = _laminate(source)
-    yield laminate_model(laminate, frozenset(job.get("has", ())))
+    yield laminate_model(laminate, has)
     pause()
     yield _prediction(design, laminate)
     pause()
@@ -280,7 +284,7 @@ def refusal(sentence: str) -> Answer:
 
 
 def _is_key(word: str) -> bool:
-    return word.startswith("parts.") or word in design_keys()
+    return word.startswith(("parts.", "shapes.")) or word in design_keys()
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -97,6 +97,13 @@ def _pattern(laminate: Laminate, layers: tuple[Layer, ...], shapes: AnswerShapes
         "bounds": list(first.profile.bounds),
         "marks": [asdict(mark) for mark in api.dimensions(laminate, first)],
     }
+
+
+def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> dict[str, Any]:
+    """The shapes that a design file names, each the key of its region or None."""
+    shapes = AnswerShapes(has)
+    named = {name: region and shapes.key(region) for name, region in drawn.items()}
+    return {"kind": "shapes", "named": named, "shapes": shapes.new}
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:
