@@ -80,9 +80,10 @@ def _value(key: str, text: str) -> Any:
 
 
 def _put(
-    table: MutableMapping[str, Any], parts: list[str], value: Any, dotted: bool = False
+    document: tomlkit.TOMLDocument, parts: list[str], value: Any, dotted: bool = False
 ) -> None:
     *above, last = parts
+    table: Any = document
     for depth, part in enumerate(above):
         inner = _inner(table, part)
         if inner is None and dotted and isinstance(table, tomlkit.items.Table):

@@ -18,7 +18,13 @@ from sbafab.errors import DesignError, SbafabError
 from sbafab.studio import places
 from sbafab.studio.editing import MOST_EDITS, edited
 from sbafab.studio.forms import keys
-from sbafab.studio.model import CancelCheck, finding_model, laminate_model, parts_model, shapes_model
+from sbafab.studio.model import (
+    CancelCheck,
+    finding_model,
+    laminate_model,
+    parts_model,
+    shapes_model,
+)
 from sbafab.studio.moving import (
     Filling,
     moving_parts,

@@ -43,8 +43,9 @@ class AnswerShapes:
 
 
 def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
-    """A contour as the page reads it."""
-    return [round(number, 6) for vertex in vertices for number in vertex]
+    """A contour as the page reads it; its bulges so exact that arcs may go back into a design."""
+    rounded = ((round(x, 6), round(y, 6), round(bulge, 12)) for x, y, bulge in vertices)
+    return [number for vertex in rounded for number in vertex]
 
 
 def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:

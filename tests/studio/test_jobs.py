@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import tomllib
 from itertools import islice
 from pathlib import Path
@@ -43,6 +45,44 @@ def test_a_shape_that_the_page_has_is_not_sent_again(tmp_path: Path) -> None:
     again = seen({**job(tmp_path, SMALL), "has": list(first["shapes"])})
     assert again["shapes"] == {}
     assert again["patterns"] == first["patterns"]
+
+
+def test_named_shapes_are_sent_with_their_arcs_even_where_one_fails(tmp_path: Path) -> None:
+    pouch = api.template("pouch")
+    told = {answer["kind"]: answer for answer in answers(job(tmp_path, pouch))}
+    named, shapes = told["shapes"]["named"], told["shapes"]["shapes"]
+    film = next(row for row in told["laminate"]["layers"] if row["role"] == "base")
+    assert named["film"] == told["laminate"]["patterns"][film["pattern"]]["shape"]
+    bulges = {round(abs(bulge), 9) for bulge in shapes[named["film"]][0][2::3]}
+    assert bulges == {0.0, round(math.tan(math.pi / 8), 9)}
+
+    crossed = "pocket = {path = [[0, 0], [9, 9], [9, 0], [0, 9]]}"
+    text = re.sub("(?m)^pocket = .*", crossed, pouch)
+    told = {answer["kind"]: answer for answer in jobs_answers(job(tmp_path, text))}
+    assert told["shapes"]["named"]["pocket"] is None
+    assert told["shapes"]["named"]["film"] is None
+    assert told["shapes"]["named"]["tab"] == named["tab"]
+    assert told["error"]["field"] == "shapes.pocket.path"
+    assert "crosses or touches itself at x 4.5000, y 4.5000" in told["error"]["message"]
+
+
+def jobs_answers(asked: dict[str, Any]) -> list[dict[str, Any]]:
+    """Everything that the page hears, errors included."""
+    return list(jobs.answers(asked, lambda: None))
+
+
+def test_a_row_of_a_list_is_edited_in_place() -> None:
+    pouch = api.template("pouch")
+    edits = [("layers.2.shape", '"ring"'), ("layers.2.pieces", "2"), ("shapes.tab.at", "[1, 2]")]
+    tab = "tab = {slot = [[0, 10], [0, 24]], width = 4"
+    assert edited(pouch, edits) == pouch.replace(
+        '{role = "cap", shape = "film"}', '{role = "cap", shape = "ring", pieces = 2}'
+    ).replace(tab, f"{tab}, at = [1, 2]")
+    shape = "[[layers]]\nshape = 'a'  # first\n[[layers]]\nshape = 'b'  # second\n"
+    assert edited(shape, [("layers.1.shape", "'c'")]) == shape.replace("'b'", "'c'")
+    for key in ("layers.3.shape", "layers.x.shape", "layers.1"):
+        with pytest.raises(DesignError, match=f"{key}.*change it in the text"):
+            edited(pouch, [(key, "1")])
 
 
 def seen(asked: dict[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ export function pathOf(shape) {
       if (b === 0) d += `L${c[j]} ${c[j + 1]}`;
       else {
         const r = radius(c[i * 3], c[i * 3 + 1], c[j], c[j + 1], b);
-        d += `A${r} ${r} 0 0 ${b > 0 ? 1 : 0} ${c[j]} ${c[j + 1]}`;
+        d += `A${r} ${r} 0 ${Math.abs(b) > 1 ? 1 : 0} ${b > 0 ? 1 : 0} ${c[j]} ${c[j + 1]}`;
       }
     }
     d += "Z";
@@ -20,7 +20,7 @@ export function pathOf(shape) {
 }
 const radius = (x0, y0, x1, y1, b) => Math.hypot(x1 - x0, y1 - y0) * (1 + b * b) / (4 * Math.abs(b));
 
-function arc(x0, y0, x1, y1, b) {
+export function arc(x0, y0, x1, y1, b) {
   // Centre left of the chord by the DXF convention.
   const k = (1 / b - b) / 4;
   const cx = (x0 + x1) / 2 - (y1 - y0) * k, cy = (y0 + y1) / 2 + (x1 - x0) * k;

@@ -90,10 +90,10 @@ export class Studio {
     this.ask();
   }
 
-  // A step of the history, once the hand rests.
+  // A step of the history, once the hand rests; a drag, which holds it, is one step.
   settle() {
     clearTimeout(this.settling);
-    this.settling = setTimeout(() => this.commit(), SETTLE);
+    if (!this.holding) this.settling = setTimeout(() => this.commit(), SETTLE);
     this.keep();
   }
   commit() {
@@ -188,6 +188,11 @@ export class Studio {
         if (seen) this.emit("laminate");
       },
       parts: () => this.heardParts(answer, flight),
+      shapes: () => {
+        for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
+        this.named = answer.named;
+        this.emit("shapes", answer.named);
+      },
       laminate: () => this.heardLaminate(answer, flight),
       prediction: () => {
         // What an assembly does takes seconds; until then the figures before are shown as such.
@@ -256,7 +261,7 @@ export class Studio {
   drop() {
     // Shapes of states long gone.
     if (this.shapes.size < 400) return;
-    const used = new Set([this.laminate, this.reference?.laminate].filter(Boolean).flatMap(shapeKeys));
+    const used = new Set([...[this.laminate, this.reference?.laminate].filter(Boolean).flatMap(shapeKeys), ...Object.values(this.named ?? {})]);
     for (const key of this.shapes.keys()) if (!used.has(key)) this.shapes.delete(key);
   }
   time(what, flight) {
