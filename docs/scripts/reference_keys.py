@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import sbafab
@@ -18,39 +18,48 @@ To have an editor complete and check keys, save the schema (`sbafab schema > des
 file with `#:schema ./design.schema.json`, which Taplo and its editor plug-ins read.
 """
 
-ALL = "Shared by `1dof`, `lobed`, `radial` and `drawn`, which `family` names.\n"
-FAMILIES = {
-    "OneDofDesign": "1dof",
-    "LobedDesign": "lobed",
-    "RadialDesign": "radial",
-    "DrawnDesign": "drawn",
-}
+ALL = "Shared by {}, which `family` names.\n"
 LENGTH = "^\\s*\\+?(?:"
 """How the pattern of a length with a unit begins."""
 
 
-def page() -> str:
+def page(schema: Mapping[str, Any] | None = None) -> str:
     """The whole page, as MyST Markdown: shared sections first, then those of each family."""
-    schema = sbafab.schema()
+    schema = schema or sbafab.schema()
     found = schema["$defs"]
-    sections = {name: _sections(found[name], found) for name in FAMILIES}
+    families = _families(schema)
+    usual = found[next(iter(families))]
+    sections = {name: _sections(found[name], found) for name in families}
     shared = {
         key: record
-        for key, record in sections["OneDofDesign"].items()
-        if all(sections[name].get(key) == record for name in FAMILIES)
+        for key, record in _sections(usual, found).items()
+        if all(sections[name].get(key) == record for name in families)
     }
-    parts = [HEAD, "\n## All families\n", ALL, *_table("", found["OneDofDesign"], found)]
+    *others, last = (f"`{family}`" for family in families.values())
+    common = ALL.format(f"{', '.join(others)} and {last}")
+    parts = [HEAD, "\n## All families\n", common, *_table("", usual, found)]
     for key, record in shared.items():
         parts += [f"\n### [{key}]\n", *_section(key, record, found)]
-    for name, family in FAMILIES.items():
+    for name, family in families.items():
         parts.append(f"\n## Family {family}\n\n{found[name]['description']}\n")
-        parts += _further(found[name], found["OneDofDesign"], found)
+        parts += _further(found[name], usual, found)
         for key, record in sections[name].items():
             if key not in shared:
                 parts += [f"\n### [{key}] of {family}\n", *_section(key, record, found)]
     parts += ["\n## Assemblies\n", "See [assemblies](../assemblies.md) for what each part is.\n"]
     parts += _table("", found["Assembly"], found)
     return "\n".join(parts) + "\n"
+
+
+def _families(schema: Mapping[str, Any]) -> dict[str, str]:
+    """The record of every family of single designs, with the family's name."""
+    names = map(_name, schema["oneOf"])
+    family_of = {name: schema["$defs"][name]["properties"]["family"] for name in names}
+    return {
+        name: family["const"]
+        for name, family in family_of.items()
+        if "stack" in schema["$defs"][name]["properties"]
+    }
 
 
 def _further(record: dict[str, Any], usual: dict[str, Any], found: dict[str, Any]) -> Iterator[str]:

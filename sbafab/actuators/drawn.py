@@ -20,7 +20,7 @@ from sbafab.actuators.stacking import CutFilm, channel_pin, layers
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
 from sbafab.design.outline import refuse_crossings
-from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap
+from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.design.strands import Strand, polyline
 from sbafab.design.toml_table import Section, writable
@@ -330,6 +330,11 @@ class DrawnDesign(Design):
     and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
     ``fillet.radius`` and ``bore.diameter`` move no shape: rules and pins read the last.
     """
+
+    model_config = card(
+        "Drawn layers",
+        "M5 26 27 18l22 8-22 8ZM5 19 27 11l22 8-22 8ZM5 12 27 4l22 8-22 8Z",
+    )
 
     family: Literal["drawn"]
     """Which kind of actuator this is."""

@@ -18,7 +18,7 @@ from sbafab.actuators.stacking import (
     reach,
     round_pockets,
 )
-from sbafab.design.records import Design, Form, Free, degrees_of_freedom
+from sbafab.design.records import Design, Form, Free, card, degrees_of_freedom
 from sbafab.design.toml_table import Section
 from sbafab.design.units import Length
 from sbafab.errors import DesignError
@@ -54,6 +54,13 @@ class Lumen(Section):
 
 class LobedDesign(Design):
     """Two to eight chambers in parallel round a central lumen."""
+
+    model_config = card(
+        "Lobed",
+        "M27.4 20a8 8 0 1 0 16 0 8 8 0 1 0-16 0Z"
+        "M14.8 12.7a8 8 0 1 0 16 0 8 8 0 1 0-16 0Z"
+        "M14.8 27.3a8 8 0 1 0 16 0 8 8 0 1 0-16 0Z",
+    )
 
     family: Literal["lobed"]
     """Which kind of actuator this is."""

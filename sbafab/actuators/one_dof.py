@@ -13,7 +13,7 @@ from sbafab.actuators.stacking import (
     pocket_shapes,
     round_pockets,
 )
-from sbafab.design.records import Design, Form, Free, degrees_of_freedom
+from sbafab.design.records import Design, Form, Free, card, degrees_of_freedom
 from sbafab.laminate.laminate import Laminate
 
 AXIS = (0.0, 0.0)
@@ -21,6 +21,11 @@ AXIS = (0.0, 0.0)
 
 class OneDofDesign(Design):
     """A stack of round balloons on one axis."""
+
+    model_config = card(
+        "One stack",
+        "M12 20a15 15 0 1 0 30 0 15 15 0 1 0-30 0ZM25 20a2 2 0 1 0 4 0 2 2 0 1 0-4 0Z",
+    )
 
     family: Literal["1dof"]
     """Which kind of actuator this is."""

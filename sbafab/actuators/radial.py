@@ -32,7 +32,7 @@ from sbafab.actuators.stacking import (
     stacked,
     tab_and_strip,
 )
-from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap
+from sbafab.design.records import Design, Drawn, Form, Free, Slots, Wrap, card
 from sbafab.design.sections import Chamber as ChamberSection
 from sbafab.design.sections import Inlet, Stack
 from sbafab.design.toml_table import Section
@@ -100,6 +100,14 @@ class RadialStack(Stack):
 
 class RadialDesign(Design):
     """Oblong SBAs bonded to one sheet that is wrapped round a tube."""
+
+    model_config = card(
+        "On a tube",
+        "M4 6h46v28H4Z"
+        "M8 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z"
+        "M22.5 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z"
+        "M37 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z",
+    )
 
     family: Literal["radial"]
     """Which kind of actuator this is."""

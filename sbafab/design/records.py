@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
 from pydantic import (
+    ConfigDict,
     Field,
     PrivateAttr,
 )
@@ -64,6 +65,14 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.notebook import table_html
+
+
+def card(title: str, symbol: str) -> ConfigDict:
+    """Return what forms show of a family: a few words, and a drawing.
+
+    ``symbol`` is SVG path data in a box 54 wide and 40 high. Both stand in the JSON schema.
+    """
+    return ConfigDict(title=title, json_schema_extra={"symbol": symbol})
 
 
 class Design(Section):

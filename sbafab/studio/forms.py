@@ -49,16 +49,41 @@ UNITS = (
 
 def families(schema: JsonSchema) -> dict[str, list[Field]]:
     """The fields of every family of single designs."""
-    fields_of = {}
+    return {
+        name: sorted(_fields(table, schema, ""), key=_rank)
+        for name, table in _family_tables(schema)
+    }
+
+
+def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
+    """The words and the drawing by which each family is chosen, as its record gives them."""
+    return {
+        name: {
+            "title": table["title"] if "symbol" in table else name,
+            "symbol": table.get("symbol", ""),
+            "meaning": " ".join(table.get("description", "").split()),
+        }
+        for name, table in _family_tables(schema)
+    }
+
+
+def _family_tables(schema: JsonSchema) -> Iterator[tuple[str, JsonSchema]]:
     for record in schema["oneOf"]:
         table = _named(record["$ref"], schema)
-        name = (
-            table["properties"]["family"].get("const") or table["properties"]["family"]["default"]
-        )
+        family = table["properties"]["family"]
+        name = family.get("const") or family["default"]
         if name != "assembly":
-            fields = list(_fields(table, schema, ""))
-            fields_of[name] = sorted(fields, key=_rank)
-    return fields_of
+            yield name, table
+
+
+def summaries() -> dict[str, str]:
+    """The templates, each with the sentence that its file begins with."""
+    return {name: _first_comment(api.template(name)) for name in api.templates()}
+
+
+def _first_comment(text: str) -> str:
+    first = text.partition("\n")[0]
+    return first.lstrip("# ") if first.startswith("#") else ""
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
@@ -192,7 +217,9 @@ def started(
         "template": template,
         "files": places.listed(folder) if folder else [],
         "templates": api.templates(),
+        "summaries": summaries(),
         "families": families(schema),
+        "cards": cards(schema),
         "assembly": assembly(schema),
     }
 

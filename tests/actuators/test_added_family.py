@@ -6,6 +6,7 @@ import ast
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,9 @@ from typing import NamedTuple
 import pytest
 
 import sbafab
+from docs.scripts import reference_keys
 from sbafab.actuators import FAMILIES, one_dof
+from sbafab.studio import forms
 
 TWIN = (
     inspect.getsource(one_dof)
@@ -158,6 +161,11 @@ def test_assemblies_and_the_schema_know_it(site: Path, folder: Path) -> None:
     )
     assert plain.stdout == added.stdout != ""
     assert "TwinDesign" in schema.stdout
+    # The studio's forms and the page of keys follow from the schema.
+    tables = json.loads(schema.stdout)
+    assert forms.cards(tables)["twin"] == forms.cards(tables)["1dof"]
+    assert forms.families(tables)["twin"] == forms.families(tables)["1dof"]
+    assert "## Family twin" in reference_keys.page(tables)
 
 
 def test_a_family_that_cannot_be_loaded_is_named(tmp_path: Path, folder: Path) -> None:
@@ -169,9 +177,35 @@ def test_a_family_that_cannot_be_loaded_is_named(tmp_path: Path, folder: Path) -
     assert "Traceback" not in run.stderr
 
 
+TOP = Path(sbafab.__file__).parent
+
+
 def modules_outside_the_families() -> list[Path]:
-    top = Path(sbafab.__file__).parent
-    return [p for p in sorted(top.rglob("*.py")) if "actuators" not in p.relative_to(top).parts]
+    package = [p for p in sorted(TOP.rglob("*.py")) if "actuators" not in p.relative_to(TOP).parts]
+    beside = [TOP.parent / "docs", TOP.parent / "benchmarks"]
+    return [*package, *(path for folder in beside for path in sorted(folder.rglob("*.py")))]
+
+
+def test_no_page_of_the_studio_names_a_family() -> None:
+    names = "|".join(map(re.escape, FAMILIES))
+    # In quotes, as the key of an object, as an attribute, or as a design file would write it.
+    named = re.compile(
+        rf"""(["'`\\])({names})\1|[{{,]\s*({names})\s*:|(families|cards)\.({names})\b"""
+        rf"""|family\W+({names})\b"""
+    )
+    static = TOP / "studio" / "static"
+    pages = [p for p in static.rglob("*") if p.suffix in {".js", ".html", ".css"}]
+    pages = [path for path in pages if "vendor" not in path.parts]
+    assert len(pages) > 30
+    lines = [
+        f"{path.name}:{number}: {line.strip()[:80]}"
+        for path in pages
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if named.search(line)
+    ]
+    assert lines == []
+    for line in ('family === "lobed"', "x = {radial: 1}", "families.drawn", 'family = \\"1dof\\"'):
+        assert named.search(line), line
 
 
 def test_no_room_but_actuators_asks_a_familys_name() -> None:

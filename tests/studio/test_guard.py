@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sbafab import api
+from sbafab.actuators import FAMILIES
 from sbafab.studio.app import Studio, app
 from sbafab.studio.places import RunFolder, zipped
 from tests.studio.asking import Client
@@ -155,7 +156,14 @@ def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: St
 
 def test_templates_and_forms_are_whole(client: Client) -> None:
     start = client.get("/api/start", headers=HEADERS).json()
-    assert set(start["families"]) == {"1dof", "lobed", "radial", "drawn"}
+    assert set(start["families"]) == set(FAMILIES)
+    assert set(start["cards"]) == set(FAMILIES)
+    for card in start["cards"].values():
+        assert card["title"][0].isupper()
+        assert card["symbol"].startswith("M")
+        assert card["meaning"].endswith(".")
+    assert list(start["summaries"]) == start["templates"]
+    assert all(start["summaries"].values())
     lobed = {field["key"]: field for field in start["families"]["lobed"]}
     assert lobed["chamber.diameter"]["unit"] == "mm"
     assert lobed["press.temperature_c"]["unit"] == "\u00b0C"

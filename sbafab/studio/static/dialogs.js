@@ -2,13 +2,6 @@
 import { $, download, el } from "./dom.js";
 import { ask, withoutServer } from "./server.js";
 
-const ABOUT = {
-  "1dof-5mm": "One stack of 5 mm balloons", "1dof-10mm": "One stack of 10 mm balloons",
-  "3dof-15mm": "Three chambers round a lumen: bends every way", "radial-15mm": "Balloons on a tube: expands",
-  pouch: "Two films round a pocket, drawn layer by layer",
-  aperture: "Assembly: 3-DoF arm on a magnet base", brace: "Assembly: brace, arm and cup on one tube", standing: "Assembly: three arms on a tube",
-};
-
 export class Dialogs {
   constructor(studio, { picture, section }) {
     Object.assign(this, { studio, picture, section, dialog: $("#dialog") });
@@ -27,7 +20,7 @@ export class Dialogs {
       try { await load(); this.dialog.close(); } catch (error) { alert(error.message); }
     };
     const cards = studio.templates.map((name) => el("button", { onclick: () => pick(async () => studio.open((await ask(`/api/template/${encodeURIComponent(name)}`)).text)) },
-      el("img", { src: `templates/${name}.webp`, alt: "", loading: "lazy", width: 320, height: 240 }), el("div", {}, el("strong", {}, name), el("small", {}, ABOUT[name] ?? ""))));
+      el("img", { src: `templates/${name}.webp`, alt: "", loading: "lazy", width: 320, height: 240, onerror: (event) => { event.target.style.visibility = "hidden"; } }), el("div", {}, el("strong", {}, name), el("small", {}, studio.summaries[name]))));
     const own = files.length ? [el("h3", {}, `Design files in ${studio.folder}`), el("div", { class: "files" }, ...files.map((name) => el("button", { onclick: () => pick(async () => { const { text, sha } = await ask(`/api/file/${encodeURIComponent(name)}`); studio.open(text, { name, seen: sha }); }) }, name)))] : [];
     const link = el("input", { type: "text", placeholder: "Paste a link that holds a design", "aria-label": "Link", style: false });
     const file = el("input", { type: "file", accept: ".toml", "aria-label": "Other design file", onchange: () => pick(async () => studio.open(await file.files[0].text(), { saved: "" })) });

@@ -6,12 +6,6 @@ import { assemblySections, assemblyShape } from "./assembly_form.js";
 const TITLES = { "": "Design", tpe: "TPE", ptfe: "PTFE" };
 const title = (word) => TITLES[word] ?? word.replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase());
 const OPEN = ["stack", "chamber", "lumen", "bond", "mask"];
-const FAMILY_PICTURES = {
-  "1dof": { words: "One stack", d: ["M12 20a15 15 0 1 0 30 0 15 15 0 1 0-30 0Z", "M25 20a2 2 0 1 0 4 0 2 2 0 1 0-4 0Z"] },
-  lobed: { words: "Lobed", d: [0, 120, 240].map((t) => { const x = 27 + 8.4 * Math.cos((t * Math.PI) / 180), y = 20 - 8.4 * Math.sin((t * Math.PI) / 180); return `M${x - 8} ${y}a8 8 0 1 0 16 0 8 8 0 1 0-16 0Z`; }) },
-  radial: { words: "On a tube", d: ["M4 6h46v28H4Z", ...[8, 22.5, 37].map((x) => `M${x} 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z`)] },
-  drawn: { words: "Drawn layers", d: [26, 19, 12].map((y) => `M5 ${y} 27 ${y - 8}l22 8-22 8Z`) },
-};
 
 export class Form {
   constructor(studio) {
@@ -37,7 +31,7 @@ export class Form {
     this.rows.clear();
     const fields = this.studio.families[family];
     if (!fields) {
-      this.form.replaceChildren(el("p", { class: "fallback" }, "Choose a template, or write family = \"lobed\" in the text."));
+      this.form.replaceChildren(el("p", { class: "fallback" }, `Choose a template, or write family = "${Object.keys(this.studio.families)[0]}" in the text.`));
       return false;
     }
     const sections = new Map();
@@ -75,9 +69,9 @@ export class Form {
 
   families() {
     return el("div", { class: "families", role: "group", "aria-label": "Family" }, ...Object.keys(this.studio.families).map((name) => {
-      const picture = FAMILY_PICTURES[name];
-      const drawing = el("svg", { viewBox: "0 0 54 40", "aria-hidden": "true" }, el("path", { d: picture?.d.join("") ?? "", fill: "var(--tpe)", stroke: "var(--tpe-line)", "stroke-width": 1 }));
-      return el("button", { type: "button", "aria-pressed": String(name === this.family), title: `family = "${name}"`, onclick: () => this.become(name) }, drawing, picture?.words ?? name);
+      const { title: words, symbol, meaning } = this.studio.cards[name];
+      const drawing = el("svg", { viewBox: "0 0 54 40", "aria-hidden": "true" }, el("path", { d: symbol, fill: "var(--tpe)", stroke: "var(--tpe-line)", "stroke-width": 1 }));
+      return el("button", { type: "button", "aria-pressed": String(name === this.family), title: `family = "${name}": ${meaning}`, onclick: () => this.become(name) }, drawing, words);
     }));
   }
   // Another family keeps what both know.
