@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator, MutableMapping
 from importlib import import_module
 from importlib.util import find_spec
+from keyword import iskeyword
 from typing import Any
 
 import click
@@ -19,6 +20,7 @@ from sbafab.process import prepare
 SUMMARIES = {
     "templates": "List the templates, a line each.",
     "new": "Write a commented design file to start from.",
+    "import": "Write a design of drawn layers from other files.",
     "generate": "Write everything: cut files, schedule, traveller, meshes.",
     "check": "Run the rules on a design or on an output folder.",
     "explain": "Explain a rule: criterion, reason, remedy.",
@@ -45,8 +47,8 @@ SUMMARIES = {
 A module has the name of its command. The summaries stand here so that ``sbafab --help`` and the
 completion of a command's name load no command.
 """
-BUILTIN = {"map": "map_"}
-"""Functions that cannot have the name of their command."""
+BUILTIN = {"map": "map_", "import": "import_"}
+"""Functions that cannot have the name of their command; nor can a module be named ``import``."""
 
 
 class CommandTable(MutableMapping[str, click.Command]):
@@ -58,7 +60,7 @@ class CommandTable(MutableMapping[str, click.Command]):
     def __getitem__(self, name: str) -> click.Command:
         command = self._loaded[name]
         if command is None:
-            module = import_module(f"sbafab.cli.{name}")
+            module = import_module(f"sbafab.cli.{BUILTIN[name] if iskeyword(name) else name}")
             command = self._loaded[name] = getattr(module, BUILTIN.get(name, name))
             add_verbosity(command)
         return command

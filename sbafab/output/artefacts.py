@@ -398,10 +398,13 @@ def _laminate(folder: DesignFolder) -> str:
 def _design(folder: DesignFolder) -> str:
     """Return the design as a file; a drawing and a kit of the user's come to lie beside it."""
     design = folder.design
+    names: dict[Path, str] = {}
     for key, file in design.drawings.items():
-        name = f"{'-'.join(key.split('.')[1:])}{file.suffix.lower()}"
-        shutil.copyfile(file, folder.path / name)
-        design = design.drawn_from(key, name)
+        # Several shapes may be layers of one drawing.
+        if file not in names:
+            names[file] = f"{'-'.join(key.split('.')[1:])}{file.suffix.lower()}"
+            shutil.copyfile(file, folder.path / names[file])
+        design = design.drawn_from(key, names[file])
     if design.kit not in kit_names():
         (folder.path / KIT_FILE).write_bytes(kit_of(design).text)
         design = design.model_copy(update={"kit": KIT_FILE})

@@ -1,0 +1,55 @@
+"""``sbafab import``: a design of drawn layers from what another program, or a run, wrote."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import click
+
+from sbafab.cli.options import json_option
+from sbafab.cli.printing import print_json
+from sbafab.importing.sources import import_source
+from sbafab.importing.write import default_file, write_imported
+
+
+@click.command("import")
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--out",
+    "file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="The design file to write; its drawings come to lie in a folder beside it.  "
+    "[default: NAME.toml]",
+)
+@json_option
+def import_(source: Path, file: Path | None, as_json: bool) -> None:
+    """Write a design of drawn layers from other files.
+
+    SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
+    ParchMint circuit (JSON), or a laminate of foldable_robotics or popupCAD. What is not carried
+    over is named.
+    """
+    name, imported = import_source(source)
+    written = write_imported(imported, file or default_file(imported), source.name)
+    laminate = written.laminate
+    if as_json:
+        print_json(
+            {
+                "file": str(written.file),
+                "format": name,
+                "layers": len(laminate.layers),
+                "patterns": len(laminate.patterns),
+                "remarks": list(imported.remarks),
+            }
+        )
+        return
+    for remark in imported.remarks:
+        click.echo(f"note: {remark}", err=True)
+    path = shlex.quote(str(written.file))
+    click.echo(
+        f"{written.file} written: {len(laminate.layers)} layers in {len(laminate.patterns)} "
+        f"patterns, from {name}. Next: sbafab generate {path}"
+    )

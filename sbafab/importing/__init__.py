@@ -1,0 +1,1 @@
+"""Designs of drawn layers from what others wrote: drawings, folders, laminates, circuits."""

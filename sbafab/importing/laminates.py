@@ -1,0 +1,267 @@
+"""Laminates as designs of drawn layers: from an output folder, or from a ``laminate.json`` alone.
+
+Shapes are patterns of the ``laminate.json``, which lies beside the design, so that no edge changes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import load_design
+from sbafab.design.drawing import OUTLINE
+from sbafab.design.files import ASSEMBLY, kit_names, listed, read_toml
+from sbafab.design.films import FILM_NAME, HOTTEST, Films
+from sbafab.design.records import Design, plain_tables, without_kit
+from sbafab.design.sections import Inlet as Inlets
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point, unit
+from sbafab.importing.records import Imported, file_name, key_name
+from sbafab.laminate.films import Film
+from sbafab.laminate.laminate import Chamber, Inlet, Laminate
+from sbafab.laminate.laminate_file import FILE, laminate_json, read_laminate
+
+DESIGN = "design.toml"
+OF_A_RUN = ("must not be built; failed:", "waived:", "limits lowered:")
+"""Notes that a run adds by its findings, and adds again."""
+NO_GLUE = "not stated"
+OF_FAMILIES = frozenset({"chamber", "stack", "panel"})
+"""Sections that families extend, or that drawn layers do not have."""
+
+
+def import_folder(folder: Path) -> Imported:
+    """Return the design of drawn layers that an output folder's ``laminate.json`` holds.
+
+    Films, press, laser, rules and the other sections that all families share are those of its
+    ``design.toml``. Raises DesignError.
+    """
+    data = read_toml(folder / DESIGN)
+    if data.get("family") == ASSEMBLY:
+        parts = sorted(path.parent.name for path in folder.glob(f"designs/*/{DESIGN}"))
+        hint = f"import one of its designs: {listed(parts)} in {folder / 'designs'}"
+        raise DesignError(f"{folder} holds an assembly, and drawn layers are one laminate; {hint}")
+    laminate = read_laminate(_beside(folder))
+    design = load_design(folder / DESIGN)
+    tables = _shared_tables(design, laminate)
+    drawings: dict[str, bytes] = {}
+    if design.kit not in kit_names():
+        drawings["kit.toml"] = (folder / design.kit).read_bytes()
+        tables["kit"] = "kit.toml"
+    calibration = folder / design.models.calibration
+    if calibration.is_file():
+        drawings["calibration.toml"] = calibration.read_bytes()
+        tables["models"] = {**tables.get("models", {}), "calibration": "calibration.toml"}
+    wrap = design.form.wrap
+    tube: dict[str, Any] | None = None
+    if wrap is not None:
+        tube = {"outer_diameter": wrap.tube_diameter, "pitch": wrap.pitch}
+        tube |= {"overlap": wrap.overlap, "glue": wrap.glue}
+    remarks = []
+    if design.family != "drawn":
+        remarks = [
+            f"family {design.family}: its keys are not carried over, its layers as built are",
+            "predictions: stroke, force and bending have no model of drawn layers",
+        ]
+    return _drawn(laminate, tables, design.films.stock, tube, drawings, remarks)
+
+
+def import_laminate(path: Path) -> Imported:
+    """Return the design of drawn layers that a ``laminate.json`` holds. Raises DesignError.
+
+    What it does not say, of press, laser, rules and sheets, has its defaults.
+    """
+    laminate = read_laminate(path)
+    remarks: list[str] = []
+    films, names = _film_tables(laminate, remarks)
+    stock = Films.model_validate(films).stock
+    tables: dict[str, Any] = {"name": file_name(laminate.name), "family": "drawn", "kit": "paper"}
+    if films:
+        tables["films"] = films
+    tables["layup"] = _layup(laminate, names)
+    if laminate.bores:
+        tables["bore"] = {"diameter": laminate.bores[0].diameter}
+    if laminate.inlets:
+        tables["inlet"] = {"tube_outer_diameter": laminate.inlets[0].tube_diameter}
+    tube = None
+    if laminate.tube is not None:
+        tube = {"outer_diameter": laminate.tube, "pitch": _pitch(laminate), "glue": NO_GLUE}
+        remarks.append("tube.glue: a laminate.json does not say what holds the sheet; write it")
+    tables["registration"] = {"method": laminate.registration}
+    if laminate.pins_in_full_bonds:
+        tables["registration"]["full_bond_pins"] = "in"
+    return _drawn(laminate, tables, stock, tube, {}, remarks)
+
+
+def _beside(folder: Path) -> Path:
+    path = folder / FILE
+    if not path.is_file():
+        raise DesignError(
+            f"{folder} holds no {FILE}, which every run of this version writes; generate it again"
+        )
+    return path
+
+
+def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
+    """The sections that every family has, as far as they differ from the kit and the defaults."""
+    rest = without_kit(plain_tables(design), design)
+    shared = {
+        key: rest[key]
+        for key in Design.model_fields
+        if key in rest and key not in OF_FAMILIES and rest[key] != {}
+    }
+    if "inlet" in shared:
+        shared["inlet"] = {k: v for k, v in shared["inlet"].items() if k in Inlets.model_fields}
+    return {**shared, "name": laminate.name, "family": "drawn", "kit": design.kit}
+
+
+def _drawn(
+    laminate: Laminate,
+    tables: Mapping[str, Any],
+    stock: Mapping[str, Film],
+    tube: dict[str, Any] | None,
+    drawings: dict[str, bytes],
+    remarks: list[str],
+) -> Imported:
+    """The laminate in the keys of drawn layers, on ``tables`` for all else."""
+    shapes = {pattern.lower(): {"file": FILE, "layer": pattern} for pattern in laminate.patterns}
+    design = dict(tables)
+    registration = dict(design.pop("registration", {}))
+    if laminate.panel is not None:
+        remarks.append(
+            "panel: registered sheets are not carried over, the parts are, without their sheets"
+        )
+        registration["method"] = "channel-pin"
+    design["layers"] = list(_layer_rows(laminate, stock, design.get("layup", {})))
+    design["chambers"] = list(_chamber_rows(laminate, remarks))
+    if not laminate.outline.is_empty:
+        design["body"] = OUTLINE
+        shapes[OUTLINE] = {"file": FILE, "layer": OUTLINE}
+    if laminate.lumen is not None:
+        design["lumen"] = laminate.lumen
+    design["pins"] = [
+        {"name": p.name, "at": [*p.centre], "diameter": p.diameter, "clearance": p.clearance}
+        for p in laminate.pins
+    ]
+    notes = [note for note in laminate.notes if not note.startswith(OF_A_RUN)]
+    if notes:
+        design["notes"] = notes
+    design["shapes"] = shapes
+    if tube is not None:
+        design["tube"] = tube
+    if registration:
+        design["registration"] = registration
+    text = laminate_json(laminate).encode()
+    return Imported(design, {FILE: text, **drawings}, tuple(remarks))
+
+
+def _layer_rows(
+    laminate: Laminate, stock: Mapping[str, Film], layup: Mapping[str, str]
+) -> Iterator[dict[str, Any]]:
+    for layer in laminate.layers:
+        row: dict[str, Any] = {"role": layer.role, "shape": layer.pattern.lower()}
+        usual = layup.get(layer.role.replace("-", "_"), "ptfe" if layer.is_mask else "tpe")
+        table = layer.film.material.lower()
+        if table in stock and usual != table:
+            row["film"] = table
+        if layer.pieces != 1:
+            row["pieces"] = layer.pieces
+        yield row
+
+
+def _chamber_rows(laminate: Laminate, remarks: list[str]) -> Iterator[dict[str, Any]]:
+    for chamber in laminate.chambers:
+        inlets = [inlet for inlet in laminate.inlets if inlet.chamber == chamber.name]
+        if len(inlets) != 1:
+            raise DesignError(
+                f"chamber {chamber.name} has {len(inlets)} inlets, and a chamber of drawn layers "
+                "has one; give each inlet a chamber, or join them"
+            )
+        yield _chamber_row(chamber, inlets[0])
+
+
+def _chamber_row(chamber: Chamber, inlet: Inlet) -> dict[str, Any]:
+    return {
+        "name": chamber.name,
+        "centres": [[*centre] for centre in chamber.centres],
+        "mouth": [*inlet.mouth],
+        "angle": angle_of(inlet.direction),
+        "width": inlet.width,
+        "length": inlet.length,
+    }
+
+
+def angle_of(direction: Point) -> float:
+    """Return the angle in degrees from x of which a unit vector is made, to the last bit."""
+    plain = math.degrees(math.atan2(direction[1], direction[0]))
+    candidates = [round(plain, 9), plain]
+    low = high = plain
+    for _ in range(8):
+        low, high = math.nextafter(low, -math.inf), math.nextafter(high, math.inf)
+        candidates += [low, high]
+    for angle in candidates:
+        for turned in (angle, angle + 360, angle - 360):
+            if abs(turned) <= 360 and unit(turned) == direction:
+                return turned
+    return plain
+
+
+def _pitch(laminate: Laminate) -> float:
+    """Distance between stacks along the sheet, or round the whole tube for one."""
+    centres = sorted(centre for chamber in laminate.chambers for centre in chamber.centres)
+    if len(centres) > 1:
+        return centres[1][0] - centres[0][0]
+    return math.pi * (laminate.tube or 0.0)
+
+
+# Films of a laminate.json as tables of a design.
+
+
+def _film_tables(
+    laminate: Laminate, remarks: list[str]
+) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
+    """The tables of films that are not the paper's, and each material's table."""
+    usual = Films().stock
+    tables: dict[str, dict[str, Any]] = {}
+    names: dict[str, str] = {}
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        name = film.material.lower()
+        if not FILM_NAME.fullmatch(name):
+            name = key_name(name, names.values(), "film").replace("-", "")[:16]
+            remarks.append(f"film {film.material}: named {name.upper()} here")
+        names[film.material] = name
+        if usual.get(name) != film:
+            tables[name] = _film_table(name, film)
+    return tables, names
+
+
+def _film_table(name: str, film: Film) -> dict[str, Any]:
+    modulus, poisson = film.elastic or (None, None)
+    keys: dict[str, Any] = {
+        "product": film.product,
+        "thickness": film.thickness,
+        "density": film.density,
+    }
+    if name == "ptfe":
+        keys["temperature_limit"] = film.limit
+    elif film.is_mask:
+        keys |= {"kind": film.kind, "temperature_limit": film.limit, "warning": film.warning}
+    else:
+        keys |= {"melting_point": film.softens_above, "modulus": modulus, "poisson": poisson}
+        if name != "tpe":
+            limit = None if film.limit == HOTTEST else film.limit
+            keys |= {"kind": film.kind, "temperature_limit": limit, "warning": film.warning}
+    return {key: value for key, value in keys.items() if value not in (None, "")}
+
+
+def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:
+    """The film of each role's first layer, where it is not the usual one."""
+    layup: dict[str, str] = {}
+    for layer in laminate.layers:
+        layup.setdefault(layer.role.replace("-", "_"), names[layer.film.material])
+    return {role: film for role, film in layup.items() if film not in _usual(role)}
+
+
+def _usual(role: str) -> Sequence[str]:
+    return ("ptfe",) if role.endswith("mask") else ("tpe",)

@@ -1,0 +1,101 @@
+"""What an import yields: the tables of a design file, and the drawings that lie beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sbafab.errors import DesignError
+
+MOST_NAMED = 20
+"""Places of one kind that are named one by one."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A design of drawn layers as ``tables`` of its file, and the content of its ``drawings``.
+
+    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, place by place, what
+    was not carried over, and how what was not plain was read.
+    """
+
+    tables: Mapping[str, Any]
+    drawings: Mapping[str, bytes] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+
+def toml_text(tables: Mapping[str, Any], head: Iterable[str] = ()) -> str:
+    """Return a design file: single keys, lists of rows a line each, then tables."""
+    import tomli_w
+
+    lines = [f"# {line}" for line in head]
+    singles = {key: value for key, value in tables.items() if not isinstance(value, dict)}
+    for key, value in singles.items():
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            rows = "".join(f"  {_inline(row)},\n" for row in value)
+            lines.append(f"{key} = [\n{rows}]")
+        else:
+            lines.append(f"{key} = {_inline(value)}")
+    shapes = tables.get("shapes", {})
+    if shapes:
+        lines += ["", "[shapes]", *(f"{name} = {_inline(row)}" for name, row in shapes.items())]
+    rest = {
+        key: value
+        for key, value in tables.items()
+        if isinstance(value, dict) and value and key != "shapes"
+    }
+    return "\n".join(lines) + "\n" + ("\n" + tomli_w.dumps(rest) if rest else "")
+
+
+def _inline(value: Any) -> str:
+    """A value of TOML on one line."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    # A text in JSON without escapes beyond its own is one in TOML; so are numbers and truth values.
+    return json.dumps(value, ensure_ascii=False)
+
+
+def file_name(text: str, fallback: str = "import") -> str:
+    """Return a text as a design's name: letters, digits, dot, dash and underscore, up to 64."""
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:64]
+    return name or fallback
+
+
+def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
+    """Return a text as a shape's or film's name that is not ``taken``: small letters, digits, -."""
+    stem = re.sub(r"[^a-z0-9-]+", "-", text.lower()).strip("-")[:24]
+    if not stem or not stem[0].isalpha():
+        stem = f"{fallback}{stem}"
+    taken = set(taken)
+    number, name = 1, stem
+    while name in taken:
+        number += 1
+        name = f"{stem}-{number}"
+    return name
+
+
+def named(what: str, places: list[str]) -> list[str]:
+    """Return a remark for each of the places, the many in one."""
+    remarks = [f"{place}: {what}" for place in places[:MOST_NAMED]]
+    if len(places) > MOST_NAMED:
+        remarks.append(f"and {len(places) - MOST_NAMED} more places: {what}")
+    return remarks
+
+
+def read_text(path: Path, most_bytes: int) -> str:
+    """Return the text of a file in UTF-8. Raises DesignError if it is none, or too large."""
+    try:
+        size = path.stat().st_size
+        text = path.read_text(encoding="utf-8-sig") if size <= most_bytes else ""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        raise DesignError(f"{path} cannot be read: {reason}; check the file") from None
+    if size > most_bytes:
+        raise DesignError(f"{path} has {size:,} bytes, where at most {most_bytes:,} are allowed")
+    return text

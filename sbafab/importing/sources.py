@@ -1,0 +1,60 @@
+"""The formats that are imported: by which sign a source is known, and what reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from sbafab.errors import DesignError
+from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
+from sbafab.importing.layer_table import LAYERS, import_table
+from sbafab.importing.records import Imported
+from sbafab.laminate.laminate_validator import SCHEMA
+
+
+class Format(NamedTuple):
+    """A format: its name in messages, whether a source is of it, and what reads such a source."""
+
+    name: str
+    matches: Callable[[Path], bool]
+    read: Callable[[Path], Imported]
+
+
+def import_source(source: Path) -> tuple[str, Imported]:
+    """Return the format of a file or folder, and what it holds. Raises DesignError."""
+    if not source.exists():
+        raise DesignError(f"{source} does not exist; give a file or folder to import")
+    for entry in FORMATS:
+        if entry.matches(source):
+            return entry.name, entry.read(source)
+    what = "folder" if source.is_dir() else "file"
+    raise DesignError(
+        f"{source} is a {what} of no format that is imported: " + "; ".join(f.name for f in FORMATS)
+    )
+
+
+def _has_design(source: Path) -> bool:
+    return (source / DESIGN).is_file()
+
+
+def _holds(mark: str) -> Callable[[Path], bool]:
+    """Return a test for a JSON file with this text near its beginning or anywhere in it."""
+
+    def matches(source: Path) -> bool:
+        if source.suffix.lower() != ".json" or not source.is_file():
+            return False
+        return mark in source.read_bytes().decode("utf-8", errors="replace")
+
+    return matches
+
+
+def _has_table(source: Path) -> bool:
+    return (source / LAYERS).is_file()
+
+
+FORMATS = (
+    Format(f"a folder of drawings with {LAYERS}", _has_table, import_table),
+    Format("an output folder, with its design.toml", _has_design, import_folder),
+    Format("a laminate.json", _holds(SCHEMA), import_laminate),
+)

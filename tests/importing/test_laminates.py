@@ -1,0 +1,222 @@
+"""Output folders and laminates imported: the same layers, findings and cut files to the byte."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+
+from sbafab.actuators import build, load_design
+from sbafab.design.identity import design_sha256
+from sbafab.errors import DesignError, OutputError
+from sbafab.importing.laminates import import_folder, import_laminate
+from sbafab.importing.sources import import_source
+from sbafab.importing.write import Written, write_imported
+from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate_file import FILE, laminate_json
+from sbafab.rules.deck import run_deck
+from sbafab.rules.limits import Limits
+from sbafab.runs.run import RunRequest, generate
+from tests.importing.conftest import Importing
+from tests.properties.designs import Draft, valid
+from tests.properties.test_designs import share
+from tests.quick import few
+
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+DESIGNS: dict[str, tuple[str, list[str]]] = {
+    "1dof-5mm": ("1dof-5mm", ["stack.balloons=3"]),
+    "3dof-15mm": ("3dof-15mm", ["stack.balloons=2"]),
+    "pouch": ("pouch", []),
+    "1dof-10mm": ("1dof-10mm", []),
+    "radial-15mm": ("radial-15mm", []),
+    "radial manifold": ("radial-15mm", ["inlet.manifold=true", "stack.balloons=2"]),
+    "radial ears": ("radial-15mm", ["registration.method=ears", "sheet.overlap=2"]),
+    "lobed ears": ("3dof-15mm", ["registration.method=ears", "stack.balloons=3"]),
+    "ears stay in": (
+        "1dof-5mm",
+        ["registration.method=ears", "registration.full_bond_pins=in"],
+    ),
+    "seven lobes": ("3dof-15mm", ["chamber.count=7", "stack.balloons=2"]),
+    "taper": (str(GALLERY / "taper-12-to-6.toml"), []),
+    "thick film": (str(GALLERY / "thick-film.toml"), []),
+    "drawn outline": (str(GALLERY / "oval.toml"), []),
+    "pinned": (str(GALLERY / "pinned-15mm.toml"), []),
+}
+FEW = Limits(yield_builds=50)
+
+
+def folder_of(source: str, changes: list[str], out: Path) -> tuple[Laminate, Path]:
+    design = load_design(source, [*changes, "rules.yield_builds=100", "sheets.label=false"])
+    folder = generate(RunRequest(design, out, ("cut", "press"))).folder
+    return build(design), folder
+
+
+def holes(dxf: bytes) -> bytes:
+    """The circles of a base plate's cut file, without their handles."""
+    return b"\n".join(re.findall(rb"AcDbCircle\n(?:.*\n){8}", dxf))
+
+
+def imported(folder: Path, file: Path) -> Written:
+    return write_imported(import_folder(folder), file, folder.name)
+
+
+@pytest.mark.parametrize("name", few(DESIGNS, 3))
+def test_a_folder_comes_back_with_the_same_bytes(name: str, tmp_path: Path) -> None:
+    laminate, folder = folder_of(*DESIGNS[name], tmp_path / "out")
+    written = imported(folder, tmp_path / "again.toml")
+    again = written.laminate
+    assert replace(again, family=laminate.family) == laminate
+    assert all(
+        a.profile.is_exactly(b.profile) for a, b in zip(again.layers, laminate.layers, strict=True)
+    )
+    assert run_deck(again, FEW) == run_deck(laminate, FEW)
+
+    second = generate(RunRequest(written.design, tmp_path / "second", ("cut", "press"))).folder
+    hashes = [json.loads((top / "manifest.json").read_text()) for top in (folder, second)]
+    ours, theirs = (entry["design_sha256"].encode() for entry in hashes)
+    assert theirs == design_sha256(written.design).encode()
+    cut = [*folder.glob("layers/*.dxf"), *folder.glob("sheets/*.dxf")]
+    assert len(cut) > len(laminate.layers)
+    for path in (*cut, folder / "checks.json", folder / "press.json", folder / "press.csv"):
+        ours_text, theirs_text = path.read_bytes(), (second / path.relative_to(folder)).read_bytes()
+        if path.name == "fixture.dxf":
+            # Its lettering spells the design's hash.
+            ours_text, theirs_text = holes(ours_text), holes(theirs_text)
+        assert theirs_text.replace(theirs, ours) == ours_text, path.name
+
+
+def read_back(laminate: Laminate, folder: Path) -> Written:
+    path = folder / FILE
+    path.write_text(laminate_json(laminate), encoding="utf-8")
+    written = write_imported(import_laminate(path), folder / "again.toml", FILE)
+    assert replace(written.laminate, family=laminate.family, name=laminate.name) == laminate
+    return written
+
+
+@pytest.mark.parametrize("name", few(DESIGNS, 3))
+def test_a_laminate_alone_comes_back_exactly(name: str, tmp_path: Path) -> None:
+    source, changes = DESIGNS[name]
+    read_back(build(load_design(source, changes)), tmp_path)
+
+
+def comes_back(draft: Draft) -> None:
+    with TemporaryDirectory() as name:
+        laminate = build(load_design(draft.write(Path(name))))
+        read_back(replace(laminate, panel=None), Path(name))
+
+
+@pytest.mark.long
+@settings(max_examples=100)
+@given(valid())
+def test_100_random_laminates_come_back_exactly(draft: Draft) -> None:
+    comes_back(draft)
+
+
+@share(2, 2)
+@given(valid())
+def test_a_random_laminate_comes_back_exactly(draft: Draft) -> None:
+    comes_back(draft)
+
+
+def test_registered_sheets_are_named_and_their_parts_carried(tmp_path: Path) -> None:
+    laminate = build(load_design(GALLERY / "panel-of-4.toml"))
+    assert laminate.panel is not None
+    path = tmp_path / FILE
+    path.write_text(laminate_json(laminate), encoding="utf-8")
+    read = import_laminate(path)
+    assert any(remark.startswith("panel: registered sheets are not") for remark in read.remarks)
+    again = write_imported(read, tmp_path / "again.toml", FILE).laminate
+    assert again.panel is None
+    assert [layer.profile for layer in again.layers] == [layer.profile for layer in laminate.layers]
+
+
+def test_a_kit_comes_along(tmp_path: Path) -> None:
+    from sbafab.design.kits import write_kit
+
+    kit = write_kit(tmp_path / "lab.toml")
+    kit.write_text(
+        kit.read_text().replace("temperature_c = { value = 135", "temperature_c = { value = 140")
+    )
+    source = tmp_path / "mine.toml"
+    source.write_text('name = "mine"\nfamily = "1dof"\nkit = "lab.toml"\n[stack]\nballoons = 2\n')
+    design = load_design(source, ["rules.yield_builds=100"])
+    assert design.press.temperature_c == 140
+    folder = generate(RunRequest(design, tmp_path / "out", ("cut",))).folder
+    written = imported(folder, tmp_path / "again.toml")
+    assert written.design.kit == "again-drawings/kit.toml"
+    assert written.design.press == design.press
+    assert written.design.rules == design.rules
+
+
+def test_the_command_writes_a_design_and_says_what_is_not_carried(
+    importing: Importing, tmp_path: Path
+) -> None:
+    _, folder = folder_of("1dof-5mm", ["stack.balloons=2"], tmp_path / "out")
+    result = importing(folder, "--json")
+    assert result.exit_code == 0
+    said = json.loads(result.stdout)
+    assert (said["file"], said["layers"]) == ("1dof-5mm.toml", 7)
+    assert any("family 1dof: its keys are not carried over" in line for line in said["remarks"])
+    assert Path("1dof-5mm-drawings", FILE).read_bytes() == (folder / FILE).read_bytes()
+    again = importing(folder)
+    assert again.exit_code == 2
+    assert "1dof-5mm.toml is there already; move it, or choose another file with -o" in again.output
+
+
+def broken(folder: Path, spoil: Any) -> Path:
+    path = folder / FILE
+    document = json.loads(laminate_json(build(load_design("1dof-5mm"))))
+    spoil(document)
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def test_a_chamber_without_an_inlet_is_named(importing: Importing, tmp_path: Path) -> None:
+    path = broken(tmp_path, lambda document: document.update(inlets=[]))
+    assert "chamber chamber1 has 0 inlets" in importing(path).output
+
+
+def test_a_damaged_laminate_is_refused(importing: Importing, tmp_path: Path) -> None:
+    path = broken(tmp_path, lambda document: document["layers"][1].update(film=9))
+    assert "layers[1].film: there is no film 9" in importing(path).output
+
+
+@pytest.mark.parametrize("name", ["none", "empty", "text.txt"])
+def test_what_is_of_no_format_is_refused(name: str, importing: Importing, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if name == "empty":
+        path.mkdir()
+    elif name == "text.txt":
+        path.write_text("layers")
+    sentence = "does not exist" if name == "none" else "of no format that is imported: a folder of"
+    assert sentence in importing(path).output
+
+
+def test_an_assembly_is_refused_with_its_designs(importing: Importing, tmp_path: Path) -> None:
+    folder = tmp_path / "pair"
+    part = folder / "designs" / "1dof-5mm"
+    part.mkdir(parents=True)
+    (folder / "design.toml").write_text('name = "pair"\nfamily = "assembly"\n')
+    (part / "design.toml").write_text('name = "1dof-5mm"\nfamily = "1dof"\n')
+    said = importing(folder).output
+    assert "holds an assembly" in said
+    assert '"1dof-5mm"' in said
+
+
+def test_a_design_that_cannot_be_built_leaves_nothing(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    path.write_text(laminate_json(build(load_design("1dof-5mm"))), encoding="utf-8")
+    _, read = import_source(path)
+    bad = replace(read, tables={**read.tables, "chambers": []})
+    with pytest.raises(DesignError, match="chambers"):
+        write_imported(bad, tmp_path / "again.toml", FILE)
+    assert sorted(p.name for p in tmp_path.iterdir()) == [FILE]
+    (tmp_path / "again-drawings").mkdir()
+    with pytest.raises(OutputError, match="again-drawings is there already"):
+        write_imported(read, tmp_path / "again.toml", FILE)
