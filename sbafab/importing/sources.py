@@ -13,7 +13,7 @@ from sbafab.importing.records import Imported
 from sbafab.laminate.laminate_validator import SCHEMA
 
 
-class Format(NamedTuple):
+class SourceFormat(NamedTuple):
     """A format: its name in messages, whether a source is of it, and what reads such a source."""
 
     name: str
@@ -54,7 +54,7 @@ def _has_table(source: Path) -> bool:
 
 
 FORMATS = (
-    Format(f"a folder of drawings with {LAYERS}", _has_table, import_table),
-    Format("an output folder, with its design.toml", _has_design, import_folder),
-    Format("a laminate.json", _holds(SCHEMA), import_laminate),
+    SourceFormat(f"a folder of drawings with {LAYERS}", _has_table, import_table),
+    SourceFormat("an output folder, with its design.toml", _has_design, import_folder),
+    SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
 )
