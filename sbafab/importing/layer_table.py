@@ -36,7 +36,7 @@ MOST_ROWS = 1000
 MOST_BYTES = 1_000_000
 
 
-class TableRow(NamedTuple):
+class CsvRow(NamedTuple):
     """A row of a table: its line in the file, and its cells by column, without empty ones."""
 
     place: str
@@ -92,7 +92,7 @@ def import_table(folder: Path) -> Imported:
     return Imported(tables, drawings, tuple(remarks))
 
 
-def read_table(path: Path, columns: Mapping[str, bool]) -> list[TableRow]:
+def read_table(path: Path, columns: Mapping[str, bool]) -> list[CsvRow]:
     """Return the rows of a CSV file that has some of these columns.
 
     Separators are commas, semicolons or tabs. Raises DesignError with file, line and column.
@@ -136,7 +136,7 @@ def _check_columns(path: Path, names: Sequence[str], columns: Mapping[str, bool]
 
 def _row(
     path: Path, number: int, names: Sequence[str], row: Sequence[str], columns: Mapping[str, bool]
-) -> TableRow:
+) -> CsvRow:
     place = f"{path.name}, line {number}"
     if len(row) > len(names):
         raise DesignError(f"{place} has {len(row)} cells for {len(names)} columns; remove some")
@@ -144,10 +144,10 @@ def _row(
     missing = next((name for name, needed in columns.items() if needed and name not in cells), None)
     if missing is not None:
         raise DesignError(f"{place} has no {missing}; fill it in")
-    return TableRow(place, cells)
+    return CsvRow(place, cells)
 
 
-def _drawing(folder: Path, row: TableRow) -> tuple[str, bytes]:
+def _drawing(folder: Path, row: CsvRow) -> tuple[str, bytes]:
     """The name and content of a row's drawing, which must be one."""
     path = folder / row.cells["file"]
     if path.suffix.lower() not in DRAWINGS:
@@ -159,7 +159,7 @@ def _drawing(folder: Path, row: TableRow) -> tuple[str, bytes]:
         raise DesignError(f"{row.place}: {error}") from None
 
 
-def _layer(row: TableRow, shape: str) -> dict[str, Any]:
+def _layer(row: CsvRow, shape: str) -> dict[str, Any]:
     cells = row.cells
     roles = get_args(Role)
     if cells["role"] not in roles:
@@ -201,7 +201,7 @@ def _chambers(path: Path) -> list[dict[str, Any]]:
     return list(chambers.values())
 
 
-def _refuse_second(row: TableRow, columns: Iterable[str]) -> None:
+def _refuse_second(row: CsvRow, columns: Iterable[str]) -> None:
     second = next((column for column in columns if column in row.cells), None)
     if second is not None:
         raise DesignError(
