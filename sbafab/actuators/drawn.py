@@ -30,6 +30,7 @@ from sbafab.geometry.contour import Mark, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point, unit
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
+from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import (
     Fold,
     Seam,
@@ -445,7 +446,10 @@ class DrawnDesign(Design):
 
 
 def build(design: DrawnDesign) -> Laminate:
-    """Return the laminate of drawn layers. Raises DesignError, which names the key at fault."""
+    """Return the laminate of drawn layers.
+
+    Raises DesignError, which names the key at fault, or what keeps its films from being joined.
+    """
     _check(design)
     shapes = ShapeRegions(design)
     balloons = design.stack.balloons
@@ -460,7 +464,7 @@ def build(design: DrawnDesign) -> Laminate:
         for centre in chamber.centres
         if len(chamber.balloons or range(balloons)) > 1
     )
-    return Laminate(
+    laminate = Laminate(
         name=design.name,
         family=design.family,
         layers=_turned(layers(cuts, design), design),
@@ -488,7 +492,10 @@ def build(design: DrawnDesign) -> Laminate:
             for number, seam in enumerate(design.seams or (), start=1)
         ),
         folds=tuple(Fold(*fold.layers, fold.line) for fold in design.folds or ()),
+        bonds=design.face_bonds,
     )
+    joinings(laminate)
+    return laminate
 
 
 def _is_table(value: object) -> bool:

@@ -170,7 +170,10 @@ def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
     for film in index["films"]:
         if "sheets" in film:
             yield f"{film['material']} film", film_text(film, index["sheets"], index["copies"])
-    if run.schedule is not None:
+    if run.schedule is not None and run.schedule.seams:
+        tools = ", ".join(dict.fromkeys(seam.tool for seam in run.schedule.seams))
+        yield "seams", f"{len(run.schedule.seams)} by {tools}; press.json"
+    if run.schedule is not None and run.schedule.steps:
         force = run.schedule.steps[0].force_n / 1000
         yield (
             "press",

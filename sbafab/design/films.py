@@ -24,6 +24,7 @@ from sbafab.laminate.films import (
     FilmKind,
     Material,
 )
+from sbafab.laminate.joints import BondProcess
 
 UNCALIBRATED: Literal["uncalibrated"] = "uncalibrated"
 FILM_NAME = re.compile(r"[a-z][a-z0-9]{0,15}")
@@ -82,6 +83,55 @@ class Sheet(Section):
     """Sheets that may be used."""
 
 
+FaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
+"""A face material: small letters, digits, - and _."""
+
+
+class FilmFaces(Section):
+    """What the two faces of a film are of, where they are not the film's own."""
+
+    upper: FaceName
+    """The face that lies up, unless the layer is turned."""
+    lower: FaceName
+    """The other face."""
+
+
+class FaceBonding(Section):
+    """Two faces that bond to each other, and by what."""
+
+    faces: Annotated[tuple[FaceName, FaceName], Field(strict=False)]
+    """The two face materials, in either order; a film without faces has its own name for both."""
+    by: BondProcess
+    """press, or the tool of a seam: laser, hot-tip, ultrasonic, roller."""
+    temperature_c: float | None = Field(default=None, gt=0, le=1000)
+    """C at which they bond; of a press it must not be more than its temperature."""
+    after: str | None = Field(default=None, max_length=32)
+    """The bond that must be made before this one."""
+
+
+class FaceBondings(Section):
+    """Which faces bond, a table each; with any, faces that are not in one do not bond."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, FaceBonding] = Field(init=False)
+
+    @model_validator(mode="after")
+    def _names_are_known(self) -> Self:
+        for name, bond in self.by_name.items():
+            if not re.fullmatch("[a-z][a-z0-9_-]{0,31}", name):
+                raise ValueError(f"has a bond named {name[:40]!r}; a name is of small letters")
+            if bond.after is not None and (bond.after == name or bond.after not in self.by_name):
+                raise ValueError(
+                    f"has bond {name} after {bond.after[:40]!r}, which is no other bond of it; "
+                    f"there are {', '.join(self.by_name)}"
+                )
+        return self
+
+    @property
+    def by_name(self) -> Mapping[str, FaceBonding]:
+        return self.__pydantic_extra__ or {}
+
+
 OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
 """Keys of a film that another product does not share."""
 
@@ -103,6 +153,8 @@ class TpeFilm(Section):
     """MPa, Young's (paper Sec. 3.2.1); elastic models and simulators need it."""
     poisson: float | None = Field(default=PAPER_TPE[1], ge=0, lt=0.5)
     """Poisson's ratio (paper Sec. 3.2.1), likewise."""
+    faces: FilmFaces | None = None
+    """What its faces are of; by default both are tpe."""
 
     @model_validator(mode="before")
     @classmethod
@@ -157,6 +209,8 @@ class OtherFilm(Section):
     """MPa, Young's; elastic models and simulators need it."""
     poisson: float | None = Field(default=None, ge=0, lt=0.5)
     """Poisson's ratio, likewise."""
+    faces: FilmFaces | None = None
+    """What its faces are of, for instance a coating and a textile; by default the film's name."""
     warning: str = Field(default="", max_length=200)
     """What every cut file of it says, for instance of its fumes."""
     kerf: KerfWidth = UNCALIBRATED
@@ -213,6 +267,7 @@ class Films(Section):
                 tpe.melting_point,
                 limit,
                 elastic=_elastic(tpe),
+                faces=_faces(tpe),
             ),
             "ptfe": Film(
                 "PTFE",
@@ -238,6 +293,7 @@ class Films(Section):
                 elastic=_elastic(film),
                 shade=sum(limits.kind == film.kind for limits in films.values()),
                 stays_solid=film.kind == "structural" and film.melting_point is None,
+                faces=_faces(film),
             )
         return films
 
@@ -247,6 +303,11 @@ def _elastic(film: TpeFilm | OtherFilm) -> tuple[float, float] | None:
     if film.modulus is None or film.poisson is None:
         return None
     return film.modulus, film.poisson
+
+
+def _faces(film: TpeFilm | OtherFilm) -> tuple[str, str] | None:
+    """What the upper and the lower face are of, if that is stated."""
+    return None if film.faces is None else (film.faces.upper, film.faces.lower)
 
 
 def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:

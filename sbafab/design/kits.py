@@ -27,7 +27,7 @@ from sbafab.design.files import (
     templates_folder,
     write_copy,
 )
-from sbafab.design.films import Films, LayerFilms, without_other_products
+from sbafab.design.films import FaceBondings, Films, LayerFilms, without_other_products
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -48,7 +48,7 @@ FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = (
-    *("films", "layup", "registration", "press", "acceptance", "laser", "sheets", "rules"),
+    *("films", "layup", "bonds", "registration", "press", "acceptance", "laser", "sheets", "rules"),
     "models",
 )
 """Sections of a design that a kit fills in."""
@@ -92,6 +92,7 @@ class KitFile(Section):
     about: str = Field(default="", max_length=400)
     films: Films = Films.model_construct()
     layup: LayerFilms = LayerFilms.model_construct()
+    bonds: FaceBondings | None = None
     registration: Registration = Registration.model_construct()
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()

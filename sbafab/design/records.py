@@ -35,6 +35,7 @@ from sbafab.design.files import (
     suggest_from_user_folder,
 )
 from sbafab.design.films import (
+    FaceBondings,
     Films,
     LayerFilms,
     without_other_products,
@@ -64,6 +65,7 @@ from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
+from sbafab.laminate.joints import FaceBond
 from sbafab.notebook import table_html
 
 
@@ -93,6 +95,8 @@ class Design(Section):
     inlet: Inlet = Inlet.model_construct()
     films: Films = Films.model_construct()
     layup: LayerFilms = LayerFilms.model_construct()
+    bonds: FaceBondings | None = None
+    """Which faces of films bond, and by what; by default all structural films in the press."""
     registration: Registration = Registration.model_construct()
     panel: PanelSection = PanelSection.model_construct()
     press: Press = Press.model_construct()
@@ -145,6 +149,15 @@ class Design(Section):
     def seamed_layers(self) -> frozenset[tuple[int, int]]:
         """Pairs of layers, by index, that seams bond."""
         return frozenset()
+
+    @property
+    def face_bonds(self) -> tuple[FaceBond, ...]:
+        """Which faces bond, and by what; none where nothing is said of it."""
+        bonds = {} if self.bonds is None else self.bonds.by_name
+        return tuple(
+            FaceBond(name, bond.faces, bond.by, bond.temperature_c, bond.after)
+            for name, bond in bonds.items()
+        )
 
     @property
     def thickest_pin(self) -> float:

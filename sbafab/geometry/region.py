@@ -469,9 +469,13 @@ def coord(value: float) -> str:
     return "0" if text == "-0" else text
 
 
+def chain_data(edges: Sequence[Edge]) -> str:
+    """Return the ``d`` of an SVG path along a chain of edges, in mm, y up."""
+    return "".join([f"M{_point(edges[0].start)}", *map(_command, edges)])
+
+
 def _contour_data(contour: Contour) -> str:
-    commands = [f"M{_point(contour.edges[0].start)}", *map(_command, contour.edges), "Z"]
-    return "".join(commands)
+    return f"{chain_data(contour.edges)}Z"
 
 
 def _command(edge: Edge) -> str:

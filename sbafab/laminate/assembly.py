@@ -6,11 +6,13 @@ the full bonds too: a flash bond on the pins comes first, and the full bond afte
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.cache import stored
+from sbafab.laminate.joining import Joining, is_only_pressed, joinings
+from sbafab.laminate.joints import PRESS
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 
 BondState = Literal["flash", "full"]
@@ -23,10 +25,11 @@ PLATE_MARGIN = 6.0
 
 @dataclass(frozen=True)
 class AssemblyStep:
-    """One closing of the press, steps counted from 1.
+    """One closing of the press, or a seam, steps counted from 1.
 
     ``stacks`` lie on each other, lowest first, and ``adds`` are those of their layers that join in
-    this step, both by layer index; ``pins`` are the dowel pins that are in.
+    this step, both by layer index; ``pins`` are the dowel pins that are in. ``joining`` is what
+    the step belongs to, where films are not joined in the press alone.
     """
 
     number: int
@@ -35,6 +38,7 @@ class AssemblyStep:
     stacks: tuple[tuple[int, ...], ...]
     adds: tuple[int, ...]
     pins: tuple[Pin, ...]
+    joining: Joining | None = None
 
     @property
     def layers(self) -> tuple[int, ...]:
@@ -53,8 +57,45 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     return stored(laminate, "_steps", _steps)
 
 
+def laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+    """Return all steps in which layers are laid on each other: presses and seams, in order.
+
+    A step of a seam has no pins, and is named as a flash bond.
+    """
+    return stored(laminate, "_laying", _laying)
+
+
+def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
+    if is_only_pressed(laminate):
+        return assembly(laminate)
+    steps: list[AssemblyStep] = []
+    folds = 0
+    for joining in joinings(laminate):
+        if joining.fold is not None:
+            folds += 1
+            continue
+        adds = tuple(body[0] for body in joining.bodies if len(body) == 1)
+        plans = [_Plan("bond_all", "full", joining.bodies, adds)]
+        if joining.process == PRESS and not laminate.folds and adds == joining.layers:
+            plans = [*_plans(laminate, joining.layers)]
+        if joining.seam is not None:
+            plans = [_Plan("flash_middle", "flash", joining.bodies, adds)]
+        for plan in plans:
+            step = _step(len(steps) + folds + 1, plan, laminate)
+            pins = () if joining.seam is not None else step.pins
+            steps.append(replace(step, joining=joining, pins=pins))
+    return tuple(steps)
+
+
 def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
-    plans = [plan for plan in _plans(laminate) if plan.adds]
+    if not is_only_pressed(laminate):
+        return tuple(
+            step
+            for step in laying(laminate)
+            if step.joining is not None and step.joining.seam is None
+        )
+    indices = tuple(layer.index for layer in laminate.layers)
+    plans = [*_plans(laminate, indices)]
     if laminate.registration == "ears" and not laminate.pins_in_full_bonds:
         plans = [step for plan in plans for step in _tacked(plan)]
     return tuple(_step(number, plan, laminate) for number, plan in enumerate(plans, 1))
@@ -69,8 +110,12 @@ class _Plan(NamedTuple):
     adds: tuple[int, ...]
 
 
-def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
-    indices = tuple(layer.index for layer in laminate.layers)
+def _plans(laminate: Laminate, indices: Sequence[int]) -> Iterator[_Plan]:
+    """Yield the steps of a press of these layers that add any."""
+    return (plan for plan in _all_plans(laminate, tuple(indices)) if plan.adds)
+
+
+def _all_plans(laminate: Laminate, indices: tuple[int, ...]) -> tuple[_Plan, ...]:
     if laminate.panel is not None:
         # Corner pins hold the base as well: nothing has to be pressed by itself first.
         below, cap = indices[:-1], indices[-1:]
@@ -78,7 +123,7 @@ def _plans(laminate: Laminate) -> tuple[_Plan, ...]:
             _Plan("flash_middle", "flash", (below,), below),
             _Plan("bond_all", "full", (below, cap), cap),
         )
-    films = [layer for layer in laminate.layers if not layer.is_mask]
+    films = [layer for layer in map(laminate.layer, indices) if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     wall = next((layer.index for layer in films if layer.index > base), base)
     upper = tuple(index for index in indices if base < index <= wall)
@@ -163,7 +208,7 @@ def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
     }
     return {
         index: tuple(pin for pin in fitting[laminate.layer(index).pattern] if pin in step.pins)
-        for step in assembly(laminate)
+        for step in laying(laminate)
         for index in step.adds
     }
 

@@ -37,7 +37,7 @@ class Film:
     the press and bonds to a film that melts on it. ``limit`` is the highest temperature allowed, C.
     ``shade`` counts the films of a kind, for colours; ``warning`` is written into its cut files;
     ``elastic`` are Young's modulus in MPa and Poisson's ratio, None if one of them is unknown.
-    ``faces`` are what the upper and the lower face are of; None where both are the film's material.
+    ``faces`` are what the upper and the lower face are of; None where both have the film's name.
     """
 
     material: Material

@@ -61,6 +61,11 @@ class Seam:
     kind: SeamKind = "lap"
     order: int = 1
 
+    @property
+    def length(self) -> float:
+        """Length of the path, mm."""
+        return sum(edge.length for chain in self.path for edge in chain)
+
     @cached_attribute
     def region(self) -> Region:
         """What the tool covers: half of the width on both sides of the path."""

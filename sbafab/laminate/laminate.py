@@ -147,7 +147,8 @@ class Layer:
     @property
     def faces(self) -> tuple[str, str]:
         """What its faces are of as it lies, the upper one first."""
-        upper, lower = self.film.faces or (self.film.material, self.film.material)
+        plain = self.film.material.lower()
+        upper, lower = self.film.faces or (plain, plain)
         return (lower, upper) if self.turned else (upper, lower)
 
     def _repr_html_(self) -> str:

@@ -290,6 +290,8 @@ def schedule_of(checked: Checked) -> Schedule:
         remarks.append(f"{CHECKED_AGAINST}{', '.join(checked.lowered)}")
     if not remarks:
         return plain
+    if not plain.steps:
+        return replace(plain, warnings=(*remarks, *plain.warnings))
     first, *later = plain.steps
     words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
     marked = replace(first, instructions=f"{words} {first.instructions}")

@@ -210,7 +210,7 @@ def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, 
     """Return the entry of ``press.json`` for a batch of several copies."""
     runs, shift = design_runs(design, laminate), 60 * design.order.shift_hours
     times = batch_times(runs, plan)
-    most = most_together(laminate, plan.steps[0].platen_mm)
+    most = most_together(laminate, (design.press.platen_width, design.press.platen_length))
     return {
         "copies": runs.copies,
         "at_once": runs.together,

@@ -11,6 +11,7 @@ from itertools import chain
 from typing import NamedTuple
 
 from sbafab.errors import DesignError
+from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import (
     AssemblyStep,
     BondState,
@@ -18,10 +19,13 @@ from sbafab.laminate.assembly import (
     assembly,
     distinct_layers,
     is_laid_by_hand,
+    laying,
     stack_count,
 )
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
+from sbafab.laminate.joining import is_only_pressed, joinings
+from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up
 from sbafab.pressing.build_up import (
@@ -235,6 +239,8 @@ class Step:
     pin_settings: tuple[PinSetting, ...]
     instructions: str
     time_temperature: tuple[HeatPoint, ...]
+    reason: str = ""
+    """Why the films are pressed now; empty where they are joined in the press alone."""
 
     @property
     def stack_mm(self) -> float:
@@ -253,6 +259,43 @@ class Step:
 
 
 @dataclass(frozen=True)
+class SeamStep:
+    """One seam made by a tool, counted among all steps.
+
+    ``layers`` are in hand, ``adds`` those of them that are laid in this step. ``length_mm`` is that
+    of the path that the middle of the tool follows. Temperature and speed are None where nobody
+    stated them.
+    """
+
+    step: int
+    title: str
+    seam: str
+    layers: tuple[int, ...]
+    adds: tuple[int, ...]
+    joins: tuple[int, int]
+    tool: SeamTool
+    kind: SeamKind
+    width_mm: float
+    length_mm: float
+    temperature_c: float | None
+    speed_mm_s: float | None
+    instructions: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class FoldStep:
+    """One film folded along a line from the first to the second of two points, mm."""
+
+    step: int
+    title: str
+    layers: tuple[int, int]
+    line_mm: tuple[Point, Point]
+    instructions: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class Schedule:
     """All steps, their time, and the warnings for the technician.
 
@@ -268,6 +311,8 @@ class Schedule:
     heating: Heating
     hands_minutes: float
     tacking: Tacking | None = None
+    seams: tuple[SeamStep, ...] = ()
+    folds: tuple[FoldStep, ...] = ()
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -319,7 +364,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     return Schedule(
         steps,
         total,
-        None if total is None else total + hands,
+        None if total is None or laminate.seams else total + hands,
         f"{pressed} in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
         "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
         "1.75 h in all)",
@@ -327,6 +372,8 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         warming,
         hands,
         tacking,
+        tuple(seam_steps(laminate)),
+        tuple(fold_steps(laminate)),
     )
 
 
@@ -405,6 +452,8 @@ def _step(
     words = _instructions(part, count) + after
     if laminate.panel is not None:
         title, words = title_of_sheets(part), instructions(part)
+    if part.joining is not None and len(part.layers) < len(laminate.layers):
+        title = f"Press of {layers_in_words(part.layers)}"
     return Step(
         step=part.number,
         title=title,
@@ -429,6 +478,7 @@ def _step(
         pin_settings=setting.pins,
         instructions=words,
         time_temperature=setting.heating.line(setting.minutes),
+        reason="" if part.joining is None else part.joining.reason,
     )
 
 
@@ -486,6 +536,58 @@ def _instructions(part: AssemblyStep, count: int) -> str:
     return f"Lay {stacks} on each other {by}, lowest first, as {nouns} of their own. {after}"
 
 
+def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
+    """Yield the seams of a laminate, in the order in which they are made."""
+    for step in laying(laminate):
+        seam = None if step.joining is None else step.joining.seam
+        if step.joining is None or seam is None:
+            continue
+        lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
+        bond = laminate.bond_of(lower, upper, seam.tool)
+        laid = f"Lay {layers_in_words(step.adds)} in place by hand. " if step.adds else ""
+        yield SeamStep(
+            step=step.number,
+            title=f"Seam {seam.name}",
+            seam=seam.name,
+            layers=step.layers,
+            adds=step.adds,
+            joins=(seam.below, seam.above),
+            tool=seam.tool,
+            kind=seam.kind,
+            width_mm=seam.width,
+            length_mm=round(seam.length, 6),
+            temperature_c=None if bond is None else bond.temperature_c,
+            speed_mm_s=None,
+            instructions=(
+                f"{laid}Follow the path with the middle of the {seam.tool}, {seam.width:g} mm "
+                f"wide: it bonds layers {seam.below} and {seam.above}."
+            ),
+            reason=step.joining.reason,
+        )
+
+
+def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
+    """Yield the folds of a laminate, in order."""
+    for joining in () if is_only_pressed(laminate) else joinings(laminate):
+        fold = joining.fold
+        if fold is None:
+            continue
+        (x, y), (u, v) = fold.line
+        masks = tuple(range(fold.lower + 1, fold.upper))
+        laid = f", {layers_in_words(masks)} on its half {fold.lower}" if masks else ""
+        yield FoldStep(
+            step=joining.number,
+            title=f"Fold of layers {fold.lower} and {fold.upper}",
+            layers=(fold.lower, fold.upper),
+            line_mm=fold.line,
+            instructions=(
+                f"Lay the film flat{laid}, and fold half {fold.upper} over along the line from "
+                f"x {x:g}, y {y:g} to x {u:g}, y {v:g}."
+            ),
+            reason=joining.reason,
+        )
+
+
 # Refusals, and warnings for the technician.
 
 
@@ -503,7 +605,11 @@ PRESSURES_TRIED = (70.0, 200.0)
 
 
 def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
-    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+    parts = assembly(laminate)
+    pressed = {index for part in parts for index in part.layers}
+    if not pressed:
+        return
+    for film in dict.fromkeys(laminate.layer(index).film for index in sorted(pressed)):
         melts = not film.is_mask and film.softens_above is not None
         if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
@@ -527,9 +633,10 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
             f"press.temperature_c = {press.temperature_c:g} reaches panel.carrier_limit_c = "
             f"{limit:g}, what the transfer film stands that is pressed with the masks; take another"
         )
+    _refuse_bonds(laminate, press, parts)
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
-        if below.film.stays_solid and above.film.stays_solid:
+        if interface.pressed and below.film.stays_solid and above.film.stays_solid:
             roles = " or the ".join(dict.fromkeys((below.role, above.role)))
             raise DesignError(
                 f"layers {below.index} and {above.index} are of {below.film.material} and "
@@ -541,6 +648,33 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
             f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
             f"{press.pad.material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
         )
+
+
+def _refuse_bonds(laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]) -> None:
+    """Raises DesignError where the press is too cold for its bonds, or too hot for those of seams
+    that are in it.
+    """
+    for gap in laminate.interfaces:
+        ends = {gap.below.index, gap.above.index}
+        if not any(ends <= set(part.layers) for part in parts):
+            continue
+        pressed = laminate.bond_of(gap.below, gap.above, PRESS)
+        if pressed is not None and (pressed.temperature_c or 0.0) > press.temperature_c:
+            raise DesignError(
+                f"press.temperature_c = {press.temperature_c:g} does not bond layers "
+                f"{gap.below.index} and {gap.above.index}, which bonds.{pressed.name} bonds at "
+                f"{pressed.temperature_c:g} C; raise it"
+            )
+        for seam in gap.seams if pressed is None else ():
+            bond = laminate.bond_of(gap.below, gap.above, seam.tool)
+            melts = None if bond is None else bond.temperature_c
+            if melts is not None and melts <= press.temperature_c:
+                raise DesignError(
+                    f"press.temperature_c = {press.temperature_c:g} would weld layers "
+                    f"{gap.below.index} and {gap.above.index} all over, which seam {seam.name} "
+                    f"bonds at {melts:g} C and leaves open elsewhere; press before the seam, lower "
+                    "the temperature, or lay a mask between them"
+                )
 
 
 def warnings(
@@ -579,7 +713,10 @@ def warnings(
         )
     if laminate.registration == "ears" and laminate.pins:
         yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
-    pad = next(item.thickness_mm for item in steps[0].build_up if item.part == build_up.PAD)
+    pads = (
+        item.thickness_mm for step in steps for item in step.build_up if item.part == build_up.PAD
+    )
+    pad = next(pads, 0.0)
     if (pile := build_up.pad_sheets(pad)) > 1:
         yield (
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "

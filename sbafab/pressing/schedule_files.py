@@ -8,7 +8,7 @@ from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.plate_heating import HeatPoint
-from sbafab.pressing.schedule import Schedule, layers_in_words
+from sbafab.pressing.schedule import Schedule, Step, layers_in_words
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"
@@ -39,9 +39,13 @@ COLUMNS = (
 
 def press_json(plan: Schedule) -> dict[str, Any]:
     """Return the content of ``press.json``."""
+    joints = {
+        "seams": [_plain(asdict(step)) for step in plan.seams],
+        "folds": [_plain(asdict(step)) for step in plan.folds],
+    }
     return {
         "schema": PRESS_SCHEMA,
-        "steps": [_plain(asdict(step)) for step in plan.steps],
+        "steps": [_pressed(step) for step in plan.steps],
         "total_press_minutes": plan.total_press_minutes,
         "estimated_build_minutes": plan.estimated_build_minutes,
         "estimate_basis": plan.estimate_basis,
@@ -49,7 +53,14 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "heating": asdict(plan.heating),
         "hands_minutes": plan.hands_minutes,
         "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
+        **{key: steps for key, steps in joints.items() if steps},
     }
+
+
+def _pressed(step: Step) -> dict[str, Any]:
+    """Return a step with its reason, if it has any."""
+    table: dict[str, Any] = _plain(asdict(step))
+    return table if step.reason else {key: table[key] for key in table if key != "reason"}
 
 
 def _plain(value: Any) -> Any:

@@ -16,7 +16,7 @@ from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point, distance_to
 from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region, centroid
-from sbafab.laminate.assembly import AssemblyStep, assembly
+from sbafab.laminate.assembly import AssemblyStep, assembly, laying
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
@@ -114,7 +114,7 @@ def lay_up(laminate: Laminate) -> list[Laid]:
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     laid: list[Laid] = []
-    for step in assembly(laminate):
+    for step in laying(laminate):
         layers = frozenset(step.layers)
         present = sorted(body for body in bodies if body[0].layer in layers)
         pins_of_bodies = [shapes.pins(body, step) for body in present]

@@ -210,6 +210,8 @@ def build_up_again(work: Work) -> tuple[str, ...]:
 def items(work: Work) -> list[tuple[str, str, str]]:
     """Return rows of the bill of materials: name, specification, quantity."""
     laminate, plan = work.laminate, work.schedule
+    if not plan.steps:
+        return []
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}
     size = units.size(*first.platen_mm)

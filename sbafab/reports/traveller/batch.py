@@ -163,6 +163,10 @@ def _copies(entry: Entry) -> str:
     return str(first) if first == last else f"{first} to {last}"
 
 
+def _platen(work: Work) -> tuple[float, float]:
+    return work.design.press.platen_width, work.design.press.platen_length
+
+
 def _plan_basis(work: Work) -> str:
     """Return how far the plan can be trusted, or why there is none."""
     if work.schedule.total_press_minutes is None:
@@ -171,7 +175,7 @@ def _plan_basis(work: Work) -> str:
             "Generate again once they are known."
         )
     by_hand, hours = work.schedule.hands_minutes, work.design.order.shift_hours
-    platen = work.schedule.steps[0].platen_mm
+    platen = _platen(work)
     holds = most_together(work.laminate, platen)
     entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
     pressing = {entry.day for entry in entries if entry.task == "press"}
@@ -227,7 +231,7 @@ def _name(runs: Runs, size: int) -> str:
 def _picture(work: Work, runs: Runs) -> str:
     """Return the places on the base plate, numbered as they are laid."""
     laminate = work.laminate
-    plate = whole_plate(laminate, work.schedule.steps[0].platen_mm, runs.places)
+    plate = whole_plate(laminate, _platen(work), runs.places)
     low_x, low_y, high_x, high_y = plate.bounds
     wide, high = high_x - low_x, high_y - low_y
     scale = WIDEST / max(wide, high)

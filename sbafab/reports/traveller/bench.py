@@ -434,14 +434,23 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
         )
     release = sum(base_plate.release_films(work) for work in works)
     pads = "the press pad" if len(works) == 1 else "every press pad"
-    yield f"Cut to the size under Materials: {release} release films and {pads}."
+    if release:
+        yield f"Cut to the size under Materials: {release} release films and {pads}."
     if any(work.job.underlay is not None for work in works):
         prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
         yield (
             f"Underlay printed at 100 %, {units.count(prints, 'time', 'times')}, the bars of each "
             "print measured, each cut out along its dotted line."
         )
-    yield "Clean and dry: base plate, pad, release films, film as it comes off the roll."
+    plate = "base plate, pad, release films, " if release else ""
+    yield f"Clean and dry: {plate}film as it comes off the roll."
+    if works[0].schedule.steps:
+        yield from _before_the_press(works)
+    if any(work.laminate.inlets for work in works):
+        yield "Adhesive in date; curing time on its package: ________ h."
+
+
+def _before_the_press(works: Sequence[Work]) -> Iterator[str]:
     first = works[0].schedule.steps[0]
     hot = units.temperature(first.temperature_c)
     yield (
@@ -453,15 +462,11 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
     yield from heating_lines(works[0].schedule.heating, steps)
     yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
-    if any(work.laminate.inlets for work in works):
-        yield "Adhesive in date; curing time on its package: ________ h."
 
 
 def tools(works: Sequence[Work]) -> list[Tool]:
     """Return the tools, without what is used up."""
     laminates = [work.laminate for work in works]
-    first = works[0].schedule.steps[0]
-    width, length = first.platen_mm
     rows = [
         Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),
         Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
@@ -505,16 +510,13 @@ def tools(works: Sequence[Work]) -> list[Tool]:
                 "unaided eye resolves about 0.1 mm",
             )
         )
-    rows += [
-        Tool(
-            f"Heat press, {units.size(width, length)}",
-            f"both platens to {units.temperature(first.temperature_c)}, "
-            f"{units.force(first.force_n)}",
-        ),
-        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
-        Tool(f"{film_words(works)[:1].upper()}{film_words(works)[1:]}", COLD),
-        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
-    ]
+    seams = [seam for work in works for seam in work.schedule.seams]
+    for tool in dict.fromkeys(seam.tool for seam in seams):
+        widths = sorted({seam.width_mm for seam in seams if seam.tool == tool})
+        wide = joined_words([units.millimetres(width) for width in widths])
+        rows.append(Tool(f"{tool.capitalize()}, {wide} wide", "seams, along the paths of layers/"))
+    if works[0].schedule.steps:
+        rows += _press_tools(works)
     if any(laminate.inlets for laminate in laminates):
         ears = "ears, " if any(laminate.registration == "ears" for laminate in laminates) else ""
         rows += [
@@ -526,3 +528,18 @@ def tools(works: Sequence[Work]) -> list[Tool]:
             Tool(works[0].design.acceptance.fitting, "joins each tube to the supply"),
         ]
     return rows
+
+
+def _press_tools(works: Sequence[Work]) -> list[Tool]:
+    first = works[0].schedule.steps[0]
+    width, length = first.platen_mm
+    return [
+        Tool(
+            f"Heat press, {units.size(width, length)}",
+            f"both platens to {units.temperature(first.temperature_c)}, "
+            f"{units.force(first.force_n)}",
+        ),
+        Tool("Thermocouple with a reader, clock", "on the plate's edge: starts each step's clock"),
+        Tool(f"{film_words(works)[:1].upper()}{film_words(works)[1:]}", COLD),
+        Tool("Heat-proof gloves", "take the plate out, as hot as the platens"),
+    ]

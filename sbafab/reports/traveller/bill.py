@@ -369,9 +369,13 @@ def times(work: Work) -> list[Time]:
     plan = work.schedule
     handling = plan.hands_minutes
     steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
-    rows = [
-        Time("In the press", units.minutes(plan.total_press_minutes), f"{steps} min, one actuator")
-    ]
+    rows = []
+    if plan.steps:
+        took = units.minutes(plan.total_press_minutes)
+        rows.append(Time("In the press", took, f"{steps} min, one actuator"))
+    if plan.seams:
+        metres = sum(seam.length_mm for seam in plan.seams)
+        rows.append(Time("Seams", "", f"{metres:.0f} mm of path; nobody stated their speed"))
     if work.sheets:
         copies = units.count(work.job.copies, "copy", "copies")
         rows.append(

@@ -30,6 +30,7 @@ from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.joints import joint_pages
 from sbafab.reports.traveller.process import order_of, wrapping
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
 from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
@@ -88,14 +89,16 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": bill.laser_minutes(work),
         "laser_basis": bill.laser_basis(work),
         "lay_up": _lay_up(work),
-        "force_notes": (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work)),
+        "force_notes": _force_notes(work),
         "plate_holes": base_plate.holes(work),
         "plate_notes": base_plate.plate_notes(work),
         "plate_places": base_plate.places(work),
         "plate_grid": base_plate.grid(work),
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
-        "taking_down": order_of(work.schedule.steps),
+        "joint_pages": joint_pages(work),
+        "turned": layer_numbers([layer.index for layer in laminate.layers if layer.turned]),
+        "taking_down": order_of(work.schedule.steps) if work.schedule.steps else None,
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
         "leak_test": process.leak_test(work),
@@ -107,6 +110,12 @@ def context(work: Work) -> dict[str, Any]:
         "expected_sizes": bill.expected_sizes(work),
         **panel.chapter(work),
     }
+
+
+def _force_notes(work: Work) -> tuple[str, ...]:
+    if not work.schedule.steps:
+        return ()
+    return (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work))
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:

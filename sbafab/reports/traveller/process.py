@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from sbafab.design.identity import kit_of, tube_name
 from sbafab.geometry.edges import Point
-from sbafab.laminate.assembly import AssemblyStep, assembly, stack_count
+from sbafab.laminate.assembly import AssemblyStep, assembly, laying, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
@@ -79,7 +79,7 @@ def step_pages(work: Work) -> list[StepPage]:
     runs = work.runs
     pages = []
     for part, step in zip(parts, work.schedule.steps, strict=True):
-        lying = beds(parts, part)
+        lying = beds(laying(work.laminate), part)
         placed = places(work.laminate, part, lying)
         pages.append(
             StepPage(
@@ -315,7 +315,10 @@ def tubing(work: Work) -> list[Action]:
     names = _boxes([inlet.chamber for inlet in inlets])
     diameter = units.millimetres(inlets[0].tube_diameter)
     straight = units.millimetres(min(inlet.length for inlet in inlets))
-    strip = work.laminate.interfaces[-1].masks[0].film.material
+    masks = [mask for gap in work.laminate.interfaces for mask in gap.masks]
+    strip = f"the {masks[-1].film.material} strip lies" if masks else "nothing lies"
+    end = [Action("Snip the strip off flush with the tab's end.", (), names)] if masks else []
+    beside = " beside the strip" if masks else " between them"
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
         *_each_copy(work, "Fit the tubes"),
@@ -326,16 +329,14 @@ def tubing(work: Work) -> list[Action]:
             f"Cut {units.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
+        Action(f"Part the two films at the tab's end; {strip} between them.", (), names),
         Action(
-            f"Part the two films at the tab's end; the {strip} strip lies between them.", (), names
-        ),
-        Action(
-            f"Push the tube in beside the strip, up to {straight} deep: the length of the tab's "
+            f"Push the tube in{beside}, up to {straight} deep: the length of the tab's "
             "straight run.",
             (),
             names,
         ),
-        Action("Snip the strip off flush with the tab's end.", (), names),
+        *end,
         Action(
             f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
             "out of the tube.",

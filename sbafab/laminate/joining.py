@@ -1,0 +1,397 @@
+"""The order in which films are joined: presses, seams and folds, each with its reason.
+
+A press bonds all films in it at once; a tool heats every film under its path. So both are possible
+only while nothing lies in the hand that they would weld by mistake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from sbafab.errors import DesignError
+from sbafab.geometry.cache import stored
+from sbafab.geometry.edges import Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.joints import PRESS, BondProcess, FaceBond, Fold, Seam
+from sbafab.laminate.laminate import Interface, Laminate, Layer
+
+MOST_TRIED = 300
+"""Beginnings that may lead nowhere before the search for an order is given up."""
+LEAST_WELD = 1e-3
+"""mm2: what two films share beyond that is a weld, and no rounding."""
+
+
+@dataclass(frozen=True)
+class Joining:
+    """One act of joining, counted from 1: a press, a seam or a fold.
+
+    ``layers`` are those in hand, by index, and ``bodies`` the same as they come, lowest first: what
+    was joined before, and single layers.
+    """
+
+    number: int
+    process: BondProcess | Literal["fold"]
+    layers: tuple[int, ...]
+    bodies: tuple[tuple[int, ...], ...]
+    reason: str
+    seam: Seam | None = None
+    fold: Fold | None = None
+
+
+class _Task(NamedTuple):
+    """What is to be joined: interfaces by index, ``first`` to ``last``, in the press or a seam."""
+
+    first: int
+    last: int
+    seam: Seam | None = None
+
+    @property
+    def process(self) -> BondProcess:
+        return PRESS if self.seam is None else self.seam.tool
+
+
+def is_only_pressed(laminate: Laminate) -> bool:
+    """Return True for films that are joined in the press alone, and not folded."""
+    return not laminate.seams and not laminate.folds
+
+
+def joinings(laminate: Laminate) -> tuple[Joining, ...]:
+    """Return all acts of joining, in order.
+
+    Presses come before seams, seams as they are listed, unless ``bonds`` say otherwise, or one of
+    them is only possible earlier. Raises DesignError, which names the conflict, where there is no
+    order.
+    """
+    return stored(laminate, "_joinings", _joinings)
+
+
+def _joinings(laminate: Laminate) -> tuple[Joining, ...]:
+    _refuse_strangers(laminate)
+    waiting = [*_presses(laminate), *_seams(laminate)]
+    ordered = _ordered(laminate, waiting, [], set())
+    if ordered is None:
+        raise DesignError(_first_conflict(laminate, waiting))
+    done: list[_Task] = []
+    steps: list[Joining] = []
+    for task in ordered:
+        earlier = waiting[: waiting.index(task)]
+        before = [_conflict(laminate, other, waiting, done) for other in earlier]
+        steps += _steps(laminate, task, done, before, len(steps))
+        waiting.remove(task)
+        done.append(task)
+    return tuple(steps)
+
+
+def _ordered(
+    laminate: Laminate,
+    waiting: Sequence[_Task],
+    done: Sequence[_Task],
+    failed: set[frozenset[_Task]],
+) -> list[_Task] | None:
+    """Return the first order without a conflict, or None; ``failed`` are sets that lead nowhere."""
+    if not waiting:
+        return []
+    key = frozenset(done)
+    if key in failed or len(failed) > MOST_TRIED:
+        return None
+    for task in waiting:
+        if _conflict(laminate, task, waiting, done) is None:
+            rest = [other for other in waiting if other is not task]
+            order = _ordered(laminate, rest, [*done, task], failed)
+            if order is not None:
+                return [task, *order]
+    failed.add(key)
+    return None
+
+
+def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
+    """Return the conflict that is met when all is made as it is listed."""
+    waiting, done = [*tasks], [*tasks[:0]]
+    while True:
+        conflicts = [_conflict(laminate, task, waiting, done) for task in waiting]
+        if None not in conflicts:
+            return next(filter(None, conflicts))
+        done.append(waiting.pop(conflicts.index(None)))
+
+
+def _refuse_strangers(laminate: Laminate) -> None:
+    """Raises DesignError for neighbours that nothing joins, though their faces meet."""
+    folded = {(fold.lower, fold.upper) for fold in laminate.folds}
+    for gap in laminate.interfaces if laminate.bonds else ():
+        pair = gap.below.index, gap.above.index
+        if gap.pressed or gap.seams or pair in folded:
+            continue
+        below, above = gap.below.faces[0], gap.above.faces[1]
+        raise DesignError(
+            f"layers {pair[0]} and {pair[1]} face each other with {below} and {above}, which "
+            "nothing in bonds joins in the press, and no seam lies between them; turn one of them, "
+            "add a seam, or say in [bonds] what joins these faces"
+        )
+    for seam in laminate.seams if laminate.bonds else ():
+        lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
+        if laminate.bond_of(lower, upper, seam.tool) is None:
+            raise DesignError(
+                f"seam {seam.name}: layers {seam.below} and {seam.above} face each other with "
+                f"{lower.faces[0]} and {upper.faces[1]}, which nothing in bonds joins by "
+                f"{seam.tool}; turn one of them, or add it to [bonds]"
+            )
+
+
+def _presses(laminate: Laminate) -> Iterator[_Task]:
+    """Yield runs of interfaces that bond in the press, bottom to top."""
+    run: list[int] = []
+    for gap in laminate.interfaces:
+        if gap.pressed:
+            run.append(gap.index)
+        elif run:
+            yield _Task(run[0], run[-1])
+            run = []
+    if run:
+        yield _Task(run[0], run[-1])
+
+
+def _seams(laminate: Laminate) -> Iterator[_Task]:
+    by_layers = {(gap.below.index, gap.above.index): gap.index for gap in laminate.interfaces}
+    for seam in sorted(laminate.seams, key=lambda seam: seam.order):
+        index = by_layers[seam.below, seam.above]
+        yield _Task(index, index, seam)
+
+
+def _bond(laminate: Laminate, task: _Task) -> FaceBond | None:
+    """What ``bonds`` say of a task's faces."""
+    gap = laminate.interfaces[task.first - 1]
+    return laminate.bond_of(gap.below, gap.above, task.process)
+
+
+def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[int, int]:
+    """The first and last interface of what is in hand in a task, with all joined to it before."""
+    first, last = task.first, task.last
+    joined = {index for past in done for index in range(past.first, past.last + 1)}
+    while first - 1 in joined:
+        first -= 1
+    while last + 1 in joined:
+        last += 1
+    return first, last
+
+
+def _conflict(
+    laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
+) -> str | None:
+    """Return why a task cannot come now, in a sentence, or None if it can."""
+    bond = _bond(laminate, task)
+    if bond is not None and bond.after is not None:
+        others = [other for other in waiting if other is not task]
+        if any(_is_of(laminate, other, bond.after) for other in others):
+            return (
+                f"{_what(task)} comes after bond {bond.after} by bonds.{bond.name}.after, and that "
+                "cannot be made before; change the order of the two"
+            )
+    first, last = _in_hand(laminate, task, done)
+    gaps = laminate.interfaces[first - 1 : last]
+    if task.seam is None:
+        return _pressed_by_mistake(laminate, task, gaps)
+    return _welded_by_mistake(laminate, task.seam, task, gaps) or _is_covered(task.seam, task, gaps)
+
+
+def _is_of(laminate: Laminate, task: _Task, name: str) -> bool:
+    bond = _bond(laminate, task)
+    return bond is not None and bond.name == name
+
+
+def _what(task: _Task) -> str:
+    return "the press" if task.seam is None else f"seam {task.seam.name}"
+
+
+def _pressed_by_mistake(laminate: Laminate, task: _Task, gaps: Sequence[Interface]) -> str | None:
+    if laminate.bonds:
+        # Faces that do not bond in the press are safe in it; its temperature is looked at later.
+        return None
+    for gap in gaps:
+        if task.first <= gap.index <= task.last:
+            continue
+        weld = _open(laminate, gap)
+        if weld.area > LEAST_WELD:
+            x, y = _somewhere(weld)
+            return (
+                f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index} would weld "
+                f"layers {gap.below.index} and {gap.above.index} all over, which are bonded by "
+                f"seams (x {x:.3f}, y {y:.3f}); lay a mask between them, or say in [bonds] that "
+                "these faces do not bond in the press"
+            )
+    return None
+
+
+def _open(laminate: Laminate, gap: Interface) -> Region:
+    """Where films touch that are not meant to bond, and no mask keeps them apart.
+
+    Beside the seams of a chamber films may weld: there they are a flap that holds no pressure.
+    """
+    bare = gap.unbonded - gap.mask if gap.masks else gap.unbonded
+    if gap.kind != "chamber":
+        return bare
+    places = [centre for chamber in laminate.chambers for centre in chamber.centres]
+    places += [port.at for port in laminate.ports]
+    pieces = sorted(bare.pieces, key=lambda piece: Region(piece.outers).area)
+    # A flap goes round the pocket; the innermost piece about a place is the one that holds it.
+    inner = [
+        next((piece for piece in pieces if any(o.winding(place) for o in piece.outers)), None)
+        for place in places
+    ]
+    held = {id(piece): piece for piece in inner if piece is not None}.values()
+    return Region(tuple(contour for piece in held for contour in piece.contours)) if held else bare
+
+
+def _welded_by_mistake(
+    laminate: Laminate, seam: Seam, task: _Task, gaps: Sequence[Interface]
+) -> str | None:
+    for gap in gaps:
+        if gap.index == task.first or not _bonds_by(laminate, gap, seam):
+            continue
+        weld = _open(laminate, gap) & seam.region
+        if weld.area > LEAST_WELD:
+            x, y = _somewhere(weld)
+            return (
+                f"seam {seam.name} of layers {seam.below} and {seam.above} would weld layers "
+                f"{gap.below.index} and {gap.above.index} too, over {weld.area:.3f} mm2 at "
+                f"x {x:.3f}, y {y:.3f}; lay a mask between these, move the seam, or take films "
+                "whose faces do not bond there"
+            )
+    return None
+
+
+def _bonds_by(laminate: Laminate, gap: Interface, seam: Seam) -> bool:
+    """Return True if the heat of a seam bonds the faces of another interface."""
+    if not laminate.bonds:
+        return True
+    other = laminate.bond_of(gap.below, gap.above, seam.tool)
+    below, above = laminate.layer(seam.below), laminate.layer(seam.above)
+    bond = laminate.bond_of(below, above, seam.tool)
+    if other is None or bond is None or None in (other.temperature_c, bond.temperature_c):
+        return other is not None
+    return (bond.temperature_c or 0.0) >= (other.temperature_c or 0.0)
+
+
+def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> str | None:
+    """Return the sentence for a seam that films which melt cover from above and from below."""
+    above = [gap.above for gap in gaps if gap.index > task.first]
+    below = [gap.below for gap in gaps if gap.index < task.first]
+    covers = [_melting(films, seam) for films in (above, below)]
+    if None in covers:
+        return None
+    over, under = (layer.index for layer in covers if layer is not None)
+    return (
+        f"seam {seam.name} of layers {seam.below} and {seam.above} would have to be made through "
+        f"layer {over} or layer {under}, which melt under the tool; make it before these are "
+        "joined to them, or open them there"
+    )
+
+
+def _melting(films: Sequence[Layer], seam: Seam) -> Layer | None:
+    """The first film over a seam that melts before what lies under it is warm."""
+    return next(
+        (
+            film
+            for film in films
+            if not film.film.stays_solid and (film.profile & seam.region).area > LEAST_WELD
+        ),
+        None,
+    )
+
+
+def _somewhere(region: Region) -> Point:
+    return max(region.pieces, key=lambda piece: piece.area).edges[0].at(0.5)
+
+
+def _steps(
+    laminate: Laminate,
+    task: _Task,
+    done: Sequence[_Task],
+    before: Sequence[str | None],
+    count: int,
+) -> Iterator[Joining]:
+    """Yield a task's joining, and the folds that come before it. ``before``: why earlier ones in
+    the list have to wait.
+    """
+    first, last = _in_hand(laminate, task, done)
+    gaps = laminate.interfaces[first - 1 : last]
+    layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
+    laid = {index for past in done for index in _layers(laminate, past)}
+    for fold in laminate.folds:
+        halves = {fold.lower, fold.upper}
+        if halves <= {*layers} and not halves <= laid:
+            count += 1
+            yield Joining(
+                count,
+                "fold",
+                tuple(range(fold.lower, fold.upper + 1)),
+                (tuple(range(fold.lower, fold.upper + 1)),),
+                f"layers {fold.lower} and {fold.upper} are halves of one film",
+                fold=fold,
+            )
+    bodies = tuple(_bodies(laminate, layers, done))
+    reason = _reason(laminate, task, before)
+    yield Joining(count + 1, task.process, layers, bodies, reason, task.seam)
+
+
+def _layers(laminate: Laminate, task: _Task) -> range:
+    gaps = laminate.interfaces
+    return range(gaps[task.first - 1].below.index, gaps[task.last - 1].above.index + 1)
+
+
+def _bodies(
+    laminate: Laminate, layers: Sequence[int], done: Sequence[_Task]
+) -> Iterator[tuple[int, ...]]:
+    """Yield what was joined before and single layers, lowest first."""
+    joined = {index for past in done for index in range(past.first, past.last + 1)}
+    inside = {
+        index
+        for gap in laminate.interfaces
+        if gap.index in joined
+        for index in range(gap.below.index, gap.above.index)
+    }
+    body: list[int] = []
+    for index in layers:
+        body.append(index)
+        if index not in inside:
+            yield tuple(body)
+            body = []
+
+
+def _reason(laminate: Laminate, task: _Task, before: Sequence[str | None]) -> str:
+    bond = _bond(laminate, task)
+    gap = laminate.interfaces[task.first - 1]
+    faces = f"{gap.below.faces[0]} and {gap.above.faces[1]}"
+    if task.seam is None:
+        words = f"films of layers {gap.below.index} to "
+        words += f"{laminate.interfaces[task.last - 1].above.index} bond in the press"
+    else:
+        words = f"{task.seam.tool} bonds layers {task.seam.below} and {task.seam.above}"
+    if bond is not None:
+        words += f" ({faces}, bond {bond.name}"
+        words += ")" if bond.temperature_c is None else f", {bond.temperature_c:g} C)"
+    later = _later(laminate, task)
+    if later is not None:
+        return f"{words}; now, for once more films are joined {later}"
+    waits = next(filter(None, before), None)
+    return words if waits is None else f"{words}; before others, for {waits.split(';')[0]}"
+
+
+def _later(laminate: Laminate, task: _Task) -> str | None:
+    """Return why a task could not come when all else is joined, or None if it could."""
+    gaps = laminate.interfaces
+    if len(gaps) == task.last - task.first + 1:
+        return None
+    if task.seam is None:
+        conflict = _pressed_by_mistake(laminate, task, gaps)
+    else:
+        conflict = _welded_by_mistake(laminate, task.seam, task, gaps)
+        conflict = conflict or _is_covered(task.seam, task, gaps)
+    if conflict is None:
+        return None
+    words = conflict.split(";")[0].split(" (x ")[0]
+    if task.seam is None:
+        return words
+    own = f"seam {task.seam.name} of layers {task.seam.below} and {task.seam.above}"
+    return words.replace(own, "it", 1)
