@@ -492,7 +492,7 @@ def build(design: DrawnDesign) -> Laminate:
             for number, seam in enumerate(design.seams or (), start=1)
         ),
         folds=tuple(Fold(*fold.layers, fold.line) for fold in design.folds or ()),
-        bonds=design.face_bonds,
+        bonds=design.stated_bonds,
     )
     joinings(laminate)
     return laminate

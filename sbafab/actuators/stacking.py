@@ -245,7 +245,7 @@ def stacked(
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
         notes=(NOTE,) if stack.ears else (),
-        bonds=design.face_bonds,
+        bonds=design.stated_bonds,
     )
 
 

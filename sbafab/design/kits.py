@@ -48,7 +48,17 @@ FILE = "kit.toml"
 """A kit's copy in the output folder of a design."""
 VALUE, SOURCE = "value", "source"
 SECTIONS = (
-    *("films", "layup", "bonds", "registration", "press", "acceptance", "laser", "sheets", "rules"),
+    *(
+        "films",
+        "layup",
+        "face_bonds",
+        "registration",
+        "press",
+        "acceptance",
+        "laser",
+        "sheets",
+        "rules",
+    ),
     "models",
 )
 """Sections of a design that a kit fills in."""
@@ -92,7 +102,7 @@ class KitFile(Section):
     about: str = Field(default="", max_length=400)
     films: Films = Films.model_construct()
     layup: LayerFilms = LayerFilms.model_construct()
-    bonds: FaceBondings | None = None
+    face_bonds: FaceBondings | None = None
     registration: Registration = Registration.model_construct()
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()

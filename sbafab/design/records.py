@@ -95,7 +95,7 @@ class Design(Section):
     inlet: Inlet = Inlet.model_construct()
     films: Films = Films.model_construct()
     layup: LayerFilms = LayerFilms.model_construct()
-    bonds: FaceBondings | None = None
+    face_bonds: FaceBondings | None = None
     """Which faces of films bond, and by what; by default all structural films in the press."""
     registration: Registration = Registration.model_construct()
     panel: PanelSection = PanelSection.model_construct()
@@ -151,9 +151,9 @@ class Design(Section):
         return frozenset()
 
     @property
-    def face_bonds(self) -> tuple[FaceBond, ...]:
+    def stated_bonds(self) -> tuple[FaceBond, ...]:
         """Which faces bond, and by what; none where nothing is said of it."""
-        bonds = {} if self.bonds is None else self.bonds.by_name
+        bonds = {} if self.face_bonds is None else self.face_bonds.by_name
         return tuple(
             FaceBond(name, bond.faces, bond.by, bond.temperature_c, bond.after)
             for name, bond in bonds.items()

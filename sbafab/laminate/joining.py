@@ -126,16 +126,16 @@ def _refuse_strangers(laminate: Laminate) -> None:
         below, above = gap.below.faces[0], gap.above.faces[1]
         raise DesignError(
             f"layers {pair[0]} and {pair[1]} face each other with {below} and {above}, which "
-            "nothing in bonds joins in the press, and no seam lies between them; turn one of them, "
-            "add a seam, or say in [bonds] what joins these faces"
+            "nothing in face_bonds joins in the press, and no seam lies between them; turn one of "
+            "them, add a seam, or say in [face_bonds] what joins these faces"
         )
     for seam in laminate.seams if laminate.bonds else ():
         lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
         if laminate.bond_of(lower, upper, seam.tool) is None:
             raise DesignError(
                 f"seam {seam.name}: layers {seam.below} and {seam.above} face each other with "
-                f"{lower.faces[0]} and {upper.faces[1]}, which nothing in bonds joins by "
-                f"{seam.tool}; turn one of them, or add it to [bonds]"
+                f"{lower.faces[0]} and {upper.faces[1]}, which nothing in face_bonds joins by "
+                f"{seam.tool}; turn one of them, or add it to [face_bonds]"
             )
 
 
@@ -185,8 +185,8 @@ def _conflict(
         others = [other for other in waiting if other is not task]
         if any(_is_of(laminate, other, bond.after) for other in others):
             return (
-                f"{_what(task)} comes after bond {bond.after} by bonds.{bond.name}.after, and that "
-                "cannot be made before; change the order of the two"
+                f"{_what(task)} comes after bond {bond.after} by face_bonds.{bond.name}.after, and "
+                "that cannot be made before; change the order of the two"
             )
     first, last = _in_hand(laminate, task, done)
     gaps = laminate.interfaces[first - 1 : last]
@@ -217,8 +217,8 @@ def _pressed_by_mistake(laminate: Laminate, task: _Task, gaps: Sequence[Interfac
             return (
                 f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index} would weld "
                 f"layers {gap.below.index} and {gap.above.index} all over, which are bonded by "
-                f"seams (x {x:.3f}, y {y:.3f}); lay a mask between them, or say in [bonds] that "
-                "these faces do not bond in the press"
+                f"seams (x {x:.3f}, y {y:.3f}); lay a mask between them, or say in [face_bonds] "
+                "that these faces do not bond in the press"
             )
     return None
 

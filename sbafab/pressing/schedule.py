@@ -662,8 +662,8 @@ def _refuse_bonds(laminate: Laminate, press: PressSettings, parts: Sequence[Asse
         if pressed is not None and (pressed.temperature_c or 0.0) > press.temperature_c:
             raise DesignError(
                 f"press.temperature_c = {press.temperature_c:g} does not bond layers "
-                f"{gap.below.index} and {gap.above.index}, which bonds.{pressed.name} bonds at "
-                f"{pressed.temperature_c:g} C; raise it"
+                f"{gap.below.index} and {gap.above.index}, which face_bonds.{pressed.name} bonds "
+                f"at {pressed.temperature_c:g} C; raise it"
             )
         for seam in gap.seams if pressed is None else ():
             bond = laminate.bond_of(gap.below, gap.above, seam.tool)
