@@ -44,6 +44,9 @@ class FaceBond:
         return {a, b} == set(self.faces)
 
 
+PortKind = Literal["place", "hole"]
+
+
 @dataclass(frozen=True)
 class Seam:
     """A bond that a tool makes along a path, between the structural layers ``below`` and ``above``.
@@ -90,13 +93,15 @@ class Fold:
 class Port:
     """A named place at ``at`` in the gap between the structural layers ``below`` and ``above``.
 
-    Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel.
+    Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel. A
+    "hole" is an opening of the top or bottom film beside that gap, which a tube fills.
     """
 
     name: str
     below: int
     above: int
     at: Point
+    kind: PortKind = "place"
 
 
 @dataclass(frozen=True)

@@ -136,6 +136,8 @@ def limits(design: Design) -> Limits:
         pin_stretch=design.registration.pin_stretch,
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,
+        opening_pressure=design.rules.opening_pressure_kpa,
+        dead_end=design.rules.dead_end,
         target_yield=design.rules.target_yield,
         yield_builds=design.rules.yield_builds,
         minutes_for=tuple(map(named_film, design.press.minutes_for)),

@@ -51,8 +51,9 @@ class Limits:
     not calibrated, and up to ``unknown_kerf``), ``waive`` the rules whose failure the user accepts
     by name. The ``worst_`` limits are for what is left of bond and overhang under the
     ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
-    them (None: none asked for; for the builds: as many as are quick). ``minutes_for``: product and
-    thickness of the films that the press minutes were stated for.
+    them (None: none asked for; for the builds: as many as are quick). ``opening_pressure``: kPa
+    that may open a channel; ``dead_end``: widths that a blind branch may be long. ``minutes_for``:
+    product and thickness of the films that the press minutes were stated for.
     """
 
     bond_width: float = 0.75
@@ -68,6 +69,8 @@ class Limits:
     pin_stretch: float = 0.3
     worst_bond_width: float = 0.5
     worst_mask_overhang: float = 0.25
+    opening_pressure: float = 100.0
+    dead_end: float = 2.0
     target_yield: float | None = None
     yield_builds: int | None = None
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
@@ -125,6 +128,8 @@ KEYS = (
     _Key("hand_placement", WORST, lambda lim: lim.tolerances.placement, "default"),
     _Key("hand_turn", WORST, lambda lim: lim.tolerances.turn, "default"),
     _Key("sheet_error", WORST, lambda lim: lim.tolerances.sheet, "default"),
+    _Key("opening_pressure_kpa", ("nets",), lambda lim: lim.opening_pressure, "default", True),
+    _Key("dead_end", ("nets",), lambda lim: lim.dead_end, "default", True),
     _Key("second_cut_error", ("bridges",), lambda lim: lim.tolerances.second_cut, "default"),
 )
 """Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""

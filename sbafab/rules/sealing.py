@@ -6,6 +6,7 @@ searched from each inlet.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
@@ -31,6 +32,8 @@ class _Offence(NamedTuple):
 def check(measures: Measures) -> list[Finding]:
     """The number of pockets that leak, reach another, are cut off or missing, and loose films."""
     laminate = measures.laminate
+    if laminate.nets:
+        return _judged_by_nets(laminate)
     graph = void_graph(laminate)
     owners = _owners(laminate, graph)
     offences = [
@@ -42,6 +45,19 @@ def check(measures: Measures) -> list[Finding]:
         pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
         message = f"{pockets} sealed, each reached from the inlet of its own chamber alone"
         return [Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), message)]
+    return [_failed(offences, laminate)]
+
+
+def _judged_by_nets(laminate: Laminate) -> list[Finding]:
+    """Where nets are declared, the rule nets says what joins; loose films stay a fault."""
+    offences = _loose_films(laminate)
+    if offences:
+        return [_failed(offences, laminate)]
+    message = "no film is loose; what the voids join is judged by nets"
+    return [Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), message)]
+
+
+def _failed(offences: Sequence[_Offence], laminate: Laminate) -> Finding:
     first = offences[0]
     layers: tuple[int, ...] = ()
     if first.interface is not None:
@@ -51,7 +67,7 @@ def check(measures: Measures) -> list[Finding]:
     if len(offences) > 1:
         message += f" (and {len(offences) - 1} more)"
     place = Place(first.interface, layers, x, y)
-    return [Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)]
+    return Finding(NAME, "fail", 0.0, float(len(offences)), "voids", place, message)
 
 
 RULE = Rule(

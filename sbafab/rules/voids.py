@@ -17,8 +17,9 @@ from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import in_reading_order, tidy
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point
 from sbafab.geometry.nearby import widened
-from sbafab.geometry.region import Region, rectangle
-from sbafab.laminate.laminate import Inlet, Interface, Laminate
+from sbafab.geometry.region import Region, rectangle, union
+from sbafab.laminate.joints import Port
+from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
 from sbafab.rules.boundary import beside, edges_along
 from sbafab.rules.limits import TOLERANCE
 
@@ -39,12 +40,19 @@ OUTSIDE = Void("outside")
 
 @dataclass
 class VoidGraph:
-    """Voids, the points at which they join, and the voids that inlets open into."""
+    """Voids, the points at which they join, and the voids that inlets and holes open into."""
 
     pieces: dict[Void, Region] = field(default_factory=dict)
+    """The unbonded pieces of every interface."""
+    gaps: dict[Void, Region] = field(default_factory=dict)
+    """Where a film is missing beside an interface, but for the outside."""
+    openings: dict[Void, Region] = field(default_factory=dict)
+    """The holes of films."""
     joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
     mouths: dict[int, list[Void]] = field(default_factory=dict)
     """By the inlet's place in ``laminate.inlets``."""
+    holes: dict[str, Void] = field(default_factory=dict)
+    """Openings of the outer films that a port's tube fills, by its name."""
 
     def join(self, a: Void, b: Void, p: Point) -> None:
         self.joins.setdefault(a, {}).setdefault(b, p)
@@ -105,6 +113,11 @@ def void_graph(laminate: Laminate) -> VoidGraph:
             and (inlet.chamber in chambers[interface.index] or inlet.chamber not in named)
         }
         _add_gap(graph, interface, gap, missing, inlets)
+        graph.gaps.update(
+            (void, piece)
+            for void, piece in zip(missing, gap.missing, strict=True)
+            if void is not OUTSIDE
+        )
         for layer in (interface.below, interface.above):
             key = interface.pattern, layer.pattern
             if key not in homes:
@@ -114,13 +127,25 @@ def void_graph(laminate: Laminate) -> VoidGraph:
                     _opening(layer.index, number, outside[layer.pattern])
                     for number in range(len(openings[layer.pattern]))
                 ]
+                graph.openings.update(
+                    (void, piece)
+                    for void, piece in zip(
+                        opened[layer.index], openings[layer.pattern], strict=True
+                    )
+                    if void is not OUTSIDE
+                )
             for opening, (home, p) in zip(opened[layer.index], homes[key], strict=True):
                 if opening is not OUTSIDE or missing[home] is not OUTSIDE:
                     graph.join(opening, missing[home], p)
     for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1]):
         for number, piece in enumerate(openings[layer.pattern]):
             opening = _opening(layer.index, number, outside[layer.pattern])
-            if opening != OUTSIDE:
+            if opening == OUTSIDE:
+                continue
+            port = _tube_in(piece, layer, graph, laminate.ports)
+            if port is not None:
+                graph.holes[port.name] = opening
+            else:
                 graph.join(opening, OUTSIDE, _middle(piece.bounds))
     return graph
 
@@ -132,6 +157,17 @@ def chambers_by_level(laminate: Laminate) -> dict[int, frozenset[str]]:
         level: frozenset(chamber.name for chamber in laminate.chambers if chamber.is_in(balloon))
         for balloon, level in enumerate(levels, start=1)
     }
+
+
+def _tube_in(
+    opening: Region, layer: Layer, graph: VoidGraph, ports: tuple[Port, ...]
+) -> Port | None:
+    """The port whose tube fills an opening of an outer film; a tube fills one opening."""
+    for port in ports:
+        is_beside = layer.index in (port.below, port.above) and port.name not in graph.holes
+        if port.kind == "hole" and is_beside and opening.contains(port.at):
+            return port
+    return None
 
 
 @cached
@@ -268,3 +304,51 @@ def _holding(pieces: tuple[Region, ...], p: Point) -> int:
 
 def _middle(box: Bounds) -> Point:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+
+
+# Cavities: what a person sees of the voids in one interface, holes of the films included.
+
+
+@dataclass(frozen=True)
+class Cavity:
+    """Unbonded pieces of an interface and the gaps beside them, which air fills as one.
+
+    ``region`` has no hole where a film has one. ``is_open_film``: no unbonded piece is part of it,
+    so that it is a hole of a film and no more.
+    """
+
+    interface: int
+    voids: tuple[Void, ...]
+    region: Region
+    is_open_film: bool
+
+
+def cavities(laminate: Laminate, graph: VoidGraph) -> tuple[Cavity, ...]:
+    """Return the cavities of all interfaces, bottom to top; equal ones share a region."""
+    regions: dict[tuple[object, ...], Region] = {}
+    patterns = {interface.index: interface.pattern for interface in laminate.interfaces}
+    parts = {**graph.pieces, **graph.gaps}
+    rows: list[Cavity] = []
+    seen: set[Void] = set()
+    for void in parts:
+        if void in seen:
+            continue
+        group = _beside(graph, void, parts)
+        seen.update(group)
+        key = (patterns[void.level], *(part[::2] for part in group))
+        if key not in regions:
+            regions[key] = union(parts[part] for part in group)
+        is_open_film = all(part.kind == "gap" for part in group)
+        rows.append(Cavity(void.level, tuple(group), regions[key], is_open_film))
+    return tuple(sorted(rows, key=lambda cavity: cavity.interface))
+
+
+def _beside(graph: VoidGraph, start: Void, parts: dict[Void, Region]) -> list[Void]:
+    """The voids of an interface that hang together without a way through a film."""
+    group, queue = {start}, [start]
+    while queue:
+        for void in graph.joins.get(queue.pop(), {}):
+            if void in parts and void.level == start.level and void not in group:
+                group.add(void)
+                queue.append(void)
+    return sorted(group)

@@ -1,0 +1,653 @@
+"""nets: the voids join the ports of every declared net, and join nothing else (fluidic LVS).
+
+Layout versus schematic, as for a chip: the void graph is read back from the profiles and compared
+with the nets. A design that declares no nets gets no finding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.on_demand import np
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.films import Film
+from sbafab.laminate.joints import Net
+from sbafab.laminate.laminate import Interface, Laminate, Layer
+from sbafab.rules.boundary import without_slivers
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.limits import Limits, at
+from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.void_axes import (
+    Axis,
+    Node,
+    Terminal,
+    axis_of,
+    blind_ends,
+    shortest_way,
+)
+from sbafab.rules.voids import OUTSIDE, Cavity, Void, VoidGraph, cavities, void_graph
+
+NAME = "nets"
+
+FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
+
+
+@dataclass(frozen=True)
+class NetFault:
+    """A difference between nets and voids, with its place.
+
+    ``nets`` are the nets that it concerns; ``interface`` and ``layers`` count from 1.
+    """
+
+    kind: FaultKind
+    nets: tuple[str, ...]
+    interface: int | None
+    layers: tuple[int, ...]
+    at: Point
+    message: str
+
+
+@dataclass(frozen=True)
+class NarrowPlace:
+    """The narrowest place of a net's voids in one interface, and the pressure that opens it there.
+
+    ``pressure`` in kPa is None where no film has elastic constants.
+    """
+
+    net: str
+    interface: int
+    width: Width
+    pressure: float | None
+
+
+@dataclass(frozen=True)
+class Connectivity:
+    """The voids of a laminate against its nets.
+
+    ``owners`` holds the names of the nets that every cavity belongs to, none for a slit or hole;
+    ``groups`` the names of ports and chambers that are joined, ``faults`` what is not as declared.
+    """
+
+    cavities: tuple[Cavity, ...]
+    owners: tuple[tuple[str, ...], ...]
+    groups: tuple[frozenset[str], ...]
+    faults: tuple[NetFault, ...]
+    narrow: tuple[NarrowPlace, ...]
+
+
+def check(measures: Measures) -> list[Finding]:
+    """Return a finding for every fault, and one for the channel that is hardest to open."""
+    laminate, limits = measures.laminate, measures.limits
+    if not laminate.nets:
+        return []
+    found = connectivity(laminate, limits)
+    findings = [
+        Finding(
+            NAME,
+            "fail",
+            0.0,
+            1.0,
+            "faults",
+            Place(fault.interface, fault.layers, *fault.at),
+            fault.message,
+        )
+        for fault in found.faults
+    ]
+    if not findings:
+        nets = declared(laminate)
+        count = sum(len(net.ports) for net in nets)
+        message = (
+            f"{_counted(len(nets), 'net')} of {_counted(count, 'port')} joined as declared, and to "
+            "nothing else"
+        )
+        findings.append(Finding(NAME, "pass", 0.0, 0.0, "faults", Place(), message))
+    return [*findings, *_openings(found.narrow, laminate, limits)]
+
+
+RULE = Rule(
+    NAME,
+    check,
+    Explanation(
+        "the voids join the ports of each net, and nothing else; no branch ends blind, and every "
+        "channel opens under pressure",
+        "An open net never fills, two that are joined fill together, and a blind branch keeps air.",
+        "Look at the place named: a mask that is cut or bridged, or a hole that is missing or one "
+        "too many.",
+        ("nets", "ports", "rules.opening_pressure_kpa", "rules.dead_end"),
+    ),
+    at_most=True,
+)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def declared(laminate: Laminate) -> tuple[Net, ...]:
+    """Return the nets, and a net of its own for every chamber and port that none names."""
+    named = {member for net in laminate.nets for member in net.ports}
+    names = [chamber.name for chamber in laminate.chambers] + [p.name for p in laminate.ports]
+    alone = (Net(name, (name,)) for name in dict.fromkeys(names) if name not in named)
+    return (*laminate.nets, *alone)
+
+
+def connectivity(laminate: Laminate, limits: Limits) -> Connectivity:
+    """Return the voids of a laminate, the nets that they belong to, and what is not as declared."""
+    reading = _Reading(laminate)
+    faults = [
+        *reading.opens(),
+        *reading.shorts(),
+        *reading.leaks(),
+        *reading.dead_ends(limits.dead_end),
+        *reading.strays(),
+    ]
+    owners = tuple(
+        tuple(sorted(reading.owners.get(reading.part_of[cavity.voids[0]], ())))
+        for cavity in reading.cavities
+    )
+    return Connectivity(
+        reading.cavities, owners, reading.groups(), tuple(faults), tuple(reading.narrow())
+    )
+
+
+class _Terminal(NamedTuple):
+    """A place that a port or chamber stands for, and the cavities of which one must be its own."""
+
+    member: str
+    label: str
+    cavities: tuple[int, ...]
+    at: Point
+    width: float
+    is_port: bool
+    layers: tuple[int, ...]
+
+
+class _Reading:
+    """The void graph of a laminate with the places of its ports.
+
+    ``part_of`` numbers the parts into which the voids fall without the outside.
+    """
+
+    def __init__(self, laminate: Laminate) -> None:
+        self.laminate = laminate
+        self.nets = declared(laminate)
+        self.graph: VoidGraph = void_graph(laminate)
+        self.cavities = cavities(laminate, self.graph)
+        self.cavity_of = {v: n for n, cavity in enumerate(self.cavities) for v in cavity.voids}
+        self.part_of = _parts(self.graph)
+        members = dict.fromkeys(member for net in self.nets for member in net.ports)
+        self.terminals = {member: self._terminals(member) for member in members}
+
+    def interface(self, index: int) -> Interface:
+        return self.laminate.interfaces[index - 1]
+
+    def part(self, cavity: int) -> int:
+        return self.part_of[self.cavities[cavity].voids[0]]
+
+    # Places of ports.
+
+    def _terminals(self, member: str) -> list[_Terminal]:
+        laminate, graph = self.laminate, self.graph
+        rows: list[_Terminal] = []
+        for port in laminate.ports:
+            if port.name != member:
+                continue
+            layers = (port.below, port.above)
+            if port.kind == "hole":
+                opening = graph.holes.get(port.name)
+                beside = () if opening is None else self._beside(opening)
+                width = 0.0 if opening is None else _across(graph.openings[opening])
+                rows.append(_Terminal(member, member, beside, port.at, width, False, layers))
+                continue
+            holding = self._holding(port.at, [layers])
+            rows.append(_Terminal(member, member, holding, port.at, 0.0, True, layers))
+        for number, inlet in enumerate(laminate.inlets):
+            if inlet.chamber == member:
+                mouths = graph.mouths.get(number, ())
+                beside = tuple(sorted({self.cavity_of[void] for void in mouths}))
+                label = f"the inlet of {member}"
+                rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
+        gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
+        faces = [(gap.below.index, gap.above.index) for gap in gaps]
+        for chamber in laminate.chambers:
+            for centre in chamber.centres if chamber.name == member else ():
+                holding = self._holding(centre, faces)
+                label = f"the pocket of {member}"
+                rows.append(_Terminal(member, label, holding, centre, 0.0, True, ()))
+        return rows
+
+    def _holding(self, p: Point, faces: Sequence[tuple[int, int]]) -> tuple[int, ...]:
+        """The cavities between any of these pairs of layers that hold a point."""
+        return tuple(
+            number
+            for number, cavity in enumerate(self.cavities)
+            for gap in [self.interface(cavity.interface)]
+            if (gap.below.index, gap.above.index) in faces
+            and not cavity.is_open_film
+            and cavity.region.contains(p)
+        )
+
+    def _beside(self, opening: Void) -> tuple[int, ...]:
+        """The cavities that a hole of a film opens into."""
+        voids = self.graph.joins.get(opening, {})
+        return tuple(sorted({self.cavity_of[v] for v in voids if v in self.cavity_of}))
+
+    # Parts, and the nets that own them.
+
+    @cached_property
+    def homes(self) -> dict[str, dict[_Terminal, int | None]]:
+        """By net: the part in which every one of its terminals lies, None for no void.
+
+        A terminal that several cavities may hold lies in the net's main part if one of them does.
+        """
+        homes: dict[str, dict[_Terminal, int | None]] = {}
+        for net in self.nets:
+            rows = [row for member in net.ports for row in self.terminals[member]]
+            votes = [part for row in rows for part in {self.part(c) for c in row.cavities}]
+            main = max(dict.fromkeys(votes), key=votes.count, default=None)
+            home: dict[_Terminal, int | None] = {}
+            for row in rows:
+                parts = [self.part(number) for number in row.cavities]
+                home[row] = main if main in parts else next(iter(parts), None)
+            homes[net.name] = home
+        return homes
+
+    @cached_property
+    def owners(self) -> dict[int, tuple[str, ...]]:
+        """The nets that have a terminal in a part, by the part."""
+        owners: dict[int, dict[str, None]] = {}
+        for name, home in self.homes.items():
+            for part in home.values():
+                if part is not None:
+                    owners.setdefault(part, {})[name] = None
+        return {part: tuple(names) for part, names in owners.items()}
+
+    def groups(self) -> tuple[frozenset[str], ...]:
+        """The members that hang together, by part; those in no void are alone."""
+        groups: dict[object, set[str]] = {}
+        for home in self.homes.values():
+            for row, part in home.items():
+                groups.setdefault(row if part is None else part, set()).add(row.member)
+        return tuple(map(frozenset, groups.values()))
+
+    # Faults.
+
+    def opens(self) -> Iterable[NetFault]:
+        """Yield the terminals in no void, and the parts of a net that are not joined to it."""
+        for net in self.nets:
+            home = self.homes[net.name]
+            main = next((part for part in home.values() if part is not None), None)
+            counts = [*home.values()]
+            if main is not None:
+                main = max(
+                    dict.fromkeys(counts), key=lambda p: -1 if p is None else counts.count(p)
+                )
+            for row in (row for row, part in home.items() if part is None):
+                message = (
+                    f"net {net.name} is open: {row.label} lies in no void ({at(row.at)}); open the "
+                    "mask or the film there, or move the port"
+                )
+                gap = self._between(row.layers)
+                yield NetFault("open", (net.name,), gap, row.layers, row.at, message)
+            for part in dict.fromkeys(p for p in home.values() if p not in (None, main)):
+                yield self._open(net.name, home, part or 0, main or 0)
+
+    def _open(
+        self, name: str, home: Mapping[_Terminal, int | None], part: int, main: int
+    ) -> NetFault:
+        cut = self._gap_between(part, main)
+        apart = _listed(row.label for row, number in home.items() if number == part)
+        rest = _listed(row.label for row, number in home.items() if number == main)
+        gap = self.interface(cut.interface)
+        reason = (
+            f"layer {gap.above.index} has no hole there"
+            if cut.is_through_film
+            else f"{cut.length:.3f} mm of bond lie between"
+        )
+        message = (
+            f"net {name} is open: {apart} is not joined to {rest}; they come nearest at interface "
+            f"{cut.interface} ({at(cut.at)}), where {reason}: join them"
+        )
+        return NetFault("open", (name,), cut.interface, gap.layer_indices, cut.at, message)
+
+    def shorts(self) -> Iterable[NetFault]:
+        """Yield the parts that several nets share, a fault for each further net."""
+        for part, names in self.owners.items():
+            for name in names[1:]:
+                number, p = self._bridge(part, names[0], name)
+                gap = self.interface(self.cavities[number].interface)
+                message = (
+                    f"nets {names[0]} and {name} are joined at interface {gap.index} ({at(p)}); "
+                    "bond the films between them, or close the hole"
+                )
+                yield NetFault("short", (names[0], name), gap.index, gap.layer_indices, p, message)
+
+    def leaks(self) -> Iterable[NetFault]:
+        """Yield the places where a net reaches the outside."""
+        for void, p in self.graph.joins.get(OUTSIDE, {}).items():
+            names = self.owners.get(self.part_of[void], ())
+            if not names:
+                continue
+            interface = None if void.kind == "opening" else void.level
+            layers = (void.level,) if interface is None else self.interface(interface).layer_indices
+            where = f"layer {void.level}" if interface is None else f"interface {interface}"
+            message = (
+                f"net {names[0]} reaches the outside at {where} ({at(p)}); close the opening, or "
+                "make it a port"
+            )
+            yield NetFault("leak", names, interface, layers, p, message)
+
+    def dead_ends(self, ratio: float) -> Iterable[NetFault]:
+        """Yield what ends blind in the cavities of the nets."""
+        for number, cavity in enumerate(self.cavities):
+            names = self.owners.get(self.part(number), ())
+            if not names:
+                continue
+            gap = self.interface(cavity.interface)
+            terminals = self._ways_on(number)
+            if len(terminals) <= 1:
+                if any(terminal.is_port for terminal in terminals):
+                    continue
+                start = terminals[0].at if terminals else None
+                p = _middle(cavity.region) if start is None else self._far_from(number, start)
+                what = "a hole that leads nowhere" if cavity.is_open_film else "a void with no port"
+            else:
+                for end in blind_ends(self.axis(number), terminals, ratio):
+                    message = (
+                        f"net {names[0]} has a dead end at interface {gap.index} ({at(end.at)}): "
+                        f"{end.depth:.2f} mm long, {end.width:.2f} mm wide and without a port; "
+                        "remove that part of the mask, or put a port there"
+                    )
+                    yield NetFault("dead-end", names, gap.index, gap.layer_indices, end.at, message)
+                continue
+            message = (
+                f"net {names[0]} has a dead end at interface {gap.index} ({at(p)}): {what}; remove "
+                "it, or put a port there"
+            )
+            yield NetFault("dead-end", names, gap.index, gap.layer_indices, p, message)
+
+    def strays(self) -> Iterable[NetFault]:
+        """Yield closed voids of no net, and those in a chamber interface that open outside."""
+        is_open = {self.part_of[void] for void in self.graph.joins.get(OUTSIDE, {})}
+        seen: set[int] = set()
+        for number, cavity in enumerate(self.cavities):
+            part = self.part(number)
+            gap = self.interface(cavity.interface)
+            if cavity.is_open_film or part in self.owners or part in seen:
+                continue
+            if part in is_open and gap.kind != "chamber":
+                continue
+            seen.add(part)
+            p = _middle(cavity.region)
+            message = (
+                f"a void of no net lies at interface {gap.index} ({at(p)}); remove that part of "
+                "the mask, or put a port of a net there"
+            )
+            yield NetFault("stray", (), gap.index, gap.layer_indices, p, message)
+
+    # Widths.
+
+    def narrow(self) -> Iterable[NarrowPlace]:
+        """Yield the narrowest place of every cavity of a net."""
+        for number, cavity in enumerate(self.cavities):
+            names = self.owners.get(self.part(number), ())
+            width = self._width(number) if names and not cavity.is_open_film else None
+            if width is not None:
+                pressure = opening_pressure(self.laminate, cavity.interface, width)
+                yield NarrowPlace(names[0], cavity.interface, width, pressure)
+
+    def _width(self, number: int) -> Width | None:
+        return least_width(self.cavities[number].region, 0.0)
+
+    def axis(self, number: int) -> Axis:
+        width = self._width(number)
+        return axis_of(self.cavities[number].region, 0.0 if width is None else width.value)
+
+    # Places.
+
+    def _ways_on(self, number: int) -> list[Terminal]:
+        """The ports and vias of a cavity, and where it reaches the outside."""
+        rows = [
+            Terminal(row.at, row.width, row.is_port)
+            for name in self.owners.get(self.part(number), ())
+            for row, part in self.homes[name].items()
+            if number in row.cavities and part == self.part(number)
+        ]
+        tubes = set(self.graph.holes.values())
+        for void in self.cavities[number].voids:
+            for there, p in self.graph.joins.get(void, {}).items():
+                if there == OUTSIDE:
+                    rows.append(Terminal(p, 0.0, False))
+                elif there.kind == "opening" and there not in tubes:
+                    beyond = [v for v in self.graph.joins[there] if self.cavity_of.get(v) != number]
+                    if beyond:
+                        rows.append(Terminal(p, _across(self.graph.openings[there]), False))
+        return rows
+
+    def _far_from(self, number: int, start: Point) -> Point:
+        axis = self.axis(number)
+        return axis.centre(int(np.argmax(np.hypot(*(axis.points - start).T))))
+
+    def _between(self, layers: tuple[int, ...]) -> int | None:
+        for gap in self.laminate.interfaces:
+            if (gap.below.index, gap.above.index) == layers:
+                return gap.index
+        return None
+
+    def _of_part(self, part: int) -> list[int]:
+        return [n for n in range(len(self.cavities)) if self.part(n) == part]
+
+    def _gap_between(self, part: int, main: int) -> _Cut:
+        """The place where two parts of a net most likely should be joined.
+
+        That is where both end one above the other, or else where they come nearest.
+        """
+        cuts: list[_Cut] = []
+        for a in self._of_part(part):
+            for b in self._of_part(main):
+                here, there = self.cavities[a], self.cavities[b]
+                if here.interface == there.interface:
+                    cuts.append(_nearest(self.axis(a), self.axis(b), here.interface))
+                elif abs(here.interface - there.interface) == 1:
+                    cuts += _overlaps(here, there)
+        if not cuts:
+            cavity = self.cavities[self._of_part(part)[0]]
+            return _Cut(0.0, 0.0, cavity.interface, _middle(cavity.region), True)
+        return min(cuts, key=lambda cut: (cut.cost, cut.interface))
+
+    def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point]:
+        """The cavity and the place in it where two nets of one part are joined.
+
+        The ways between the ports of each net are its own; the bridge is the middle of the shortest
+        way from the one's to the other's.
+        """
+        numbers = self._of_part(part)
+        axes = [self.axis(number) for number in numbers]
+        links = self._links(numbers, axes)
+        trees: list[dict[Node, None]] = []
+        for name in (first, second):
+            nodes = [
+                (place, axes[place].nearest(row.at))
+                for row, home in self.homes[name].items()
+                if home == part
+                for place, number in enumerate(numbers)
+                if number in row.cavities
+            ]
+            tree: dict[Node, None] = dict.fromkeys(nodes[:1])
+            for node in nodes[1:]:
+                tree.update(dict.fromkeys(shortest_way(axes, links, tree, [node])))
+            trees.append(tree)
+        shared = [node for node in trees[0] if node in trees[1]]
+        way = shared or shortest_way(axes, links, trees[0], trees[1])
+        place, sample = way[len(way) // 2]
+        return numbers[place], axes[place].centre(sample)
+
+    def _links(self, numbers: Sequence[int], axes: Sequence[Axis]) -> dict[Node, list[Node]]:
+        """The nodes on both sides of every via between these cavities."""
+        links: dict[Node, list[Node]] = {}
+        for opening in self.graph.openings:
+            beside = [n for n in self._beside(opening) if n in numbers]
+            p = _middle(self.graph.openings[opening])
+            nodes = [(numbers.index(n), axes[numbers.index(n)].nearest(p)) for n in beside]
+            for node in nodes:
+                links.setdefault(node, []).extend(other for other in nodes if other != node)
+        return links
+
+
+class _Cut(NamedTuple):
+    """A place where two parts of a net are apart by ``length`` mm; the least ``cost`` is likeliest.
+
+    A film between two ends costs nothing, bond its length, a crossing of channels twice its width.
+    """
+
+    cost: float
+    length: float
+    interface: int
+    at: Point
+    is_through_film: bool
+
+
+def _nearest(a: Axis, b: Axis, interface: int) -> _Cut:
+    best, at_point = math.inf, (0.0, 0.0)
+    for start in range(0, len(a.points), 256):
+        rows = a.points[start : start + 256]
+        away = np.hypot(*(rows[:, None, :] - b.points[None, :, :]).transpose(2, 0, 1))
+        i, j = np.unravel_index(away.argmin(), away.shape)
+        if away[i, j] < best:
+            best = float(away[i, j])
+            x, y = (rows[i] + b.points[j]) / 2
+            at_point = float(x), float(y)
+    return _Cut(best, best, interface, at_point, False)
+
+
+def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
+    """Return the places where a film alone lies between two cavities, ends before crossings."""
+    lower = min(a.interface, b.interface)
+    cuts = []
+    for piece in without_slivers(a.region & b.region).pieces:
+        left = [len(without_slivers(cavity.region - piece).pieces) for cavity in (a, b)]
+        cost = 2 * _across(piece) if min(left) > 1 else 0.0
+        cuts.append(_Cut(cost, 0.0, lower, _middle(piece), True))
+    return cuts
+
+
+def _parts(graph: VoidGraph) -> dict[Void, int]:
+    """Return the number of the part that every void belongs to; the outside joins none."""
+    parts: dict[Void, int] = {}
+    for void in [*graph.pieces, *graph.gaps, *graph.openings]:
+        if void not in parts:
+            number = len(parts)
+            for reached in graph.reached([void]):
+                if reached != OUTSIDE:
+                    parts[reached] = number
+    return parts
+
+
+def _across(opening: Region) -> float:
+    low_x, low_y, high_x, high_y = opening.bounds
+    return min(high_x - low_x, high_y - low_y)
+
+
+def _middle(region: Region) -> Point:
+    low_x, low_y, high_x, high_y = region.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2
+
+
+def _listed(labels: Iterable[str]) -> str:
+    return " and ".join(dict.fromkeys(labels))
+
+
+# Channels that close: narrower than their films can lift.
+#
+# A channel between films bonded at both sides is a long plate clamped at its edges. Under a
+# pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The first
+# term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed., Sec. 3:
+# d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by 8 d^2 / 3 w,
+# and a tension T in it carries p = 8 T d / w^2. It counts as open where d is the thickness of the
+# film beside the void. Films bonded behind that film there stiffen it.
+
+
+BENDING = 32.0
+STRETCHING = 64.0 / 3.0
+
+
+def opening_pressure(laminate: Laminate, interface: int, width: Width) -> float | None:
+    """Return the kPa at which either film of a channel lifts by its thickness at a place.
+
+    None where no film of either side has elastic constants. A model, not measured.
+    """
+    gap = laminate.interfaces[interface - 1]
+    if width.value <= 0:
+        return math.inf
+    sides = [
+        _lifting_pressure(_bonded_films(laminate, gap, width.middle, step), width.value)
+        for step in (-1, 1)
+    ]
+    known = [pressure for pressure in sides if pressure is not None]
+    return min(known, default=None)
+
+
+def _lifting_pressure(films: Sequence[Film], width: float) -> float | None:
+    """Return the kPa at which a stack of bonded films lifts by the thickness of the first one."""
+    moduli = [
+        1000 * film.elastic[0] / (1 - film.elastic[1] ** 2)
+        for film in films
+        if film.elastic is not None
+    ]
+    if len(moduli) < len(films):
+        return None
+    lift, thickness = films[0].thickness, sum(film.thickness for film in films)
+    stiffness = BENDING * thickness**3 * lift + STRETCHING * thickness * lift**3
+    return max(moduli) * stiffness / width**4
+
+
+def _bonded_films(laminate: Laminate, gap: Interface, p: Point, step: int) -> list[Film]:
+    """The film beside a void on its upper (+1) or lower (-1) side, and those bonded behind it."""
+    layer: Layer = gap.above if step > 0 else gap.below
+    films = [layer.film]
+    number = gap.index - 1 + step
+    while 0 <= number < len(laminate.interfaces):
+        behind = laminate.interfaces[number]
+        if not behind.bond.contains(p):
+            break
+        films.append((behind.above if step > 0 else behind.below).film)
+        number += step
+    return films
+
+
+def _openings(
+    narrow: Sequence[NarrowPlace], laminate: Laminate, limits: Limits
+) -> Iterable[Finding]:
+    """Yield the channel that takes most pressure to open; a warning where that is not known."""
+    limit = limits.opening_pressure
+    known = [(place.pressure, place) for place in narrow if place.pressure is not None]
+    if known:
+        pressure, worst = max(known, key=lambda row: row[0])
+        layers = laminate.interfaces[worst.interface - 1].layer_indices
+        place = Place(worst.interface, layers, *worst.width.middle)
+        is_good = pressure <= limit * (1 + 1e-9)
+        message = (
+            f"the channel of net {worst.net} that is hardest to open is {worst.width.value:.3f} mm "
+            f"wide, at interface {worst.interface} ({at(worst.width.middle)}), and takes "
+            f"{pressure:.3g} kPa to lift a film by its thickness (clamped plate)"
+        )
+        if not is_good:
+            message += f"; it may take {limit:g}: widen it there"
+        measured = pressure if math.isfinite(pressure) else None
+        verdict: Literal["pass", "fail"] = "pass" if is_good else "fail"
+        yield Finding(NAME, verdict, limit, measured, "kPa", place, message)
+    if len(known) < len(narrow):
+        unknown = next(place for place in narrow if place.pressure is None)
+        message = (
+            "State modulus and poisson of the films: without them it is not known what opens the "
+            f"channel of {unknown.width.value:.3f} mm at interface {unknown.interface}"
+        )
+        where = Place(unknown.interface, (), *unknown.width.middle)
+        yield Finding(NAME, "warn", limit, None, "kPa", where, message, remedy=message)

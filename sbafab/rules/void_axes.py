@@ -1,0 +1,326 @@
+"""Medial axes of voids seen from above: blind ends, and the way from one place to another.
+
+A void's boundary is sampled; every sample touches the largest circle inside the void that is
+tangent there, and the circle touches a second sample, its partner (shrinking balls: Ma, Bae and
+Choi, The Visual Computer 28 (2012) 7). The chord between the two is a cut straight across the void.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from sbafab.geometry.cache import cached
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Point, left_normal
+from sbafab.geometry.offset import shrink
+from sbafab.geometry.on_demand import np
+from sbafab.geometry.region import Region
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Counts = NDArray[np.int64]
+
+STEPS_ACROSS = 4
+"""Samples along the boundary within the narrowest width."""
+MOST_SAMPLES = 3000
+ROWS = 256
+"""Samples whose circles are searched for at once; bounds the memory."""
+INWARD = 1e-6
+"""mm by which a sample must lie inside of another's tangent to bound its circle."""
+POCKET = 3.0
+"""A pocket is this many times as wide as the channels that lead to it."""
+POCKET_OF_VIAS = 6.0
+"""As POCKET, of the holes that lead to it: many are narrower than the channels that they join."""
+NUDGE = 1e-3
+"""mm by which places are moved off the boundary, inward."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Samples of a void's boundary in order, contour by contour, the void on their left.
+
+    ``points`` and ``centres`` of the tangent circles are (n, 2) in mm, ``radii`` (n,) in mm;
+    ``partners`` (n,) are the samples that the circles touch besides; ``contours`` (n,) number the
+    contour of each; ``starts`` are the first samples of the contours, and their end.
+    """
+
+    region: Region
+    points: Floats
+    centres: Floats
+    radii: Floats
+    partners: Counts
+    contours: Counts
+    starts: tuple[int, ...]
+
+    def nearest(self, p: Point) -> int:
+        """Return the sample whose circle has its centre nearest to ``p``."""
+        return int(np.argmin(np.hypot(*(self.centres - p).T)))
+
+    def neighbours(self, sample: int) -> tuple[int, int, int]:
+        """Return the samples before and after on the contour, and the partner."""
+        contour = int(self.contours[sample])
+        first, end = self.starts[contour], self.starts[contour + 1]
+        before = sample - 1 if sample > first else end - 1
+        after = sample + 1 if sample + 1 < end else first
+        return before, after, int(self.partners[sample])
+
+    def centre(self, sample: int) -> Point:
+        x, y = self.centres[sample]
+        return float(x), float(y)
+
+
+@cached
+def axis_of(region: Region, width: float) -> Axis:
+    """Return the axis of a connected region whose narrowest place is ``width`` mm wide."""
+    length = sum(contour.length for contour in region.contours)
+    step = max(width / STEPS_ACROSS, length / MOST_SAMPLES)
+    points: list[Point] = []
+    normals: list[Point] = []
+    starts = [0]
+    for contour in region.contours:
+        for p, normal in _samples(contour, step):
+            points.append(p)
+            normals.append(normal)
+        starts.append(len(points))
+    numbers = [starts[i + 1] - starts[i] for i in range(len(starts) - 1)]
+    contours = np.repeat(np.arange(len(numbers)), numbers)
+    places, inward = np.array(points), np.array(normals)
+    radii, partners = _circles(places, inward)
+    centres = places + radii[:, None] * inward
+    return Axis(region, places, centres, radii, partners, contours, tuple(starts))
+
+
+def _samples(contour: Contour, step: float) -> Iterable[tuple[Point, Point]]:
+    """Points inside the edges, at most a step apart, with their normals into the region."""
+    for edge in contour.edges:
+        count = max(1, math.ceil(edge.length / step))
+        for i in range(count):
+            p = edge.at((i + 0.5) / count)
+            yield p, left_normal(edge, p)
+
+
+def _circles(points: Floats, normals: Floats) -> tuple[Floats, Counts]:
+    """Return radii of the largest inner circles tangent at the samples, and what they touch."""
+    radii = np.empty(len(points))
+    partners = np.empty(len(points), dtype=np.int64)
+    for first in range(0, len(points), ROWS):
+        rows = slice(first, first + ROWS)
+        away = points[None, :, :] - points[rows, None, :]
+        inward = np.einsum("ijk,ik->ij", away, normals[rows])
+        squares = np.einsum("ijk,ijk->ij", away, away)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            candidates = np.where(inward > INWARD, squares / (2 * inward), np.inf)
+        best = candidates.argmin(axis=1)
+        partners[rows] = best
+        radii[rows] = candidates[np.arange(len(best)), best]
+    # A sample that no other faces, as in the cusp of a sliver, has a circle of no size.
+    radii[~np.isfinite(radii)] = 0.0
+    return radii, partners
+
+
+# Blind ends: what lies behind a cut straight across a void and holds no way on.
+
+
+class Terminal(NamedTuple):
+    """A place where something goes on from a void: a port, or a way of ``width`` mm out of it."""
+
+    at: Point
+    width: float
+    is_port: bool
+
+
+class BlindEnd(NamedTuple):
+    """A part of a void behind a cut of ``width`` mm, ``depth`` mm long, with its far end ``at``."""
+
+    at: Point
+    width: float
+    depth: float
+
+
+def blind_ends(axis: Axis, terminals: Sequence[Terminal], ratio: float) -> list[BlindEnd]:
+    """Return the parts of a void that end blind, more than ``ratio`` times as long as wide.
+
+    Such a part lies behind a cut straight across the void and holds no terminal. It is none where a
+    port lies at its foot, within the width of the cut, nor where it is part of a pocket that holds
+    a port. Length is half of the way round it along the boundary, less the cut.
+    """
+    cuts = _cuts(axis)
+    closed = ~_holds_any(axis, cuts, [terminal.at for terminal in terminals])
+    deep = closed & (cuts.depth >= ratio * cuts.width)
+    ends: list[BlindEnd] = []
+    taken: list[tuple[int, int, int]] = []
+    for row in np.argsort(-np.where(deep, cuts.depth, -1.0), kind="stable")[: int(deep.sum())]:
+        first, last = int(cuts.first[row]), int(cuts.last[row])
+        contour = int(axis.contours[first])
+        begin, end = axis.starts[contour], axis.starts[contour + 1]
+        size = end - begin
+        count = (last - first) % size
+        covered = [(contour, (first - begin + i) % size) for i in (0, count // 2, count)]
+        if any(_within(taken_arc, place, axis) for taken_arc in taken for place in covered):
+            continue
+        taken.append((contour, first - begin, count))
+        foot = (axis.points[first] + axis.points[last]) / 2
+        width = float(cuts.width[row])
+        if _is_excused(axis, (float(foot[0]), float(foot[1])), width, terminals):
+            continue
+        tip = begin + (first - begin + count // 2) % size
+        ends.append(BlindEnd(axis.centre(tip), width, float(cuts.depth[row])))
+    return ends
+
+
+class _Cuts(NamedTuple):
+    """Cuts across a void: the samples from ``first`` on to ``last`` lie behind it."""
+
+    first: Counts
+    last: Counts
+    width: Floats
+    depth: Floats
+
+
+def _cuts(axis: Axis) -> _Cuts:
+    """Return both sides of every chord that parts the void."""
+    samples = np.arange(len(axis.points))
+    is_whole = (axis.contours[axis.partners] == axis.contours) & (axis.radii > 0)
+    there, back = samples[is_whole], axis.partners[is_whole]
+    first, last = np.concatenate([there, back]), np.concatenate([back, there])
+    chord = axis.points[first] - axis.points[last]
+    width = np.hypot(*chord.T)
+    length, area = _along(axis)
+    way = _from_to(axis, length, first, last)
+    p, q = axis.points[last], axis.points[first]
+    enclosed = _from_to(axis, area, first, last) + _cross(p, q) / 2
+    depth = np.where(enclosed > 0, (way - width) / 2, -1.0)
+    return _Cuts(first, last, width, depth)
+
+
+def _cross(p: Floats, q: Floats) -> Floats:
+    crossed: Floats = p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]
+    return crossed
+
+
+def _following(axis: Axis) -> Floats:
+    """Return the sample after each one on its contour."""
+    following = np.roll(axis.points, -1, axis=0)
+    for first, end in zip(axis.starts, axis.starts[1:], strict=False):
+        following[end - 1] = axis.points[first]
+    return following
+
+
+def _along(axis: Axis) -> tuple[Floats, Floats]:
+    """Return way and area from the first sample of the contours to the end of each step."""
+    following = _following(axis)
+    way = np.hypot(*(following - axis.points).T)
+    return np.cumsum(way), np.cumsum(_cross(axis.points, following) / 2)
+
+
+def _from_to(axis: Axis, sums: Floats, first: Counts, last: Counts) -> Floats:
+    """Return what the steps from ``first`` on to ``last`` add up to, along their contour."""
+    before = np.concatenate([[0.0], sums])
+    starts, ends = np.array(axis.starts[:-1]), np.array(axis.starts[1:])
+    contour = axis.contours[first]
+    whole = before[ends[contour]] - before[starts[contour]]
+    part: Floats = before[last] - before[first]
+    return np.where(last < first, part + whole, part)
+
+
+def _holds_any(axis: Axis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
+    """Return True for the cuts that have one of the places behind them, or on their edge."""
+    following = _following(axis)
+    holds = np.zeros(len(cuts.first), dtype=np.bool_)
+    for place in (_inward(axis, place) for place in places):
+        here, there = axis.points - place, following - place
+        turned = np.cumsum(np.arctan2(_cross(here, there), np.einsum("ij,ij->i", here, there)))
+        p, q = here[cuts.last], here[cuts.first]
+        closing = np.arctan2(_cross(p, q), np.einsum("ij,ij->i", p, q))
+        turns = (_from_to(axis, turned, cuts.first, cuts.last) + closing) / math.tau
+        holds |= np.abs(turns) > 0.25
+    return holds
+
+
+def _inward(axis: Axis, p: Point) -> Point:
+    """Return a point that may lie on the boundary a little inward."""
+    sample = int(np.argmin(np.hypot(*(axis.points - p).T)))
+    x, y = axis.centre(sample)
+    away = math.dist(p, (x, y))
+    share = min(1.0, NUDGE / away) if away > 0 else 0.0
+    return p[0] + share * (x - p[0]), p[1] + share * (y - p[1])
+
+
+def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: Axis) -> bool:
+    contour, first, count = arc
+    size = axis.starts[contour + 1] - axis.starts[contour]
+    return place[0] == contour and (place[1] - first) % size <= count
+
+
+def _is_excused(axis: Axis, foot: Point, width: float, terminals: Sequence[Terminal]) -> bool:
+    """Return True if a port lies at the foot of a blind part, or in the same pocket."""
+    ports = [terminal for terminal in terminals if terminal.is_port]
+    if any(math.dist(port.at, foot) <= width for port in ports):
+        return True
+    # What is left a third of the way in has no channel that leads to the pocket.
+    inset = width / POCKET / 2
+    inner = shrink(axis.region, inset)
+    pocket = next((piece for piece in inner.pieces if piece.contains(foot)), None)
+    if pocket is None:
+        return False
+
+    def is_inside(terminal: Terminal) -> bool:
+        if pocket.contains(terminal.at):
+            return True
+        return pocket.distance_to_edge(terminal.at) <= inset + terminal.width / 2
+
+    inside = [terminal for terminal in terminals if is_inside(terminal)]
+    narrow = width / POCKET_OF_VIAS
+    wide = [terminal for terminal in inside if terminal.is_port or terminal.width > narrow]
+    return len(wide) == 1 and wide[0].is_port
+
+
+# Ways along the axes of several voids, which vias join.
+
+Node = tuple[int, int]
+"""Number of an axis, and a sample of it."""
+Links = Mapping[Node, Sequence[Node]]
+"""Vias: from a sample of one axis to samples of others."""
+
+
+def shortest_way(
+    axes: Sequence[Axis], links: Links, starts: Iterable[Node], goals: Iterable[Node]
+) -> list[Node]:
+    """Return the nodes of the shortest way from any start to any goal; empty if there is none."""
+    aims = set(goals)
+    lengths = dict.fromkeys(starts, 0.0)
+    came: dict[Node, Node] = {}
+    queue = [(0.0, node) for node in sorted(lengths)]
+    done: set[Node] = set()
+    while queue:
+        length, node = heapq.heappop(queue)
+        if node in done:
+            continue
+        done.add(node)
+        if node in aims:
+            way = [node]
+            while way[-1] in came:
+                way.append(came[way[-1]])
+            return way[::-1]
+        for there, step in _steps(axes, links, node):
+            if there not in done and length + step < lengths.get(there, math.inf):
+                lengths[there] = length + step
+                came[there] = node
+                heapq.heappush(queue, (length + step, there))
+    return []
+
+
+def _steps(axes: Sequence[Axis], links: Links, node: Node) -> Iterable[tuple[Node, float]]:
+    number, sample = node
+    axis = axes[number]
+    here = axis.centre(sample)
+    for neighbour in axis.neighbours(sample):
+        yield (number, neighbour), math.dist(here, axis.centre(neighbour))
+    for linked in links.get(node, ()):
+        yield linked, math.dist(here, axes[linked[0]].centre(linked[1]))
