@@ -33,6 +33,9 @@ from sbafab.geometry.region import Region, difference, disc, polygon, stadium, s
 from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import (
     Fold,
+    Net,
+    Port,
+    PortKind,
     Seam,
     SeamKind,
     SeamTool,
@@ -326,6 +329,30 @@ class DrawnMechanism(_Row):
         return self
 
 
+class DrawnPort(_Row):
+    """A place in a gap that nets name: a pocket, the end of a channel, or a hole for a tube."""
+
+    name: str = Field(pattern=NAME_PATTERN)
+    """How nets and findings call it."""
+    layers: LayerPair
+    """The two films that it lies between, by their numbers in ``layers``."""
+    at: Coordinates
+    """Its place, in a void."""
+    kind: PortKind = "place"
+    """A place of that gap, or a hole of the top or bottom film beside it, which a tube fills."""
+
+
+class NamedNets(Section):
+    """The nets by name: ports and chambers that voids join, and that nothing else is joined to."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Names] = Field(init=False)
+
+    @property
+    def by_name(self) -> Mapping[str, tuple[str, ...]]:
+        return self.__pydantic_extra__ or {}
+
+
 class DrawnDesign(Design):
     """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
     and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
@@ -348,6 +375,10 @@ class DrawnDesign(Design):
     """The seams, in the order in which they are made; none by default."""
     folds: Annotated[tuple[DrawnFold, ...], Field(strict=False, max_length=100)] | None = None
     """The folds; none by default."""
+    ports: Annotated[tuple[DrawnPort, ...], Field(strict=False, max_length=500)] | None = None
+    """Places that nets name, beside the chambers; none by default."""
+    nets: NamedNets | None = None
+    """Ports and chambers that are meant to be joined, across holes of films too (rule nets)."""
     body: str | None = None
     """The shape of the films without tabs, for the outline's diameter; none by default."""
     lumen: Length | None = None
@@ -462,7 +493,8 @@ def build(design: DrawnDesign) -> Laminate:
         Bore(chamber.name, centre, design.bore.diameter)
         for chamber in chambers
         for centre in chamber.centres
-        if len(chamber.balloons or range(balloons)) > 1
+        # A chamber of a net goes from film to film through the holes that are drawn.
+        if len(chamber.balloons or range(balloons)) > 1 and design.nets is None
     )
     laminate = Laminate(
         name=design.name,
@@ -492,10 +524,18 @@ def build(design: DrawnDesign) -> Laminate:
             for number, seam in enumerate(design.seams or (), start=1)
         ),
         folds=tuple(Fold(*fold.layers, fold.line) for fold in design.folds or ()),
+        ports=tuple(
+            Port(port.name, *port.layers, port.at, port.kind) for port in design.ports or ()
+        ),
+        nets=tuple(Net(name, members) for name, members in _nets(design).items()),
         bonds=design.stated_bonds,
     )
     joinings(laminate)
     return laminate
+
+
+def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:
+    return {} if design.nets is None else design.nets.by_name
 
 
 def _is_table(value: object) -> bool:
@@ -511,8 +551,11 @@ def _check(design: DrawnDesign) -> None:
     roles = [layer.role for layer in design.layers]
     if not roles:
         raise DesignError('layers is missing; add a list of {role = "...", shape = "..."}')
-    if not design.chambers:
-        raise DesignError("chambers is missing; add a list of {name, centres, mouth, angle}")
+    if not design.chambers and not any(port.kind == "hole" for port in design.ports or ()):
+        raise DesignError(
+            "chambers is missing; add a list of {name, centres, mouth, angle}, or a port of kind "
+            '"hole" to a net'
+        )
     names = [chamber.name for chamber in design.chambers]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -532,6 +575,8 @@ def _check(design: DrawnDesign) -> None:
     _check_order(roles)
     pairs = chamber_gaps(roles, design.seamed_layers)
     _check_seams(design, list(pairs))
+    _check_ports(design)
+    _check_nets(design)
     count = sum(pairs.values())
     if not count:
         raise DesignError(
@@ -586,6 +631,56 @@ def _check_seams(design: DrawnDesign, pairs: Sequence[tuple[int, int]]) -> None:
                 f"seam {seam.name}: layers {list(seam.layers)} are not two films that lie next to "
                 f"each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
             )
+
+
+def _check_ports(design: DrawnDesign) -> None:
+    """Raises DesignError for ports that lie between no neighbouring films, or share a name."""
+    films = [n for n, row in enumerate(design.layers, 1) if not row.role.endswith("-mask")]
+    pairs = list(pairwise(films))
+    names = {chamber.name for chamber in design.chambers}
+    for port in design.ports or ():
+        if port.name in names:
+            raise DesignError(
+                f"ports has {shown(port.name)}, which is the name of another port or chamber; give "
+                "each its own"
+            )
+        names.add(port.name)
+        if port.layers not in pairs:
+            raise DesignError(
+                f"port {port.name}: layers {list(port.layers)} are not two films that lie next to "
+                f"each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
+            )
+        if port.kind == "hole" and not {films[0], films[-1]} & {*port.layers}:
+            raise DesignError(
+                f"port {port.name} is a hole between layers {list(port.layers)}, and a tube goes "
+                f"through the bottom or the top film; give {list(pairs[0])} or {list(pairs[-1])}, "
+                "or join them by a hole in each film between"
+            )
+
+
+def _check_nets(design: DrawnDesign) -> None:
+    """Raises DesignError for members of nets that are not there, or of two nets."""
+    names = [chamber.name for chamber in design.chambers]
+    names += [port.name for port in design.ports or ()]
+    home: dict[str, str] = {}
+    for net, members in _nets(design).items():
+        if not re.fullmatch(NAME_PATTERN, net):
+            raise DesignError(
+                f"nets.{net} is no name; take letters, digits, dots, - and _, 64 at most"
+            )
+        for member in members:
+            if member not in names:
+                near = difflib.get_close_matches(member, names, 1)
+                hint = f"did you mean {near[0]}?" if near else f"there are {listed(names)}"
+                raise DesignError(
+                    f"nets.{net} names {shown(member)}, which is no port or chamber; {hint}"
+                )
+            if member in home:
+                where = "twice" if home[member] == net else f"and so does nets.{home[member]}"
+                raise DesignError(
+                    f"nets.{net} names {shown(member)} {where}; a port belongs to one net, once"
+                )
+            home[member] = net
 
 
 def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:

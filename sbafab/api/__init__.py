@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sbafab.api.checks import check, check_folder, checking
+    from sbafab.api.checks import check, check_folder, checking, nets_of
     from sbafab.api.designs import (
         Source,
         assemble,
@@ -57,6 +57,7 @@ __all__ = [
     "mesh",
     "motion",
     "nest",
+    "nets_of",
     "predict",
     "predict_assembly",
     "press",
@@ -74,7 +75,7 @@ __all__ = [
 ]
 
 MODULES = {
-    "checks": ("check", "check_folder", "checking"),
+    "checks": ("check", "check_folder", "checking", "nets_of"),
     "lab": ("kerf", "record", "report"),
     "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "runs": ("cut", "generate", "mesh", "nest", "press", "simulate"),

@@ -12,9 +12,11 @@ from sbafab.design.files import Change
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import limits
 from sbafab.process import Progress
+from sbafab.reports.nets_svg import NetMap, net_map
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Findings
 from sbafab.rules.measures import Measures
+from sbafab.rules.nets import connectivity
 
 
 def check(
@@ -49,6 +51,20 @@ def checking(
     for rule in RULES:
         findings = run_rule(rule, measures.laminate, measures.limits, measures)
         yield rule.name, Findings(findings)
+
+
+def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
+    """Return the nets of a design: their colours, the voids of every interface, and faults.
+
+    ``areas`` have an ``interface``, counted from 1 at the bottom, a ``net`` ("" for none), its
+    ``colour`` and their outline as SVG ``path``, mm. ``faults`` are opens, shorts, leaks, dead ends
+    and voids of no net, each with its place; a design that declares no nets has none, and every
+    chamber of it is a net. Raises DesignError.
+    """
+    design = load(source, *changes, **tables)
+    laminate = build(design)
+    found = connectivity(laminate, limits(design), faults=bool(laminate.nets))
+    return net_map(laminate, found)
 
 
 def check_folder(folder: str | Path) -> Findings:

@@ -29,7 +29,6 @@ LATER: Mapping[str, Sequence[str]] = {
     "order": ("success_rate", "certainty", "shift_hours"),
     "laser": ("hold_tpe", "hold_ptfe"),
     "panel": ("carrier_adhesive", "carrier_limit_c"),
-    "rules": ("opening_pressure_kpa", "dead_end"),
 }
 """Keys that came after the first hashes, which have none of them."""
 

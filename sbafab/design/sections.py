@@ -469,10 +469,11 @@ class Rules(Section):
     """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
     """More balloons than this draw a warning (paper Sec. 6)."""
-    opening_pressure_kpa: float = Field(default=100.0, gt=0, le=10000)
-    """A channel of a net must open at this pressure: one of its films lifts by its thickness."""
-    dead_end: float = Field(default=2.0, ge=0.5, le=1000)
-    """A branch of a net without a port may be at most so many times as long as wide."""
+    opening_pressure_kpa: float | None = Field(default=None, gt=0, le=10000)
+    """A channel of a net must open at this pressure: one of its films lifts by its thickness. By
+    default 100 kPa, at which the paper gives forces."""
+    dead_end: float | None = Field(default=None, ge=0.5, le=1000)
+    """A branch of a net without a port may be so many times as long as wide; by default 2."""
     waive: tuple[RuleName, ...] = Field(default=(), strict=False)
     """Rules whose failure shall not stop the cut files; every file then says so."""
 

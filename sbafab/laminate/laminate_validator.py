@@ -70,7 +70,7 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "order": _COUNT,
     },
     "folds": {"lower": _COUNT, "upper": _COUNT, "line": _POINTS},
-    "ports": {"name": _TEXT, "below": _COUNT, "above": _COUNT, "at": _POINT},
+    "ports": {"name": _TEXT, "below": _COUNT, "above": _COUNT, "at": _POINT, "kind": _TEXT},
     "nets": {"name": _TEXT, "ports": _TEXTS},
     "bonds": {
         "name": _TEXT,
@@ -86,6 +86,7 @@ LATER: Mapping[str, Mapping[str, Any]] = {
     "films": {"faces": None},
     "layers": {"turned": False},
     "chambers": {"balloons": []},
+    "ports": {"kind": "place"},
 }
 """Keys that files of earlier versions lack, and what holds there."""
 TOOLS = ("laser", "hot-tip", "ultrasonic", "roller")

@@ -30,7 +30,7 @@ from sbafab.pressing.schedule import PressSettings, Schedule, plate_holes, sched
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, summary
-from sbafab.rules.limits import CHECKED_AGAINST, Limits, Tolerances, lowered
+from sbafab.rules.limits import CHECKED_AGAINST, USUAL, Limits, Tolerances, lowered
 from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
 
@@ -136,8 +136,8 @@ def limits(design: Design) -> Limits:
         pin_stretch=design.registration.pin_stretch,
         worst_bond_width=design.rules.worst_bond_width,
         worst_mask_overhang=design.rules.worst_mask_overhang,
-        opening_pressure=design.rules.opening_pressure_kpa,
-        dead_end=design.rules.dead_end,
+        opening_pressure=design.rules.opening_pressure_kpa or USUAL.opening_pressure,
+        dead_end=design.rules.dead_end or USUAL.dead_end,
         target_yield=design.rules.target_yield,
         yield_builds=design.rules.yield_builds,
         minutes_for=tuple(map(named_film, design.press.minutes_for)),

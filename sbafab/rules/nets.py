@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.edges import Point
@@ -138,22 +139,29 @@ def declared(laminate: Laminate) -> tuple[Net, ...]:
     return (*laminate.nets, *alone)
 
 
-def connectivity(laminate: Laminate, limits: Limits) -> Connectivity:
-    """Return the voids of a laminate, the nets that they belong to, and what is not as declared."""
+def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Connectivity:
+    """Return the voids of a laminate, the nets that they belong to, and what is not as declared.
+
+    Without ``faults`` these are not searched for.
+    """
     reading = _Reading(laminate)
-    faults = [
-        *reading.opens(),
-        *reading.shorts(),
-        *reading.leaks(),
-        *reading.dead_ends(limits.dead_end),
-        *reading.strays(),
-    ]
+    differences = (
+        reading.opens(),
+        reading.shorts(),
+        reading.leaks(),
+        reading.dead_ends(limits.dead_end),
+        reading.strays(),
+    )
     owners = tuple(
         tuple(sorted(reading.owners.get(reading.part_of[cavity.voids[0]], ())))
         for cavity in reading.cavities
     )
     return Connectivity(
-        reading.cavities, owners, reading.groups(), tuple(faults), tuple(reading.narrow())
+        reading.cavities,
+        owners,
+        reading.groups(),
+        tuple(chain(*differences)) if faults else (),
+        tuple(reading.narrow()) if faults else (),
     )
 
 
@@ -215,8 +223,12 @@ class _Reading:
                 label = f"the inlet of {member}"
                 rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
         gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
-        faces = [(gap.below.index, gap.above.index) for gap in gaps]
         for chamber in laminate.chambers:
+            faces = [
+                (gap.below.index, gap.above.index)
+                for balloon, gap in enumerate(gaps, start=1)
+                if chamber.is_in(balloon)
+            ]
             for centre in chamber.centres if chamber.name == member else ():
                 holding = self._holding(centre, faces)
                 label = f"the pocket of {member}"
@@ -382,7 +394,8 @@ class _Reading:
             gap = self.interface(cavity.interface)
             if cavity.is_open_film or part in self.owners or part in seen:
                 continue
-            if part in is_open and gap.kind != "chamber":
+            # A slit between balloons, or a flap outside a seam.
+            if part in is_open and not (gap.kind == "chamber" and gap.pressed):
                 continue
             seen.add(part)
             p = _middle(cavity.region)
@@ -567,11 +580,11 @@ def _listed(labels: Iterable[str]) -> str:
 # Channels that close: narrower than their films can lift.
 #
 # A channel between films bonded at both sides is a long plate clamped at its edges. Under a
-# pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The first
-# term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed., Sec. 3:
-# d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by 8 d^2 / 3 w,
-# and a tension T in it carries p = 8 T d / w^2. It counts as open where d is the thickness of the
-# film beside the void. Films bonded behind that film there stiffen it.
+# pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The
+# first term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed.,
+# Sec. 3: d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by
+# 8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open where d is
+# the thickness of the film beside it. Films bonded behind that film there stiffen it.
 
 
 BENDING = 32.0

@@ -8,14 +8,14 @@ nothing and are not in it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
 from sbafab.geometry.boolean import alone, turned_round
 from sbafab.geometry.cache import cached
 from sbafab.geometry.contour import in_reading_order, tidy
-from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.joints import Port
@@ -112,7 +112,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
             if interface.kind == "chamber"
             and (inlet.chamber in chambers[interface.index] or inlet.chamber not in named)
         }
-        _add_gap(graph, interface, gap, missing, inlets)
+        _add_gap(graph, interface, gap, missing, inlets, _folds_of(interface, laminate))
         graph.gaps.update(
             (void, piece)
             for void, piece in zip(missing, gap.missing, strict=True)
@@ -246,17 +246,28 @@ def _add_gap(
     gap: _Gap,
     missing: list[Void],
     inlets: Mapping[int, Inlet],
+    folds: Sequence[Line],
 ) -> None:
     voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
     graph.pieces.update(zip(voids, gap.unbonded, strict=True))
     for number, home, p in gap.touching:
         inlet = None
-        if interface.kind == "chamber" and home == gap.outside:
-            inlet = _inlet_at(p, inlets)
+        if home == gap.outside:
+            # Where a film is folded it goes on from one layer to the other.
+            if any(distance_to(fold, p) <= TOLERANCE for fold in folds):
+                continue
+            if interface.kind == "chamber":
+                inlet = _inlet_at(p, inlets)
         if inlet is None:
             graph.join(voids[number], missing[home], p)
         else:
             graph.mouths.setdefault(inlet, []).append(voids[number])
+
+
+def _folds_of(interface: Interface, laminate: Laminate) -> list[Line]:
+    """The lines along which the two layers of an interface are one film."""
+    layers = {interface.below.index, interface.above.index}
+    return [Line(*fold.line) for fold in laminate.folds if {fold.lower, fold.upper} == layers]
 
 
 def _inlet_at(p: Point, inlets: Mapping[int, Inlet]) -> int | None:

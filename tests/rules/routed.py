@@ -8,7 +8,7 @@ rule.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from random import Random
 
@@ -126,9 +126,7 @@ def add_net(routes: Routes, name: str, random: Random) -> None:
     routes.nets[name] = names
 
 
-def shortest(
-    routes: Routes, tree: dict[Place, None], goal: Place, random: Random
-) -> list[Place]:
+def shortest(routes: Routes, tree: dict[Place, None], goal: Place, random: Random) -> list[Place]:
     """A shortest way from a tree to a place through what no other net uses."""
     came: dict[Place, Place | None] = dict.fromkeys(tree)
     queue = deque(tree)
@@ -143,10 +141,10 @@ def shortest(
         steps = [*around(here, routes), (level + 1, x, y), (level - 1, x, y)]
         random.shuffle(steps)
         for there in steps:
-            if 0 <= there[0] < routes.interfaces and there not in came:
-                if there not in routes.nodes:
-                    came[there] = here
-                    queue.append(there)
+            is_free = there not in came and there not in routes.nodes
+            if is_free and 0 <= there[0] < routes.interfaces:
+                came[there] = here
+                queue.append(there)
     return []
 
 
@@ -195,7 +193,9 @@ def laminate_of(routes: Routes) -> Laminate:
         for name, place in routes.ports.items()
         if name not in routes.mouths
     )
-    chambers = tuple(Chamber(name, ((1.5 - MARGIN, xy(routes.ports[name])[1]),)) for name in routes.mouths)
+    chambers = tuple(
+        Chamber(name, ((1.5 - MARGIN, xy(routes.ports[name])[1]),)) for name in routes.mouths
+    )
     inlets = tuple(
         Inlet(name, (-MARGIN, xy(routes.ports[name])[1]), (-1.0, 0.0), routes.width, 1.0, 0.3)
         for name in routes.mouths
@@ -238,7 +238,7 @@ def mask_of(routes: Routes, level: int) -> Region:
 
 @dataclass(frozen=True)
 class Planted:
-    """A fault: its kind, the interfaces (from 1) that it may be named at, and its shape."""
+    """A fault: how it must be named, at which interfaces (from 1), and its shape."""
 
     kind: str
     interfaces: tuple[int, ...]
@@ -246,112 +246,137 @@ class Planted:
     routes: Routes
 
     def distance(self, p: Point) -> float:
-        """mm from the fault; 0 within its shape."""
+        """Return the mm from the fault; 0 within its shape."""
         return 0.0 if self.shape.contains(p) else self.shape.distance_to_edge(p)
-
-
-FAULTS = ("cut", "bridge", "no-via", "extra-via", "stub", "leak", "stray", "blind-hole")
-NAMED: dict[str, str] = {
-    "cut": "open",
-    "bridge": "short",
-    "no-via": "open",
-    "extra-via": "short",
-    "stub": "dead-end",
-    "leak": "leak",
-    "stray": "stray",
-    "blind-hole": "dead-end",
-}
 
 
 def planted(kind: str, seed: int) -> Planted:
     """Return random routes with a fault of this kind; the next seed where it has no place."""
     while True:
-        random = Random(seed)
-        fault = plant(kind, routed(seed), random)
+        fault = FAULTS[kind](routed(seed), Random(seed))
         if fault is not None:
             return fault
         seed += 100_000
 
 
-def plant(kind: str, routes: Routes, random: Random) -> Planted | None:
-    nodes, width = routes.nodes, routes.width
-    pairs = [
+def unjoined(routes: Routes) -> list[tuple[Place, Place]]:
+    """Places of nets with the places beside them to which no channel of theirs goes."""
+    return [
         (a, b)
-        for a in sorted(nodes)
+        for a in sorted(routes.nodes)
         for b in around(a, routes)
         if (a, b) not in routes.segments and (b, a) not in routes.segments
     ]
-    reserved = set(routes.ports.values())
-    if kind == "cut" and routes.segments:
-        a, b = random.choice(sorted(routes.segments))
-        ends = [between(xy(a), xy(b), 0.5 + s * random.uniform(0.08, 0.12)) for s in (-1, 1)]
-        shape = strip(*ends, width + 0.5)
-        routes.less.append((a[0], shape))
-        return Planted(kind, (a[0] + 1,), shape, routes)
-    if kind == "bridge":
-        places = [(a, b) for a, b in pairs if b in nodes and nodes[a] != nodes[b]]
-        if places:
-            a, b = random.choice(places)
-            shape = strip(xy(a), xy(b), random.uniform(0.3, width))
-            routes.more.append((a[0], shape))
-            return Planted(kind, (a[0] + 1,), shape, routes)
-    if kind == "no-via" and routes.vias:
-        via = random.choice(sorted(routes.vias))
-        fault = disc(xy(via), routes.pad / 2)
-        # Its pads stay.
-        routes.more += [(level, fault) for level in (via[0], via[0] + 1)]
-        del routes.vias[via]
-        return Planted(kind, (via[0] + 1, via[0] + 2), fault, routes)
-    if kind == "extra-via":
-        crossings = [
-            (a, (a[0] + 1, *a[1:]))
-            for a in sorted(nodes)
-            if nodes.get((a[0] + 1, *a[1:]), nodes[a]) != nodes[a]
-        ]
-        if crossings:
-            a, b = random.choice(crossings)
-            routes.holes.append((b[0], xy(a)))
-            return Planted(kind, (a[0] + 1, b[0] + 1), disc(xy(a), routes.hole / 2), routes)
-    if kind == "stub":
-        places = [(a, b) for a, b in pairs if b not in nodes and a not in reserved]
-        if places:
-            a, b = random.choice(places)
-            shape = strip(xy(a), xy(b), width) | disc(xy(b), width / 2)
-            routes.more.append((a[0], shape))
-            return Planted(kind, (a[0] + 1,), shape, routes)
-    if kind == "leak":
-        last = routes.size[0] - 1
-        places_out = [p for p in sorted(nodes) if p[1] == last]
-        if places_out:
-            a = random.choice(places_out)
-            edge = (last * PITCH + MARGIN, xy(a)[1])
-            shape = strip(xy(a), (edge[0] + OVERHANG, edge[1]), width)
-            routes.more.append((a[0], shape))
-            return Planted(kind, (a[0] + 1,), disc(edge, 0.1), routes)
-    if kind == "stray":
-        free = [
-            (level, x, y)
-            for level in range(routes.interfaces)
-            for x in range(routes.size[0])
-            for y in range(routes.size[1])
-            if (level, x, y) not in nodes
-        ]
-        if free:
-            a = random.choice(free)
-            shape = disc(xy(a), width)
-            routes.more.append((a[0], shape))
-            return Planted(kind, (a[0] + 1,), shape, routes)
-    if kind == "blind-hole":
-        places_up = [
-            p
-            for p in sorted(nodes)
-            if p[0] + 1 < routes.interfaces and (p[0] + 1, *p[1:]) not in nodes
-        ]
-        if places_up:
-            a = random.choice(places_up)
-            routes.holes.append((a[0] + 1, xy(a)))
-            return Planted(kind, (a[0] + 2,), disc(xy(a), routes.hole / 2), routes)
-    return None
+
+
+def cut(routes: Routes, random: Random) -> Planted | None:
+    if not routes.segments:
+        return None
+    a, b = random.choice(sorted(routes.segments))
+    ends = [between(xy(a), xy(b), 0.5 + s * random.uniform(0.08, 0.12)) for s in (-1, 1)]
+    shape = strip(*ends, routes.width + 0.5)
+    routes.less.append((a[0], shape))
+    return Planted("open", (a[0] + 1,), shape, routes)
+
+
+def bridge(routes: Routes, random: Random) -> Planted | None:
+    nodes = routes.nodes
+    pairs = [(a, b) for a, b in unjoined(routes) if b in nodes and nodes[a] != nodes[b]]
+    if not pairs:
+        return None
+    a, b = random.choice(pairs)
+    shape = strip(xy(a), xy(b), random.uniform(0.3, routes.width))
+    routes.more.append((a[0], shape))
+    return Planted("short", (a[0] + 1,), shape, routes)
+
+
+def missing_via(routes: Routes, random: Random) -> Planted | None:
+    if not routes.vias:
+        return None
+    via = random.choice(sorted(routes.vias))
+    # Its pads stay.
+    pad = disc(xy(via), routes.pad / 2)
+    routes.more += [(level, pad) for level in (via[0], via[0] + 1)]
+    del routes.vias[via]
+    return Planted("open", (via[0] + 1, via[0] + 2), pad, routes)
+
+
+def extra_via(routes: Routes, random: Random) -> Planted | None:
+    crossings = [
+        a
+        for a in sorted(routes.nodes)
+        if routes.nodes.get((a[0] + 1, *a[1:]), routes.nodes[a]) != routes.nodes[a]
+    ]
+    if not crossings:
+        return None
+    a = random.choice(crossings)
+    routes.holes.append((a[0] + 1, xy(a)))
+    return Planted("short", (a[0] + 1, a[0] + 2), disc(xy(a), routes.hole / 2), routes)
+
+
+def stub(routes: Routes, random: Random) -> Planted | None:
+    ends = set(routes.ports.values())
+    pairs = [(a, b) for a, b in unjoined(routes) if b not in routes.nodes and a not in ends]
+    if not pairs:
+        return None
+    a, b = random.choice(pairs)
+    shape = strip(xy(a), xy(b), routes.width) | disc(xy(b), routes.width / 2)
+    routes.more.append((a[0], shape))
+    return Planted("dead-end", (a[0] + 1,), shape, routes)
+
+
+def leak(routes: Routes, random: Random) -> Planted | None:
+    last = routes.size[0] - 1
+    places_out = [place for place in sorted(routes.nodes) if place[1] == last]
+    if not places_out:
+        return None
+    a = random.choice(places_out)
+    edge = (last * PITCH + MARGIN, xy(a)[1])
+    shape = strip(xy(a), (edge[0] + OVERHANG, edge[1]), routes.width)
+    routes.more.append((a[0], shape))
+    return Planted("leak", (a[0] + 1,), disc(edge, 0.1), routes)
+
+
+def stray(routes: Routes, random: Random) -> Planted | None:
+    columns, rows = routes.size
+    free = [
+        (level, x, y)
+        for level in range(routes.interfaces)
+        for x in range(columns)
+        for y in range(rows)
+        if (level, x, y) not in routes.nodes and x
+    ]
+    if not free:
+        return None
+    a = random.choice(free)
+    shape = disc(xy(a), routes.width)
+    routes.more.append((a[0], shape))
+    return Planted("stray", (a[0] + 1,), shape, routes)
+
+
+def blind_hole(routes: Routes, random: Random) -> Planted | None:
+    below = [
+        a
+        for a in sorted(routes.nodes)
+        if a[0] + 1 < routes.interfaces and (a[0] + 1, *a[1:]) not in routes.nodes and a[1]
+    ]
+    if not below:
+        return None
+    a = random.choice(below)
+    routes.holes.append((a[0] + 1, xy(a)))
+    return Planted("dead-end", (a[0] + 2,), disc(xy(a), routes.hole / 2), routes)
+
+
+FAULTS: Mapping[str, Callable[[Routes, Random], Planted | None]] = {
+    "cut": cut,
+    "bridge": bridge,
+    "missing-via": missing_via,
+    "extra-via": extra_via,
+    "stub": stub,
+    "leak": leak,
+    "stray": stray,
+    "blind-hole": blind_hole,
+}
 
 
 def between(a: Point, b: Point, share: float) -> Point:
@@ -433,7 +458,7 @@ def places(laminate: Laminate, level: dict[int, int]) -> Iterator[tuple[str, int
 def flood(
     voids: Sequence[np.ndarray], films: Sequence[np.ndarray], first: np.ndarray
 ) -> list[np.ndarray]:
-    """Label what hangs together: every square takes the largest label beside it, until none does."""
+    """Label what hangs together: every square takes the largest label beside it, to the end."""
     size = first.size
     labels = [np.where(void, first + n * size, 0) for n, void in enumerate(voids)]
     while True:
@@ -443,8 +468,8 @@ def flood(
                 run_maximum(label, void, axis)
             if n:
                 hole = ~films[n] & void & voids[n - 1]
-                most = np.where(hole, np.maximum(label, labels[n - 1]), 0)
-                labels[n] = label = np.where(hole, most, label)
+                most = np.where(hole, np.maximum(labels[n], labels[n - 1]), 0)
+                labels[n] = np.where(hole, most, labels[n])
                 labels[n - 1] = np.where(hole, most, labels[n - 1])
         if all(np.array_equal(a, b) for a, b in zip(before, labels, strict=True)):
             return labels
@@ -457,4 +482,3 @@ def run_maximum(label: np.ndarray, void: np.ndarray, axis: int) -> None:
     starts, ends = np.argwhere(edges == 1), np.argwhere(edges == -1)
     for (row, start), (_, end) in zip(starts, ends, strict=True):
         lines[row, start:end] = lines[row, start:end].max()
-

@@ -8,10 +8,12 @@ from typing import NamedTuple
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.html_templates import environment
+from sbafab.reports.nets_svg import nets_svg
 from sbafab.reports.traveller.page import HERE, frame
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
+from sbafab.rules.nets import connectivity
 from sbafab.rules.registration_yield import simulate
 
 ROUGHER = (0.5, 1.5, 2.0, 2.5)
@@ -81,6 +83,8 @@ class _Chapter(NamedTuple):
     design_hand: Hand | None
     hands: Sequence[Hand]
     remedies: Sequence[str]
+    nets: str
+    """A drawing of the nets with their faults; empty for a design that declares none."""
 
 
 def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[Inspected]) -> str:
@@ -94,7 +98,16 @@ def _chapter(inspected: Inspected) -> _Chapter:
     is_open = [f for f in inspected.findings if f.verdict in ("fail", "warn") or f.by_user]
     rest = [f for f in inspected.findings if f not in is_open]
     hands, remedies = _hands(inspected)
-    return _Chapter(inspected.name, is_open, rest, _design_hand(inspected), hands, remedies)
+    hand = _design_hand(inspected)
+    return _Chapter(inspected.name, is_open, rest, hand, hands, remedies, _nets(inspected))
+
+
+def _nets(inspected: Inspected) -> str:
+    laminate, limits = inspected.laminate, inspected.limits
+    if laminate is None or limits is None or not laminate.nets:
+        return ""
+    drawing = nets_svg(laminate, connectivity(laminate, limits))
+    return drawing[drawing.index("<svg") :]
 
 
 def _design_hand(inspected: Inspected) -> Hand | None:

@@ -1,0 +1,140 @@
+"""The nets of a laminate in colour, a plan of every interface, with the faults at their places."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from sbafab.geometry.region import Region, coord, path_data
+from sbafab.laminate.laminate import Laminate
+from sbafab.markup import escape
+from sbafab.reports import drawing as draw
+from sbafab.rules.nets import Connectivity, NetFault, declared
+
+COLOURS = (
+    *("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b2a300", "#6a51a3"),
+)
+"""Of the nets in their order, from the ninth on again from the first. Most are the colours that
+M. Okabe and K. Ito (2008) chose to be distinct in colour blindness."""
+NO_NET = "#bbbbbb"
+FAULT = "#c00000"
+WIDE = 180.0
+MOST_COLUMNS = 3
+GAP, HEAD, ROW = 4.0, 7.0, 5.0
+RADIUS = 2.2
+
+
+@dataclass(frozen=True)
+class NetArea:
+    """A void of an interface, counted from 1, with its net, "" for none, and the net's colour.
+
+    ``nets`` are all nets that it belongs to: several are a short.
+    """
+
+    net: str
+    nets: tuple[str, ...]
+    interface: int
+    layers: tuple[int, ...]
+    colour: str
+    region: Region
+
+    @property
+    def path(self) -> str:
+        """The area as SVG path data, mm, y up."""
+        return path_data(self.region)
+
+
+@dataclass(frozen=True)
+class NetMap:
+    """The nets of a laminate: names with colours, coloured areas, and faults with their places."""
+
+    colours: dict[str, str]
+    areas: tuple[NetArea, ...]
+    faults: tuple[NetFault, ...]
+
+
+def net_map(laminate: Laminate, found: Connectivity) -> NetMap:
+    """Return the areas of the voids by interface, bottom to top, in the colours of their nets."""
+    names = [net.name for net in declared(laminate)]
+    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
+    areas = []
+    for cavity, owners in zip(found.cavities, found.owners, strict=True):
+        gap = laminate.interfaces[cavity.interface - 1]
+        name = owners[0] if owners else ""
+        colour = colours.get(name, NO_NET)
+        areas.append(
+            NetArea(name, owners, cavity.interface, gap.layer_indices, colour, cavity.region)
+        )
+    return NetMap(colours, tuple(areas), found.faults)
+
+
+def nets_svg(laminate: Laminate, found: Connectivity) -> str:
+    """Return a drawing 180 mm wide: a plan of every interface that has a void, and the key."""
+    shown = net_map(laminate, found)
+    low_x, low_y, high_x, high_y = laminate.bounds
+    numbers = sorted({area.interface for area in shown.areas if area.net or not area.nets})
+    columns = min(MOST_COLUMNS, max(1, len(numbers)))
+    cell = (WIDE - (columns + 1) * GAP) / columns
+    scale = cell / (high_x - low_x)
+    height = (high_y - low_y) * scale
+    rows = math.ceil(len(numbers) / columns)
+    elements: list[str] = []
+    for place, number in enumerate(numbers):
+        row, column = divmod(place, columns)
+        x, y = GAP + column * (cell + GAP), row * (height + HEAD + GAP) + HEAD
+        to_page = f"matrix({scale:.6g} 0 0 {-scale:.6g} {x - low_x * scale:.6g} "
+        to_page += f"{y + high_y * scale:.6g})"
+        elements += _plan(laminate, shown, number, (x, y), to_page)
+        for count, fault in enumerate(shown.faults, start=1):
+            if number in _levels(laminate, fault):
+                at = x + (fault.at[0] - low_x) * scale, y + (high_y - fault.at[1]) * scale
+                elements += _mark(count, at)
+    top = rows * (height + HEAD + GAP) + ROW
+    keys = [*shown.colours.items(), ("no net", NO_NET)]
+    for place, (name, colour) in enumerate(keys):
+        row, column = divmod(place, 6)
+        x, y = GAP + column * (WIDE - 2 * GAP) / 6, top + row * ROW
+        elements.append(draw.box((x, y - 3), (x + 4, y), fill=colour, stroke="none", width=0.0))
+        elements.append(draw.text((x + 5.5, y), name))
+    end = top + math.ceil(len(keys) / 6) * ROW
+    return draw.document(WIDE, end, f"{laminate.name}: nets", elements)
+
+
+def _levels(laminate: Laminate, fault: NetFault) -> tuple[int, ...]:
+    """The interfaces at which a fault is drawn: its own, or those beside its layer."""
+    if fault.interface is not None:
+        return (fault.interface,)
+    gaps = laminate.interfaces
+    return tuple(g.index for g in gaps if {g.below.index, g.above.index} & {*fault.layers})
+
+
+def _plan(
+    laminate: Laminate, shown: NetMap, number: int, corner: tuple[float, float], to_page: str
+) -> Sequence[str]:
+    gap = laminate.interfaces[number - 1]
+    areas = [area for area in shown.areas if area.interface == number]
+    drawn = [
+        f'<path d="{area.path}" fill="{area.colour}" fill-rule="evenodd">'
+        f"<title>{escape(' and '.join(area.nets) or 'no net')}</title></path>"
+        for area in areas
+    ]
+    title = f"interface {number}: layers {gap.below.index} and {gap.above.index}"
+    return [
+        draw.text((corner[0], corner[1] - 2), title),
+        f'<g transform="{to_page}" stroke-width="0.1">',
+        f'<path d="{path_data(gap.contact)}" fill="#f4f4f4" stroke="{draw.GREY}" '
+        'fill-rule="evenodd"/>',
+        *drawn,
+        "</g>",
+    ]
+
+
+def _mark(count: int, at: tuple[float, float]) -> Sequence[str]:
+    anchor: Literal["middle"] = "middle"
+    return [
+        f'<circle cx="{coord(at[0])}" cy="{coord(at[1])}" r="{RADIUS}" fill="none" '
+        f'stroke="{FAULT}" stroke-width="0.6"/>',
+        draw.text((at[0], at[1] - RADIUS - 0.8), str(count), anchor=anchor, bold=True),
+    ]
