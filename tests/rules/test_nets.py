@@ -1,0 +1,252 @@
+"""nets: opens, shorts, leaks, dead ends and stray voids of routed channels, at their place."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from sbafab.geometry.region import Region, disc, rectangle, strip, union
+from sbafab.laminate.joints import Fold, Net, Port
+from sbafab.laminate.laminate import Chamber, Laminate
+from sbafab.rules import sealing
+from sbafab.rules.limits import Limits
+from sbafab.rules.measures import Measures
+from sbafab.rules.nets import check, connectivity
+from tests.quick import few
+from tests.rules import routed
+from tests.rules.conftest import built
+from tests.rules.routed import FAULTS, Routes, groups_by_raster, laminate_of, planted, xy
+
+LIMITS = Limits()
+NEAR = 1.0
+"""Furthest in mm that a fault may be named from its place."""
+CASES = [(kind, seed) for kind in FAULTS for seed in range(25)]
+
+
+def line_of(ports: dict[str, tuple[int, int, int]], **nets: list[str]) -> Routes:
+    """Channels 1 mm wide along one row of a grid, from the first port of a net to its last."""
+    routes = Routes((6, 3), 2, 1.0, 0.6, 1.6, ports=ports, nets=nets)
+    for name, members in nets.items():
+        for a, b in zip(members, members[1:], strict=False):
+            (level, x0, y), (_, x1, _) = ports[a], ports[b]
+            for x in range(x0, x1):
+                routes.segments[(level, x, y), (level, x + 1, y)] = name
+            routes.nodes |= {(level, x, y): name for x in range(x0, x1 + 1)}
+    return routes
+
+
+def straight() -> Routes:
+    ports = {"p": (0, 0, 1), "q": (0, 5, 1), "r": (1, 0, 2), "s": (1, 5, 2)}
+    return line_of(ports, a=["p", "q"], b=["r", "s"])
+
+
+@pytest.mark.parametrize("seed", few(range(300), 12))
+def test_random_laminates_give_no_false_alarm(seed: int) -> None:
+    laminate = laminate_of(routed.routed(seed))
+    found = connectivity(laminate, LIMITS)
+    assert found.faults == ()
+    assert set(found.groups) == {frozenset(net.ports) for net in laminate.nets}
+    assert groups_by_raster(laminate) == (set(found.groups), set())
+
+
+@pytest.mark.parametrize(("kind", "seed"), few(CASES, 16, names=2))
+def test_planted_faults_are_named_at_their_place(kind: str, seed: int) -> None:
+    fault = planted(kind, 1000 + seed)
+    laminate = laminate_of(fault.routes)
+    found = connectivity(laminate, LIMITS)
+    named = [
+        fault.distance(each.at)
+        for each in found.faults
+        if each.kind == fault.kind and each.interface in fault.interfaces
+    ]
+    assert min(named, default=math.inf) <= NEAR
+    joined, outlets = groups_by_raster(laminate)
+    assert set(found.groups) == joined
+    assert bool(outlets) == any(each.kind == "leak" for each in found.faults)
+
+
+def test_a_cut_channel_is_one_open() -> None:
+    routes = straight()
+    gap = rectangle((9.5, 3.0), (10.5, 5.0))
+    routes.less.append((0, gap))
+    findings = check(Measures(laminate_of(routes), LIMITS))
+    first = findings[0]
+    assert (first.verdict, first.where.interface, first.where.layers) == ("fail", 1, (1, 2, 3))
+    assert (first.where.x, first.where.y) == pytest.approx((10.0, 4.0), abs=0.5)
+    assert first.message.startswith("net a is open: q is not joined to p; they come nearest at ")
+    assert "1.000 mm of bond lie between: join them" in first.message
+    # Each half is a void with a port at its end, and no branch of another.
+    assert len(findings) == 2
+
+
+def test_the_good_laminate_passes_and_says_what_it_holds() -> None:
+    joined, opening = check(Measures(laminate_of(straight()), LIMITS))
+    assert joined.verdict == "pass"
+    assert joined.message == "2 nets of 4 ports joined as declared, and to nothing else"
+    assert opening.verdict == "pass"
+
+
+def test_an_opening_pressure_is_that_of_a_clamped_plate() -> None:
+    routes = straight()
+    laminate = laminate_of(routes)
+    film = laminate.layers[0].film
+    assert film.elastic is not None
+    modulus, poisson = film.elastic
+    # Interface 1: the base alone lifts. For d = t, Timoshenko has d = p w^4 / 384 D with
+    # D = E t^3 / 12 (1 - nu^2), and the membrane's share from its lengthening 8 d^2 / 3 w^2 at p = 8 T d / w^2.
+    plane = 1000 * modulus / (1 - poisson**2)
+    bending = 384 * plane * film.thickness**4 / 12
+    membrane = 8 * plane * (8 / 3) * film.thickness**4
+    (_, opening) = check(Measures(laminate, LIMITS))
+    assert opening.measured == pytest.approx(bending + membrane, rel=1e-6)
+    assert opening.unit == "kPa"
+
+
+def test_a_channel_too_narrow_to_open_fails_at_its_neck() -> None:
+    routes = straight()
+    routes.less += [
+        (0, rectangle((9.0, 4.1), (11.0, 5.0))),
+        (0, rectangle((9.0, 3.0), (11.0, 3.9))),
+    ]
+    joined, opening = check(Measures(laminate_of(routes), LIMITS))
+    assert joined.verdict == "pass"
+    assert (opening.verdict, opening.where.interface) == ("fail", 1)
+    assert (opening.where.x, opening.where.y) == pytest.approx((10.0, 4.0), abs=1.0)
+    assert "is 0.200 mm wide" in opening.message
+    wider = replace(LIMITS, opening_pressure=1e6)
+    assert check(Measures(laminate_of(routes), wider))[1].verdict == "pass"
+
+
+def test_films_without_a_modulus_are_not_judged() -> None:
+    laminate = laminate_of(straight())
+    layers = tuple(
+        replace(layer, film=replace(layer.film, elastic=None)) for layer in laminate.layers
+    )
+    joined, opening = check(Measures(replace(laminate, layers=layers), LIMITS))
+    assert (joined.verdict, opening.verdict) == ("pass", "warn")
+    assert opening.message.startswith("State modulus and poisson of the films")
+
+
+def test_a_pocket_with_a_port_is_no_dead_end() -> None:
+    """Fed in the middle of its long side, with its port off the middle: its halves are 3 times as
+    long as wide and hold none.
+    """
+    routes = straight()
+    routes.ports["q"] = (0, 5, 1)
+    pouch = rectangle((8.0, -1.0), (22.0, 1.0))
+    feed = strip((14.0, 0.0), (14.0, 4.0), 0.5)
+    routes.more += [(0, pouch), (0, feed)]
+    routes.ports["t"] = (0, 5, 0)
+    routes.nets["a"] = ["p", "q", "t"]
+    found = connectivity(laminate_of(routes), LIMITS)
+    assert found.faults == ()
+    # Without its port it is one.
+    del routes.ports["t"]
+    routes.nets["a"] = ["p", "q"]
+    (fault,) = connectivity(laminate_of(routes), LIMITS).faults
+    assert fault.kind == "dead-end"
+
+
+def test_a_port_in_no_net_may_be_joined_to_none() -> None:
+    routes = straight()
+    del routes.nets["b"]
+    routes.nets["a"] = ["p", "q"]
+    found = connectivity(laminate_of(routes), LIMITS)
+    assert [(fault.kind, fault.nets) for fault in found.faults] == [("short", ("r", "s"))]
+
+
+def test_a_port_in_a_bond_is_open_at_its_place() -> None:
+    laminate = laminate_of(straight())
+    moved = tuple(
+        replace(port, at=(2.0, 6.0)) if port.name == "q" else port for port in laminate.ports
+    )
+    faults = connectivity(replace(laminate, ports=moved), LIMITS).faults
+    assert [(fault.kind, fault.at) for fault in faults if fault.kind == "open"] == [
+        ("open", (2.0, 6.0))
+    ]
+
+
+def test_laminates_without_nets_get_no_finding() -> None:
+    assert check(Measures(built("1dof-5mm", "stack.balloons=3"), LIMITS)) == []
+
+
+@pytest.mark.parametrize("design", [("1dof-5mm",), ("3dof-15mm",), ("pouch",)])
+def test_a_familys_chambers_are_nets(design: tuple[str, ...]) -> None:
+    """Each chamber is the net of its inlet and its pockets, and the good ones have no fault."""
+    laminate = built(*design, *(("stack.balloons=3",) if design != ("pouch",) else ()))
+    nets = tuple(Net(chamber.name, (chamber.name,)) for chamber in laminate.chambers)
+    found = connectivity(replace(laminate, nets=nets), LIMITS)
+    assert found.faults == ()
+    assert set(found.groups) == {frozenset({chamber.name}) for chamber in laminate.chambers}
+
+
+def test_two_chambers_of_a_family_that_are_joined_are_a_short() -> None:
+    laminate = built("3dof-15mm", "stack.balloons=3")
+    first, second = (chamber.centres[0] for chamber in laminate.chambers[:2])
+    mask = laminate.layer(6)
+    profile = mask.profile | (strip(first, second, 0.4) - disc(first, 0.5) - disc(second, 0.5))
+    layers = list(laminate.layers)
+    layers[5] = replace(mask, profile=profile, pattern="bridged")
+    nets = tuple(Net(chamber.name, (chamber.name,)) for chamber in laminate.chambers)
+    joined = replace(laminate, layers=tuple(layers), nets=nets)
+    (fault,) = connectivity(joined, LIMITS).faults
+    assert (fault.kind, fault.interface) == ("short", 3)
+    middle = (first[0] + second[0]) / 2, (first[1] + second[1]) / 2
+    assert math.dist(fault.at, middle) < NEAR
+
+
+def pouch_with(laminate: Laminate, mask: Region, **changes: object) -> Laminate:
+    layers = list(laminate.layers)
+    layers[1] = replace(layers[1], profile=mask, pattern=f"mask-{mask.key}")
+    return replace(laminate, layers=tuple(layers), **changes)  # type: ignore[arg-type]
+
+
+def test_a_fold_is_a_barrier() -> None:
+    """A channel along the folded edge of a film does not leak there, and does at any other edge."""
+    laminate = laminate_of(straight())
+    low_y = laminate.layers[0].profile.bounds[1]
+    mask = union([laminate.layers[1].profile, strip((2.0, 4.0), (2.0, low_y), 2.0)])
+    open_edge = pouch_with(laminate, mask)
+    assert [f.kind for f in connectivity(open_edge, LIMITS).faults] == ["leak"]
+    fold = Fold(1, 3, ((-10.0, low_y), (40.0, low_y)))
+    folded = connectivity(replace(open_edge, folds=(fold,)), LIMITS)
+    assert "leak" not in [f.kind for f in folded.faults]
+
+
+def test_a_tube_in_a_hole_is_a_port_and_another_hole_leaks() -> None:
+    routes = straight()
+    routes.ports |= {"r": (1, 0, 2)}
+    routes.tubes.append("r")
+    laminate = laminate_of(routes)
+    assert connectivity(laminate, LIMITS).faults == ()
+    routes.holes.append((2, xy((2, 2))))
+    (fault,) = connectivity(laminate_of(routes), LIMITS).faults
+    assert (fault.kind, fault.interface, fault.layers) == ("leak", None, (5,))
+    assert math.dist(fault.at, xy((2, 2))) < 0.01
+
+
+def test_sealing_leaves_the_voids_to_nets() -> None:
+    routes = routed.routed(3)
+    laminate = laminate_of(routes)
+    (finding,) = sealing.check(Measures(laminate, LIMITS))
+    assert (finding.verdict, finding.message) == (
+        "pass",
+        "no film is loose; what the voids join is judged by nets",
+    )
+
+
+def test_a_chamber_of_no_net_must_reach_its_own_pocket() -> None:
+    laminate = laminate_of(straight())
+    lost = Chamber("lost", ((2.0, 6.0),))
+    faults = connectivity(replace(laminate, chambers=(lost,)), LIMITS).faults
+    assert [(fault.kind, fault.nets) for fault in faults] == [("open", ("lost",))]
+
+
+def test_random_faults_are_the_same_in_every_run() -> None:
+    fault, again = planted("stub", 7), planted("stub", 7)
+    assert (fault.shape, fault.interfaces) == (again.shape, again.interfaces)
+    assert FAULTS["stub"](routed.routed(7), Random(7)) is not None
+    assert isinstance(laminate_of(fault.routes).ports[0], Port)
