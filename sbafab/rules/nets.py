@@ -26,9 +26,9 @@ from sbafab.rules.limits import Limits, at
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.void_axes import (
-    Axis,
-    Node,
+    AxisNode,
     Terminal,
+    VoidAxis,
     axis_of,
     blind_ends,
     shortest_way,
@@ -44,7 +44,8 @@ FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
 class NetFault:
     """A difference between nets and voids, with its place.
 
-    ``nets`` are the nets that it concerns; ``interface`` and ``layers`` count from 1.
+    ``nets`` are the nets that it concerns; ``interface``, None for a hole of an outer film, and
+    ``layers`` count from 1, and ``at`` is its place in mm.
     """
 
     kind: FaultKind
@@ -315,8 +316,7 @@ class _Reading:
         self, name: str, home: Mapping[_Terminal, int | None], part: int, main: int
     ) -> NetFault:
         cut = self._gap_between(part, main)
-        apart = _listed(row.label for row, number in home.items() if number == part)
-        rest = _listed(row.label for row, number in home.items() if number == main)
+        apart, rest = _labels(home, part), _labels(home, main)
         gap = self.interface(cut.interface)
         reason = (
             f"layer {gap.above.index} has no hole there"
@@ -419,7 +419,7 @@ class _Reading:
     def _width(self, number: int) -> Width | None:
         return least_width(self.cavities[number].region, 0.0)
 
-    def axis(self, number: int) -> Axis:
+    def axis(self, number: int) -> VoidAxis:
         width = self._width(number)
         return axis_of(self.cavities[number].region, 0.0 if width is None else width.value)
 
@@ -484,7 +484,7 @@ class _Reading:
         numbers = self._of_part(part)
         axes = [self.axis(number) for number in numbers]
         links = self._links(numbers, axes)
-        trees: list[dict[Node, None]] = []
+        trees: list[dict[AxisNode, None]] = []
         for name in (first, second):
             nodes = [
                 (place, axes[place].nearest(row.at))
@@ -493,7 +493,7 @@ class _Reading:
                 for place, number in enumerate(numbers)
                 if number in row.cavities
             ]
-            tree: dict[Node, None] = dict.fromkeys(nodes[:1])
+            tree: dict[AxisNode, None] = dict.fromkeys(nodes[:1])
             for node in nodes[1:]:
                 tree.update(dict.fromkeys(shortest_way(axes, links, tree, [node])))
             trees.append(tree)
@@ -502,9 +502,11 @@ class _Reading:
         place, sample = way[len(way) // 2]
         return numbers[place], axes[place].centre(sample)
 
-    def _links(self, numbers: Sequence[int], axes: Sequence[Axis]) -> dict[Node, list[Node]]:
+    def _links(
+        self, numbers: Sequence[int], axes: Sequence[VoidAxis]
+    ) -> dict[AxisNode, list[AxisNode]]:
         """The nodes on both sides of every via between these cavities."""
-        links: dict[Node, list[Node]] = {}
+        links: dict[AxisNode, list[AxisNode]] = {}
         for opening in self.graph.openings:
             beside = [n for n in self._beside(opening) if n in numbers]
             p = _middle(self.graph.openings[opening])
@@ -527,7 +529,7 @@ class _Cut(NamedTuple):
     is_through_film: bool
 
 
-def _nearest(a: Axis, b: Axis, interface: int) -> _Cut:
+def _nearest(a: VoidAxis, b: VoidAxis, interface: int) -> _Cut:
     best, at_point = math.inf, (0.0, 0.0)
     for start in range(0, len(a.points), 256):
         rows = a.points[start : start + 256]
@@ -573,7 +575,11 @@ def _middle(region: Region) -> Point:
     return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
-def _listed(labels: Iterable[str]) -> str:
+def _labels(home: Mapping[_Terminal, int | None], part: int) -> str:
+    """The members of a net in a part; inlet or pocket where the other of the two lies elsewhere."""
+    here = [row for row, number in home.items() if number == part]
+    away = {row.member for row, number in home.items() if number != part}
+    labels = (row.label if row.member in away else row.member for row in here)
     return " and ".join(dict.fromkeys(labels))
 
 

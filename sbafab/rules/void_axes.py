@@ -42,7 +42,7 @@ NUDGE = 1e-3
 
 
 @dataclass(frozen=True)
-class Axis:
+class VoidAxis:
     """Samples of a void's boundary in order, contour by contour, the void on their left.
 
     ``points`` and ``centres`` of the tangent circles are (n, 2) in mm, ``radii`` (n,) in mm;
@@ -76,7 +76,7 @@ class Axis:
 
 
 @cached
-def axis_of(region: Region, width: float) -> Axis:
+def axis_of(region: Region, width: float) -> VoidAxis:
     """Return the axis of a connected region whose narrowest place is ``width`` mm wide."""
     length = sum(contour.length for contour in region.contours)
     step = max(width / STEPS_ACROSS, length / MOST_SAMPLES)
@@ -93,7 +93,7 @@ def axis_of(region: Region, width: float) -> Axis:
     places, inward = np.array(points), np.array(normals)
     radii, partners = _circles(places, inward)
     centres = places + radii[:, None] * inward
-    return Axis(region, places, centres, radii, partners, contours, tuple(starts))
+    return VoidAxis(region, places, centres, radii, partners, contours, tuple(starts))
 
 
 def _samples(contour: Contour, step: float) -> Iterable[tuple[Point, Point]]:
@@ -143,7 +143,7 @@ class BlindEnd(NamedTuple):
     depth: float
 
 
-def blind_ends(axis: Axis, terminals: Sequence[Terminal], ratio: float) -> list[BlindEnd]:
+def blind_ends(axis: VoidAxis, terminals: Sequence[Terminal], ratio: float) -> list[BlindEnd]:
     """Return the parts of a void that end blind, more than ``ratio`` times as long as wide.
 
     Such a part lies behind a cut straight across the void and holds no terminal. It is none where a
@@ -183,7 +183,7 @@ class _Cuts(NamedTuple):
     depth: Floats
 
 
-def _cuts(axis: Axis) -> _Cuts:
+def _cuts(axis: VoidAxis) -> _Cuts:
     """Return both sides of every chord that parts the void."""
     samples = np.arange(len(axis.points))
     is_whole = (axis.contours[axis.partners] == axis.contours) & (axis.radii > 0)
@@ -204,7 +204,7 @@ def _cross(p: Floats, q: Floats) -> Floats:
     return crossed
 
 
-def _following(axis: Axis) -> Floats:
+def _following(axis: VoidAxis) -> Floats:
     """Return the sample after each one on its contour."""
     following = np.roll(axis.points, -1, axis=0)
     for first, end in zip(axis.starts, axis.starts[1:], strict=False):
@@ -212,14 +212,14 @@ def _following(axis: Axis) -> Floats:
     return following
 
 
-def _along(axis: Axis) -> tuple[Floats, Floats]:
+def _along(axis: VoidAxis) -> tuple[Floats, Floats]:
     """Return way and area from the first sample of the contours to the end of each step."""
     following = _following(axis)
     way = np.hypot(*(following - axis.points).T)
     return np.cumsum(way), np.cumsum(_cross(axis.points, following) / 2)
 
 
-def _from_to(axis: Axis, sums: Floats, first: Counts, last: Counts) -> Floats:
+def _from_to(axis: VoidAxis, sums: Floats, first: Counts, last: Counts) -> Floats:
     """Return what the steps from ``first`` on to ``last`` add up to, along their contour."""
     before = np.concatenate([[0.0], sums])
     starts, ends = np.array(axis.starts[:-1]), np.array(axis.starts[1:])
@@ -229,7 +229,7 @@ def _from_to(axis: Axis, sums: Floats, first: Counts, last: Counts) -> Floats:
     return np.where(last < first, part + whole, part)
 
 
-def _holds_any(axis: Axis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
+def _holds_any(axis: VoidAxis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
     """Return True for the cuts that have one of the places behind them, or on their edge."""
     following = _following(axis)
     holds = np.zeros(len(cuts.first), dtype=np.bool_)
@@ -243,7 +243,7 @@ def _holds_any(axis: Axis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.b
     return holds
 
 
-def _inward(axis: Axis, p: Point) -> Point:
+def _inward(axis: VoidAxis, p: Point) -> Point:
     """Return a point that may lie on the boundary a little inward."""
     sample = int(np.argmin(np.hypot(*(axis.points - p).T)))
     x, y = axis.centre(sample)
@@ -252,13 +252,13 @@ def _inward(axis: Axis, p: Point) -> Point:
     return p[0] + share * (x - p[0]), p[1] + share * (y - p[1])
 
 
-def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: Axis) -> bool:
+def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: VoidAxis) -> bool:
     contour, first, count = arc
     size = axis.starts[contour + 1] - axis.starts[contour]
     return place[0] == contour and (place[1] - first) % size <= count
 
 
-def _is_excused(axis: Axis, foot: Point, width: float, terminals: Sequence[Terminal]) -> bool:
+def _is_excused(axis: VoidAxis, foot: Point, width: float, terminals: Sequence[Terminal]) -> bool:
     """Return True if a port lies at the foot of a blind part, or in the same pocket."""
     ports = [terminal for terminal in terminals if terminal.is_port]
     if any(math.dist(port.at, foot) <= width for port in ports):
@@ -283,21 +283,21 @@ def _is_excused(axis: Axis, foot: Point, width: float, terminals: Sequence[Termi
 
 # Ways along the axes of several voids, which vias join.
 
-Node = tuple[int, int]
+AxisNode = tuple[int, int]
 """Number of an axis, and a sample of it."""
-Links = Mapping[Node, Sequence[Node]]
+Links = Mapping[AxisNode, Sequence[AxisNode]]
 """Vias: from a sample of one axis to samples of others."""
 
 
 def shortest_way(
-    axes: Sequence[Axis], links: Links, starts: Iterable[Node], goals: Iterable[Node]
-) -> list[Node]:
+    axes: Sequence[VoidAxis], links: Links, starts: Iterable[AxisNode], goals: Iterable[AxisNode]
+) -> list[AxisNode]:
     """Return the nodes of the shortest way from any start to any goal; empty if there is none."""
     aims = set(goals)
     lengths = dict.fromkeys(starts, 0.0)
-    came: dict[Node, Node] = {}
+    came: dict[AxisNode, AxisNode] = {}
     queue = [(0.0, node) for node in sorted(lengths)]
-    done: set[Node] = set()
+    done: set[AxisNode] = set()
     while queue:
         length, node = heapq.heappop(queue)
         if node in done:
@@ -316,7 +316,9 @@ def shortest_way(
     return []
 
 
-def _steps(axes: Sequence[Axis], links: Links, node: Node) -> Iterable[tuple[Node, float]]:
+def _steps(
+    axes: Sequence[VoidAxis], links: Links, node: AxisNode
+) -> Iterable[tuple[AxisNode, float]]:
     number, sample = node
     axis = axes[number]
     here = axis.centre(sample)

@@ -55,8 +55,11 @@ TESTED_APART = {
     "scrap",
     "registration-worst-case",
     "registration-yield",
+    "nets",
 }
-"""Rules that no change of one layer's profile breaks alone."""
+"""Rules that no change of one layer's profile breaks alone; nets has its own faults."""
+SILENT = {"nets"}
+"""Rules that say nothing of a design without the keys that they read."""
 SEPARATOR = disc(AXIS, 3.75) - disc(AXIS, 1.25)
 # The first fault of a rule is the one that its reference page shows.
 FAULTS = {
@@ -290,7 +293,7 @@ def test_a_waived_failure_stops_nothing_and_says_so(
 
 def test_findings_come_in_the_decks_order(good: Callable[..., Laminate]) -> None:
     found = list(dict.fromkeys(finding.rule for finding in run_deck(good(*LOBED), FEW)))
-    assert tuple(found) == rule_names()
+    assert found == [name for name in rule_names() if name not in SILENT]
 
 
 def test_every_rule_of_the_deck_can_be_waived_by_name() -> None:

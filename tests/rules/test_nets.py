@@ -95,8 +95,8 @@ def test_an_opening_pressure_is_that_of_a_clamped_plate() -> None:
     film = laminate.layers[0].film
     assert film.elastic is not None
     modulus, poisson = film.elastic
-    # Interface 1: the base alone lifts. For d = t, Timoshenko has d = p w^4 / 384 D with
-    # D = E t^3 / 12 (1 - nu^2), and the membrane's share from its lengthening 8 d^2 / 3 w^2 at p = 8 T d / w^2.
+    # At interface 1 the base alone lifts. Timoshenko: d = p w^4 / 384 D, D = E t^3 / 12 (1 - nu^2);
+    # the membrane is longer by 8 d^2 / 3 w^2 and carries p = 8 T d / w^2. Here d = t and w = 1.
     plane = 1000 * modulus / (1 - poisson**2)
     bending = 384 * plane * film.thickness**4 / 12
     membrane = 8 * plane * (8 / 3) * film.thickness**4
