@@ -16,6 +16,7 @@ from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.registration_yield import simulate
 from tests.faults.panels import narrowed, over_the_tab
 from tests.rules.conftest import built, spoiled
+from tests.rules.routed import cut_through, laminate_of, straight
 from tests.rules.test_deck import EARS, EXACT, FAULTS, ONE
 
 WIDE = 260
@@ -174,6 +175,17 @@ def _worst_case() -> Pair:
     return Pair(svg(_layers(good, (2, 3)), box), wrong, found.message)
 
 
+def _nets() -> Pair:
+    """A channel as drawn and cut through, with its mask on the film below."""
+    good, bad = (laminate_of(routes) for routes in (straight(), cut_through()))
+    found = _found("nets", bad)
+    box = _box([good.layer(1)], None)
+    right, wrong = (
+        svg(_layers(own, (1, 2)), box, mark) for own, mark in ((good, None), (bad, _place(found)))
+    )
+    return Pair(right, wrong, found.message)
+
+
 def _yield() -> Pair:
     """A hundred builds each, those that miss a limit in red, as many as the rule counts."""
     few = Limits(yield_builds=2000)
@@ -201,6 +213,7 @@ OTHERS: dict[str, Callable[[], Pair]] = {
     "press-fit": _press_fit,
     "pin-fit": _pin_fit,
     "bridges": lambda: _of_sheet("bridges", 1, narrowed),
+    "nets": _nets,
     "scrap": lambda: _of_sheet("scrap", 5, over_the_tab),
     "registration-worst-case": _worst_case,
     "registration-yield": _yield,

@@ -233,6 +233,33 @@ def mask_of(routes: Routes, level: int) -> Region:
     return mask
 
 
+# Routes drawn by hand.
+
+
+def line_of(ports: dict[str, tuple[int, int, int]], **nets: list[str]) -> Routes:
+    """Channels 1 mm wide along one row of a grid, from the first port of a net to its last."""
+    routes = Routes((6, 3), 2, 1.0, 0.6, 1.6, ports=ports, nets=nets)
+    for name, members in nets.items():
+        for a, b in zip(members, members[1:], strict=False):
+            (level, x0, y), (_, x1, _) = ports[a], ports[b]
+            for x in range(x0, x1):
+                routes.segments[(level, x, y), (level, x + 1, y)] = name
+            routes.nodes |= {(level, x, y): name for x in range(x0, x1 + 1)}
+    return routes
+
+
+def straight() -> Routes:
+    ports = {"p": (0, 0, 1), "q": (0, 5, 1), "r": (1, 0, 2), "s": (1, 5, 2)}
+    return line_of(ports, a=["p", "q"], b=["r", "s"])
+
+
+def cut_through() -> Routes:
+    """The straight channels, the first of them cut through over 1 mm round (10, 4)."""
+    routes = straight()
+    routes.less.append((0, rectangle((9.5, 3.0), (10.5, 5.0))))
+    return routes
+
+
 # Faults.
 
 

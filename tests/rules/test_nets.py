@@ -18,29 +18,20 @@ from sbafab.rules.nets import check, connectivity
 from tests.quick import few
 from tests.rules import routed
 from tests.rules.conftest import built
-from tests.rules.routed import FAULTS, Routes, groups_by_raster, laminate_of, planted, xy
+from tests.rules.routed import (
+    FAULTS,
+    cut_through,
+    groups_by_raster,
+    laminate_of,
+    planted,
+    straight,
+    xy,
+)
 
 LIMITS = Limits()
 NEAR = 1.0
 """Furthest in mm that a fault may be named from its place."""
 CASES = [(kind, seed) for kind in FAULTS for seed in range(25)]
-
-
-def line_of(ports: dict[str, tuple[int, int, int]], **nets: list[str]) -> Routes:
-    """Channels 1 mm wide along one row of a grid, from the first port of a net to its last."""
-    routes = Routes((6, 3), 2, 1.0, 0.6, 1.6, ports=ports, nets=nets)
-    for name, members in nets.items():
-        for a, b in zip(members, members[1:], strict=False):
-            (level, x0, y), (_, x1, _) = ports[a], ports[b]
-            for x in range(x0, x1):
-                routes.segments[(level, x, y), (level, x + 1, y)] = name
-            routes.nodes |= {(level, x, y): name for x in range(x0, x1 + 1)}
-    return routes
-
-
-def straight() -> Routes:
-    ports = {"p": (0, 0, 1), "q": (0, 5, 1), "r": (1, 0, 2), "s": (1, 5, 2)}
-    return line_of(ports, a=["p", "q"], b=["r", "s"])
 
 
 @pytest.mark.parametrize("seed", few(range(300), 12))
@@ -69,10 +60,7 @@ def test_planted_faults_are_named_at_their_place(kind: str, seed: int) -> None:
 
 
 def test_a_cut_channel_is_one_open() -> None:
-    routes = straight()
-    gap = rectangle((9.5, 3.0), (10.5, 5.0))
-    routes.less.append((0, gap))
-    findings = check(Measures(laminate_of(routes), LIMITS))
+    findings = check(Measures(laminate_of(cut_through()), LIMITS))
     first = findings[0]
     assert (first.verdict, first.where.interface, first.where.layers) == ("fail", 1, (1, 2, 3))
     assert (first.where.x, first.where.y) == pytest.approx((10.0, 4.0), abs=0.5)
