@@ -10,7 +10,7 @@ import pytest
 
 from sbafab.models import balloon
 from sbafab.models.balloon import Balloon, inflate, ripples_at
-from sbafab.models.balloons import stresses
+from tests.models.film_stress import stresses
 
 WIDE = Balloon(pocket=60.0)
 """So wide that its rim is nearly a straight strip."""
