@@ -16,7 +16,7 @@ from typing import NamedTuple
 from sbafab.actuators import build
 from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.cutting.chaining import check_clear
-from sbafab.cutting.layer_files import compensated_paths
+from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.properties import CutSettings, curves_of
 from sbafab.cutting.verify import check_contours
 from sbafab.design.records import Design

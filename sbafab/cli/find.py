@@ -27,11 +27,11 @@ from sbafab.search.find import (
 from sbafab.search.find import find as search
 from sbafab.search.quantities import (
     RequestedQuantity,
+    quantity_lines,
     read_sure,
     shown_interval,
     shown_value,
 )
-from sbafab.search.quantity_names import quantity_lines
 from sbafab.search.trial import (
     Goal,
     Requirement,
@@ -39,9 +39,9 @@ from sbafab.search.trial import (
     figure_text,
     keys_said,
     read_all,
+    read_free,
     value_said,
 )
-from sbafab.search.vary import read_free
 
 if TYPE_CHECKING:
     from collections.abc import Callable

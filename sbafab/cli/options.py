@@ -15,7 +15,7 @@ from click.shell_completion import CompletionItem
 
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
-from sbafab.design.pressure_units import KILOPASCALS, MILLILITRES_PER_MINUTE
+from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

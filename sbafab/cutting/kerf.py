@@ -2,14 +2,40 @@
 
 from __future__ import annotations
 
-from sbafab.cutting.properties import kerf_text
+from sbafab.cutting.properties import CutSettings, kerf_text
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.contour import Contour, run_chords, tidy
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line
 from sbafab.geometry.offset import Kerf, Lost, beam_path, widths
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import place_of
-from sbafab.laminate.laminate import Role
+from sbafab.laminate.laminate import Laminate, Layer, Role
+
+
+def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
+    """Return the path of the beam for every pattern, in chords where those are to be drawn.
+
+    Raises DesignError where the kerf leaves none.
+    """
+    return {
+        pattern: _compensated(layers[0], laminate.first_cut(layers[0]), settings)
+        for pattern, layers in laminate.patterns.items()
+    }
+
+
+def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
+    kerf, curves = settings.kerf_width(layer.film.material), settings.curves
+    try:
+        if isinstance(kerf, tuple) and curves.in_chords:
+            raise DesignError(
+                "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
+            )
+        path = compensate(shape, kerf or 0.0)
+        if not curves.in_chords:
+            return path
+        return in_chords(path, layer.role, curves.chord_error, max(widths(kerf or 0.0)) / 2)
+    except DesignError as error:
+        raise DesignError(f"layer {layer.name}: {error}") from error
 
 
 def compensate(region: Region, kerf: Kerf) -> Region:

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sbafab.cutting.dxf_write import dxf_text
-from sbafab.cutting.kerf import compensate, in_chords
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import FOLDER, CutSettings, file_properties, layer_path
 from sbafab.cutting.verify import verify_file
-from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.offset import widths
+from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.process import Counted
@@ -29,32 +27,6 @@ class CutFile:
     sha256: str
     contours: int
     cut_length: float
-
-
-def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
-    """The path of the beam for every pattern, in chords where those are to be drawn.
-
-    Raises DesignError where the kerf leaves none.
-    """
-    return {
-        pattern: _compensated(layers[0], laminate.first_cut(layers[0]), settings)
-        for pattern, layers in laminate.patterns.items()
-    }
-
-
-def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
-    kerf, curves = settings.kerf_width(layer.film.material), settings.curves
-    try:
-        if isinstance(kerf, tuple) and curves.in_chords:
-            raise DesignError(
-                "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
-            )
-        path = compensate(shape, kerf or 0.0)
-        if not curves.in_chords:
-            return path
-        return in_chords(path, layer.role, curves.chord_error, max(widths(kerf or 0.0)) / 2)
-    except DesignError as error:
-        raise DesignError(f"layer {layer.name}: {error}") from error
 
 
 def write_layer_files(

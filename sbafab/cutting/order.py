@@ -1,10 +1,11 @@
-"""The order in which contours are cut: inner before outer, short travel, heat spread."""
+"""The order in which contours are cut: inner before outer, short travel, heat spread; its time."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 from sbafab.geometry.contour import Contour
@@ -20,6 +21,16 @@ FEW = 20
 """Contours up to which looking at every stretch costs less than fetching numpy."""
 SHORTER = 1e-6
 """mm by which a path has to become shorter to be turned round."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
+
+    cut_speed: float = 20.0
+    travel_speed: float = 200.0
+    pierce_seconds: float = 0.1
+    heat_distance: float = 3.0
 
 
 def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
@@ -38,6 +49,19 @@ def travel(contours: Iterable[Contour], here: Point = ORIGIN) -> float:
     """Mm that the head moves between contours, which end where they start."""
     stops = [here, *map(_start, contours)]
     return sum(math.dist(a, b) for a, b in pairwise(stops))
+
+
+def cutting_minutes(cuts: int, cut_length: float, moved: float, machine: Machine) -> float:
+    """Return the minutes that cuts and travel (mm) take.
+
+    Engraving and the way to the cut that frees a roll's sheet are left out.
+    """
+    seconds = (
+        cut_length / machine.cut_speed
+        + moved / machine.travel_speed
+        + cuts * machine.pierce_seconds
+    )
+    return seconds / 60
 
 
 def _start(contour: Contour) -> Point:

@@ -15,7 +15,7 @@ from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import ENDING, project_text, verify_project
-from sbafab.cutting.order import cutting_order, travel
+from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
@@ -39,16 +39,6 @@ FOLDER = "sheets"
 
 
 LabelState = Literal["engraved", "no room", "off"]
-
-
-@dataclass(frozen=True)
-class Machine:
-    """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
-
-    cut_speed: float = 20.0
-    travel_speed: float = 200.0
-    pierce_seconds: float = 0.1
-    heat_distance: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -158,19 +148,9 @@ def _write_sheet(
         cut_length=cut_length,
         travel=moved,
         unsorted_travel=travel((*region.holes, *region.outers)),
-        minutes=_minutes(len(contours) + len(partings), cut_length, moved, machine),
+        minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, machine),
         label="engraved" if around.engraved else "no room" if labelled else "off",
     )
-
-
-def _minutes(cuts: int, cut_length: float, moved: float, machine: Machine) -> float:
-    """Of all cuts; engraving and the way to the cut that frees a roll's sheet are left out."""
-    seconds = (
-        cut_length / machine.cut_speed
-        + moved / machine.travel_speed
-        + cuts * machine.pierce_seconds
-    )
-    return seconds / 60
 
 
 def _surroundings(

@@ -1,4 +1,6 @@
-"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``."""
+"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; units of pressure
+and flow.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +23,17 @@ MILLIMETRES = {
     '"': 25.4,
     "mil": 0.0254,
 }
+KILOPASCALS = {
+    "kPa": 1.0,
+    "Pa": 0.001,
+    "MPa": 1000.0,
+    "mbar": 0.1,
+    "bar": 100.0,
+    "psi": 6.894757293168,
+}
+"""How many kPa each unit is (psi: NIST SP 811, App. B)."""
+MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min": 1000.0}
+"""How many ml/min each unit is."""
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
 

@@ -23,6 +23,9 @@ from sbafab.nesting.records import (
     too_many,
 )
 
+PLACES = "sheets/nest.json"
+"""File of the placements in an output folder, which a later run takes over."""
+
 
 def nest(
     parts: Sequence[NestPart],

@@ -20,7 +20,7 @@ from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.second_cut import write_second_cut
-from sbafab.cutting.sheets import FOLDER, SheetFile, write_sheets
+from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
 from sbafab.design.identity import design_sha256, kit_of
 from sbafab.design.kits import FILE as KIT_FILE
@@ -35,7 +35,7 @@ from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
 from sbafab.models.calibrated import NONE, load_calibration, shipped_names
 from sbafab.models.figures import Prediction
-from sbafab.nesting.nest import as_dict
+from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import (
     CHECKS_SCHEMA,
@@ -65,7 +65,6 @@ TRAVELLER = "traveller.html"
 FINDINGS = "findings.html"
 PREDICT = "predict"
 """Folder of a prediction's plots."""
-PLACES = f"{FOLDER}/nest.json"
 PICTURES_OF_A_DESIGN = 3
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
-from sbafab.cutting.layer_files import compensated_paths
+from sbafab.cutting.kerf import compensated_paths
+from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
-from sbafab.cutting.sheets import Machine
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design

@@ -18,12 +18,10 @@ from sbafab.design.records import Design
 from sbafab.design.sections import NAME_PATTERN
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.nesting.check import check_nest
-from sbafab.nesting.nest import from_dict, nest
+from sbafab.nesting.nest import PLACES, from_dict, nest
 from sbafab.nesting.records import Nest, NestPart
-from sbafab.output.artefacts import PLACES
 from sbafab.output.checked import Checked, DesignPlan, check, limits, stocks
-from sbafab.output.manifest import Schema
-from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
+from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA, Schema
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding

@@ -28,7 +28,7 @@ from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, 
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import DesignPlan, kerf_widths, warnings
-from sbafab.output.swap import SCHEMA
+from sbafab.output.swap import SCHEMA, BatchSchema
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.version import GENERATOR
 
@@ -37,8 +37,6 @@ MOST_SIZE = 10_000.0
 Count = Annotated[int, Field(ge=1, le=10_000_000)]
 Size = Annotated[float, Field(gt=0, le=MOST_SIZE)]
 Thickness = Annotated[float, Field(gt=0, le=10)]
-BatchSchema = Literal["sbafab/job@1", "sbafab/assembly@1"]
-Schema = Literal["sbafab/manifest@1"] | BatchSchema
 
 
 # The records.

@@ -30,7 +30,7 @@ from sbafab.reports.html_templates import environment
 from sbafab.reports.inflated_picture import WHY, PictureRequest, pictures_at_one_scale
 from sbafab.reports.solid_png import solid_png
 from sbafab.search.measure import RuleMargin, margins
-from sbafab.search.sweep import CSV, JOURNAL
+from sbafab.search.sweep_report import CSV, JOURNAL
 from sbafab.version import GENERATOR
 
 PRESSURES = (10.0,)

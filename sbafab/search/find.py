@@ -50,7 +50,7 @@ from sbafab.search.strategies import (
     widen_ranges,
     with_optuna,
 )
-from sbafab.search.sweep_page import front
+from sbafab.search.sweep_report import front
 from sbafab.search.trial import (
     Goal,
     GridPoint,

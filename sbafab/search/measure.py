@@ -1,14 +1,23 @@
-"""One design measured: rules with their margins, predicted figures, and what all its keys are."""
+"""One design measured: rules with their margins, predicted figures, and what all its keys are.
+
+As a program it measures one design after the other, and may be killed at any moment.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
+import queue
+import signal
+import sys
+import threading
+import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import IO, Any, Literal, NamedTuple
 
 import sbafab
 from sbafab.actuators import records
@@ -17,8 +26,10 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, keys_of
 from sbafab.errors import SbafabError
 from sbafab.models.figures import Figure, PredictionRequest
+from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.output.checked import check, refuse_undoable
+from sbafab.process import prepare
 from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
 
@@ -62,7 +73,9 @@ def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
         name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
         for name, rule in worst.items()
     }
-    prediction = predict(design, PredictionRequest(tuple(pressures)), checked.laminate)
+    # A row has no intervals: with the factors given, none are computed.
+    request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
+    prediction = predict(design, request, checked.laminate)
     row["figures"] = named_figures(prediction.figures)
     if checked.failed:
         failed = [rule for rule in worst.values() if rule.verdict == "fail"]
@@ -160,3 +173,46 @@ def fingerprint() -> str:
         total.update(path.relative_to(root).as_posix().encode())
         total.update(path.read_bytes())
     return f"{sbafab.__version__}+{total.hexdigest()[:12]}"
+
+
+# The process: a job a line from standard input, a row a line to standard output. When its input
+# ends, because whoever started it is gone, so does it, in the middle of a job if need be.
+
+
+def main() -> None:
+    """Measures until standard input ends."""
+    # Ctrl-C goes to all processes of a terminal; the one that started this ends it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    prepare()
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8", newline="\n")
+    # What a library prints must not stand among the answers.
+    os.dup2(2, 1)
+    jobs: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(sys.stdin, jobs), daemon=True).start()
+    while True:
+        job = json.loads(jobs.get())
+        answers.write(json.dumps(_answer(job)) + "\n")
+        answers.flush()
+
+
+def _read(lines: IO[str], jobs: queue.SimpleQueue[str]) -> None:
+    for line in lines:
+        jobs.put(line)
+    os._exit(0)
+
+
+def _answer(job: dict[str, Any]) -> dict[str, Any]:
+    if job.pop("program") != fingerprint():
+        return {"outcome": "unlike", "reason": fingerprint()}
+    began = time.perf_counter()
+    try:
+        row = measured(**job)
+    except Exception as error:
+        message = " ".join(str(error).split())
+        row = {"outcome": "crashed", "reason": f"{type(error).__name__}: {message}"}
+    row["seconds"] = round(time.perf_counter() - began, 4)
+    return row
+
+
+if __name__ == "__main__":
+    main()

@@ -139,7 +139,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 ATTEMPTS = 2
 """A process may die by somebody else's doing; a design that kills two in a row is to blame."""
 
-COMMAND = (sys.executable, "-m", "sbafab.search.measuring_process")
+COMMAND = (sys.executable, "-m", "sbafab.search.measure")
 
 MeasureJob = dict[str, Any]
 """The keyword arguments of ``measured``, and ``program``, which has to do it."""
@@ -160,7 +160,7 @@ _started = _Started()
 
 
 class Child:
-    """A running process of ``sbafab.search.measuring_process``."""
+    """A running process of ``sbafab.search.measure``."""
 
     def __init__(self) -> None:
         alone = {name: os.environ.get(name, "1") for name in ONE_THREAD}

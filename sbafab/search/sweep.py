@@ -22,18 +22,19 @@ from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
 from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
 from sbafab.search.pool import MeasureJob, dask_pool, local_pool, run_jobs
-from sbafab.search.sweep_page import sweep_html
-from sbafab.search.sweep_table import (
+from sbafab.search.sweep_report import (
+    CSV,
+    JOURNAL,
     Table,
     refuse_foreign,
     stale_designs,
+    sweep_html,
     write_csv,
     write_parquet,
     write_times,
 )
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
 
-JOURNAL, CSV = "journal.jsonl", "sweep.csv"
 SECONDS = 300.0
 """How long one design may take."""
 MEASURED = "measuring designs"

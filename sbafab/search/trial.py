@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sbafab.actuators import build
@@ -26,6 +26,7 @@ from sbafab.search.quantities import (
     safer,
     shown_value,
 )
+from sbafab.search.vary import read_varied, refuse_unknown
 
 CLOSE = 1e-9
 
@@ -316,7 +317,8 @@ def broken_rules(trial: Trial) -> list[str]:
     return [f"{margin.rule}: {margin.message}" for margin in failed]
 
 
-# The search space: steps of the free keys, each evaluated once.
+# The search space: the keys that a search may change, ``KEY=LOW:HIGH:STEP``, and the candidates by
+# their steps, each evaluated once.
 
 
 PROGRESS_LABEL = "trying designs"
@@ -325,6 +327,54 @@ PROGRESS_LABEL = "trying designs"
 def numbers_of(value: Any) -> list[float]:
     """The numbers of a key that lists some, such as one diameter a balloon; else none."""
     return list(map(float, value)) if isinstance(value, list | tuple) and value else []
+
+
+def read_free(
+    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
+) -> tuple[Free, ...]:
+    """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
+
+    Keys that are ``given`` by hand stay as they are, but for lists, which are scaled as a whole;
+    what the design must fit gives its chamber. Raises DesignError.
+    """
+    keys = {key: value for key, value, _ in keys_of(design)}
+    assigned = [key for key in assigned if not numbers_of(keys.get(key))]
+    varied = [_stepped(text) for text in texts]
+    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
+    free = {free_key.key: free_key for free_key in design.free}
+    if any(key.startswith("fits.") for key in assigned):
+        free.pop("chamber.diameter", None)
+    for key in assigned:
+        free.pop(key, None)
+    for key in dict.fromkeys(fixed):
+        if key in assigned:
+            continue
+        if key not in free:
+            raise DesignError(
+                f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
+            )
+        del free[key]
+    # What is named is free whatever the requirements name.
+    free |= {free_key.key: free_key for free_key in varied}
+    if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
+        raise DesignError(
+            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
+            "search scales that list; leave it out, or give one diameter"
+        )
+    return tuple(free.values())
+
+
+def _stepped(text: str) -> Free:
+    stepped = read_varied(text, "--free")
+    numbers = [value for value in stepped.values if isinstance(value, int | float)]
+    parts = text.partition("=")[2].split(":")
+    if len(parts) != 3 or len(numbers) != len(stepped.values):
+        raise DesignError(
+            f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
+            "--free chamber.diameter=3:12:0.1"
+        )
+    step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
+    return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))
 
 
 class SearchSpace:

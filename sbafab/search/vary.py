@@ -1,19 +1,18 @@
-"""Keys varied over values: grids and Latin hypercubes of designs, and the free keys of a search."""
+"""Keys varied over values: grids and Latin hypercubes of designs."""
 
 from __future__ import annotations
 
 import itertools
 import random
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 from sbafab.design.files import key_paths, override, shown
-from sbafab.design.records import Design, Free, keys_of
+from sbafab.design.records import Design
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
-from sbafab.search.trial import numbers_of
 
 MOST_DESIGNS = 100_000
 MOST_VALUES = 10_000
@@ -173,54 +172,3 @@ def _at(varied: Varied, share: float) -> Any:
     if varied.is_continuous:
         return round(varied.low + share * (varied.high - varied.low), DIGITS)
     return varied.values[int(share * len(varied.values))]
-
-
-# The keys that a search may change: ``KEY=LOW:HIGH:STEP``.
-
-
-def read_free(
-    design: Design, texts: Sequence[str], fixed: Sequence[str] = (), assigned: Sequence[str] = ()
-) -> tuple[Free, ...]:
-    """The family's own keys without those ``fixed``, and those of the ``texts`` in their place.
-
-    Keys that are ``given`` by hand stay as they are, but for lists, which are scaled as a whole;
-    what the design must fit gives its chamber. Raises DesignError.
-    """
-    keys = {key: value for key, value, _ in keys_of(design)}
-    assigned = [key for key in assigned if not numbers_of(keys.get(key))]
-    varied = [_stepped(text) for text in texts]
-    refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
-    free = {free_key.key: free_key for free_key in design.free}
-    if any(key.startswith("fits.") for key in assigned):
-        free.pop("chamber.diameter", None)
-    for key in assigned:
-        free.pop(key, None)
-    for key in dict.fromkeys(fixed):
-        if key in assigned:
-            continue
-        if key not in free:
-            raise DesignError(
-                f"--fix {shown(key)}: a search changes {', '.join(free) or 'nothing'} by default"
-            )
-        del free[key]
-    # What is named is free whatever the requirements name.
-    free |= {free_key.key: free_key for free_key in varied}
-    if "stack.balloons" in free and numbers_of(keys.get("chamber.diameter")):
-        raise DesignError(
-            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
-            "search scales that list; leave it out, or give one diameter"
-        )
-    return tuple(free.values())
-
-
-def _stepped(text: str) -> Free:
-    stepped = read_varied(text, "--free")
-    numbers = [value for value in stepped.values if isinstance(value, int | float)]
-    parts = text.partition("=")[2].split(":")
-    if len(parts) != 3 or len(numbers) != len(stepped.values):
-        raise DesignError(
-            f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
-            "--free chamber.diameter=3:12:0.1"
-        )
-    step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
-    return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))

@@ -14,7 +14,8 @@ import pytest
 import sbafab
 from sbafab.cutting import layer_files
 from sbafab.cutting.dxf_read import read_profile
-from sbafab.cutting.layer_files import CutFile, compensated_paths, write_layer_files
+from sbafab.cutting.kerf import compensated_paths
+from sbafab.cutting.layer_files import CutFile, write_layer_files
 from sbafab.cutting.properties import Curves, CutSettings, DxfProfile
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate

@@ -12,8 +12,9 @@ import shapely
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.lettering import GLYPHS, strokes, width
+from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import Machine, SheetFile, write_sheets
+from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc, rectangle
 from sbafab.nesting.nest import nest

@@ -22,10 +22,8 @@ from sbafab.models.intervals import calibration_of
 from sbafab.models.unknowns import UNKNOWNS
 from sbafab.search import trial as module
 from sbafab.search.find import FindRequest, find, free_keys
-from sbafab.search.quantities import read_quantity
-from sbafab.search.quantity_names import QUANTITIES
-from sbafab.search.trial import SearchProblem, Trial, figure_text, read_all
-from sbafab.search.vary import read_free
+from sbafab.search.quantities import QUANTITIES, read_quantity
+from sbafab.search.trial import SearchProblem, Trial, figure_text, read_all, read_free
 
 FREE = (Free("chamber.diameter", 3.0, 12.0, 0.1), Free("stack.balloons", 2, 20, 1))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sbafab.search.sweep_page import front
+from sbafab.search.sweep_report import front
 
 FEW = st.integers(0, 4)
 

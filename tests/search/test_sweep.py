@@ -20,7 +20,7 @@ from sbafab.search import sweep as module
 from sbafab.search.measure import measured
 from sbafab.search.pool import MeasureJob
 from sbafab.search.sweep import SweptDesigns
-from sbafab.search.sweep_page import Dots, Objective, passes_svg, trades_svg
+from sbafab.search.sweep_report import Dots, Objective, passes_svg, trades_svg
 from tests.site.formats import hold
 
 HAS_PARQUET = find_spec("pyarrow") is not None

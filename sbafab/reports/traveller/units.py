@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sbafab.design.pressure_units import KILOPASCALS
+from sbafab.design.units import KILOPASCALS
 from sbafab.laminate.laminate import Inlet
 from sbafab.reports.drawing import TIMES
 
