@@ -30,6 +30,7 @@ from sbafab.geometry.contour import Mark, tidy
 from sbafab.geometry.edges import EPSILON, Edge, Point, unit
 from sbafab.geometry.offset import fillet, grow
 from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
+from sbafab.laminate.folding import lies_on, toward, unfolded
 from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import (
     Fold,
@@ -441,6 +442,10 @@ class DrawnDesign(Design):
         return frozenset(seam.layers for seam in self.seams or ())
 
     @property
+    def stated_folds(self) -> tuple[Fold, ...]:
+        return tuple(Fold(*fold.layers, fold.line) for fold in self.folds or ())
+
+    @property
     def free(self) -> tuple[Free, ...]:
         return ()
 
@@ -496,10 +501,11 @@ def build(design: DrawnDesign) -> Laminate:
         # A chamber of a net goes from film to film through the holes that are drawn.
         if len(chamber.balloons or range(balloons)) > 1 and design.nets is None
     )
+    stack = _turned(layers(cuts, design), design)
     laminate = Laminate(
         name=design.name,
         family=design.family,
-        layers=_turned(layers(cuts, design), design),
+        layers=stack,
         chambers=chambers,
         bores=bores,
         inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
@@ -523,13 +529,17 @@ def build(design: DrawnDesign) -> Laminate:
             )
             for number, seam in enumerate(design.seams or (), start=1)
         ),
-        folds=tuple(Fold(*fold.layers, fold.line) for fold in design.folds or ()),
+        folds=tuple(
+            replace(fold, line=toward(fold.line, stack[fold.lower - 1].profile))
+            for fold in design.stated_folds
+        ),
         ports=tuple(
             Port(port.name, *port.layers, port.at, port.kind) for port in design.ports or ()
         ),
         nets=tuple(Net(name, members) for name, members in _nets(design).items()),
         bonds=design.stated_bonds,
     )
+    _check_folds(laminate, design)
     joinings(laminate)
     return laminate
 
@@ -620,6 +630,12 @@ def _check_order(roles: Sequence[str]) -> None:
 
 def _check_seams(design: DrawnDesign, pairs: Sequence[tuple[int, int]]) -> None:
     """Raises DesignError for seams and folds that do not lie between neighbouring films."""
+    for fold in design.stated_folds:
+        if (fold.lower, fold.upper) not in pairs:
+            raise DesignError(
+                f"fold of layers {fold.lower} and {fold.upper}: they are not two films that lie "
+                f"next to each other, which are {', '.join(str(list(pair)) for pair in pairs)}"
+            )
     seams = design.seams or ()
     names = [seam.name for seam in seams]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -683,12 +699,70 @@ def _check_nets(design: DrawnDesign) -> None:
             home[member] = net
 
 
+LEAST_OVERLAP = 1e-4
+"""mm2: more than that is no rounding."""
+
+
 def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
-    """The layers, those turned that lie face down."""
-    return tuple(
-        replace(layer, turned=True) if row.turned else layer
-        for layer, row in zip(stack, design.layers, strict=True)
-    )
+    """The layers, those turned that lie face down, and folded ones with patterns of their own."""
+    turned = {number: bool(row.turned) for number, row in enumerate(design.layers, start=1)}
+    for fold in design.stated_folds:
+        # A film that is folded over lies with its other face up.
+        turned[fold.upper] = not turned[fold.lower]
+    if not any(turned.values()):
+        return stack
+    folded = {index for fold in design.stated_folds for index in (fold.lower, fold.upper)}
+    patterns: dict[tuple[str, Region, int], str] = {}
+    placed = []
+    for layer in stack:
+        own = layer.index if layer.index in folded else 0
+        shape = layer.film.material, layer.profile, own
+        pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
+        placed.append(replace(layer, turned=turned[layer.index], pattern=pattern))
+    return tuple(placed)
+
+
+def _check_folds(laminate: Laminate, design: DrawnDesign) -> None:
+    """Raises DesignError for folds that no film can be folded at."""
+    halves = [index for fold in laminate.folds for index in (fold.lower, fold.upper)]
+    for fold, stated in zip(laminate.folds, design.stated_folds, strict=True):
+        lower, upper = laminate.layer(fold.lower), laminate.layer(fold.upper)
+        name = f"fold of layers {fold.lower} and {fold.upper}"
+        if lower.film != upper.film:
+            raise DesignError(
+                f"{name}: they are of {lower.film.material} and {upper.film.material}, and halves "
+                "of one film are of one; give both the same film"
+            )
+        if halves.count(fold.upper) - sum(f.lower == fold.upper for f in laminate.folds) > 1:
+            raise DesignError(f"{name}: layer {fold.upper} is folded over twice; remove one fold")
+        way = design.layers[fold.upper - 1].turned
+        if way is not None and way != upper.turned:
+            raise DesignError(
+                f"{name}: layer {fold.upper} has turned = {str(way).lower()}, and folding turns "
+                "it the other way up; leave it out"
+            )
+        for layer in (lower, upper):
+            if not any(lies_on(edge, [fold.line]) for edge in layer.profile.edges):
+                (x, y), (u, v) = stated.line
+                raise DesignError(
+                    f"{name}: layer {layer.index} has no edge on the line from x {x:g}, y {y:g} to "
+                    f"x {u:g}, y {v:g}; both halves end at the line with a straight edge"
+                )
+        over = lower.profile & unfolded(upper.profile, [fold.line])
+        if over.area > LEAST_OVERLAP:
+            x, y = over.edges[0].at(0.5)
+            raise DesignError(
+                f"{name}: laid flat the halves lie over each other on {over.area:.3f} mm2, at "
+                f"x {x:.3f}, y {y:.3f}; both must lie on one side of the line"
+            )
+    for root in {fold.lower for fold in laminate.folds} - {fold.upper for fold in laminate.folds}:
+        flat = laminate.first_cut(laminate.layer(root))
+        parts = len(laminate.layer(root).profile.pieces)
+        if len(flat.pieces) > parts:
+            raise DesignError(
+                f"fold of layer {root}: laid flat its halves fall into {len(flat.pieces)} parts, "
+                "for they do not meet on the line; let their edges there overlap"
+            )
 
 
 def _seam_path(seam: DrawnSeam, shapes: ShapeRegions) -> tuple[tuple[Edge, ...], ...]:

@@ -50,6 +50,8 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
+from sbafab.laminate.folding import fold_roots, halves
+from sbafab.laminate.joints import Fold
 from sbafab.laminate.laminate import Laminate, SheetPanel
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
@@ -173,7 +175,9 @@ def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> Folder
         design_findings += findings_of(DESIGNED, layers, AS_DESIGNED) if layers else []
         findings += [replace(f, message=f"{entry.name}: {f.message}") for f in design_findings]
         lots.append(
-            DesignLot(entry.name, entry.copies, built.files, built.design.order.spare_parts)
+            DesignLot(
+                entry.name, entry.copies, _cut_parts(built.files), built.design.order.spare_parts
+            )
         )
         identity = (built.claims.name, built.claims.copies, built.claims.design_sha256)
         if identity != (entry.name, entry.copies, entry.design_sha256):
@@ -224,6 +228,7 @@ def read_folder(
     layers_expected = expected.layers(count) if expected is not None else [None] * count
     files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
     problems += file_errors
+    files = _folded(files, () if expected is None else expected.laminate.folds)
     panel, files, file_errors = read_panel(folder, claims, files, expected)
     problems += file_errors
     layers = stacked_layers(files, design)
@@ -254,6 +259,32 @@ def read_folder(
     return AsBuiltFolder(
         claims, design, limits, tuple(files), laminate, tuple(problems), expected, design_findings
     )
+
+
+def _folded(files: Sequence[LayerFile], folds: Sequence[Fold]) -> list[LayerFile]:
+    """Return the files with each layer of a folded film as its half of the part that is cut."""
+    roots = fold_roots(folds)
+    if not roots:
+        return [*files]
+    by_root: dict[int, dict[int, Region]] = {}
+    folded = []
+    for file in files:
+        root = roots.get(file.position, file.position)
+        part = file.part
+        if part is None or part.is_expected or root not in {fold.lower for fold in folds}:
+            folded.append(file)
+            continue
+        if root not in by_root:
+            by_root[root] = halves(root, folds, part.region)
+        folded.append(replace(file, part=replace(part, region=by_root[root][file.position])))
+    return folded
+
+
+def _cut_parts(files: Sequence[LayerFile]) -> list[LayerFile]:
+    """Return each file once; layers of a folded film share one."""
+    return [*{file.claim.file or str(file.position): file for file in reversed(files)}.values()][
+        ::-1
+    ]
 
 
 def _laminate(
@@ -317,7 +348,8 @@ def _design_sheet_problems(
     if not claims.sheets and is_job(folder.absolute().parent):
         message = "the film sheets are those of the job, and were not looked at; check the folder "
         return [Problem(CLAIMS, f"{message}above this one", verdict="warn")]
-    lots = [DesignLot(claims.name, claims.copies, files, design.order.spare_parts)]
+    parts = _cut_parts(files)
+    lots = [DesignLot(claims.name, claims.copies, parts, design.order.spare_parts)]
     return sheet_problems(folder, SheetOrder(claims, design, claims.kerf, lots))
 
 

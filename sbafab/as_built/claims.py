@@ -19,6 +19,7 @@ from sbafab.cutting.properties import (
     warning_property,
 )
 from sbafab.design.records import Design
+from sbafab.laminate.folding import fold_roots
 from sbafab.laminate.joints import chamber_gaps
 from sbafab.laminate.laminate import Layer
 from sbafab.output.checked import kerf_widths, limits, warnings
@@ -103,6 +104,7 @@ def _links(folder: Path) -> list[str]:
 def order_problems(claims: Manifest, design: Design) -> list[Problem]:
     """Return indices, names, roles and films that do not fit their place in the stack."""
     problems = []
+    roots = fold_roots(design.stated_folds)
     expected = [*design.layer_roles] or _roles([layer.role for layer in claims.layers])
     expected += ["none"] * (len(claims.layers) - len(expected))
     for position, (layer, role) in enumerate(zip(claims.layers, expected, strict=False), start=1):
@@ -116,7 +118,9 @@ def order_problems(claims: Manifest, design: Design) -> list[Problem]:
                 claim(f"layer {position} is named {layer.name!r}, not {name}", position)
             )
         kerf = claims.kerf.get(layer.material)
-        file = layer_path(name, kerf.width if kerf is not None else None)
+        cut = roots.get(position, position)
+        of = claims.layers[cut - 1].name if cut <= len(claims.layers) else name
+        file = layer_path(name if cut == position else of, kerf.width if kerf is not None else None)
         if layer.file not in (None, file):
             message = f"layer {position} ({name}) is cut from {layer.file!r}, not {file}"
             problems.append(claim(message, position))
@@ -291,7 +295,8 @@ def _expected_properties(
     return {
         "DESIGN": claims.name,
         "DESIGN_SHA256": claims.design_sha256,
-        "PATTERN": layer.pattern,
+        # Layers of a folded film are cut from the file of the lowest.
+        "PATTERN": next(other.pattern for other in claims.layers if other.file == layer.file),
         "MATERIAL": layer.material,
         "UNITS": "mm",
         **kerf_properties(width),

@@ -86,14 +86,17 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
 
 def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, ...]:
     """Return the layers of readable files in order; equal profiles share a pattern."""
-    patterns: dict[tuple[str, str], str] = {}
+    patterns: dict[tuple[str, str, int], str] = {}
     layers = []
     z = 0.0
+    folded = {index for fold in design.stated_folds for index in (fold.lower, fold.upper)}
     balloons = balloon_numbers([file.claim.role for file in files], design.seamed_layers)
     for file, balloon in zip(files, balloons, strict=True):
         claim = file.claim
         if file.part is not None:
-            shape = (claim.material, file.part.region.key)
+            # Folded layers are cut as one part, so that none is of another layer's pattern.
+            number = file.position if file.position in folded else 0
+            shape = (claim.material, file.part.region.key, number)
             layers.append(
                 Layer(
                     index=file.position,

@@ -127,6 +127,17 @@ def print_run_verdict(run: Run, change: str) -> None:
         print_passed(run.folder.name, groups, f"sbafab check {run.folder}")
 
 
+def _joint_facts(run: Run) -> Iterator[tuple[str, str]]:
+    """Yield the folds and seams of a run, if it has any."""
+    if run.schedule is None:
+        return
+    if run.schedule.folds:
+        yield "folds", f"{len(run.schedule.folds)}, each film cut flat as one part; press.json"
+    if run.schedule.seams:
+        tools = ", ".join(dict.fromkeys(seam.tool for seam in run.schedule.seams))
+        yield "seams", f"{len(run.schedule.seams)} by {tools}; press.json"
+
+
 def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
     """Yield label and text of each row of a design's run."""
     index = run.manifest
@@ -149,7 +160,8 @@ def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
         + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
     )
     yield from stale_rows(run.dropped)
-    cut = [layer["file"] for layer in index["layers"] if layer["file"]]
+    # Layers of a folded film share a file.
+    cut = {layer["file"] for layer in index["layers"] if layer["file"]}
     if cut:
         plate = f", and the base plate {index['fixture']}" if index["fixture"] else ""
         yield (
@@ -170,9 +182,7 @@ def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
     for film in index["films"]:
         if "sheets" in film:
             yield f"{film['material']} film", film_text(film, index["sheets"], index["copies"])
-    if run.schedule is not None and run.schedule.seams:
-        tools = ", ".join(dict.fromkeys(seam.tool for seam in run.schedule.seams))
-        yield "seams", f"{len(run.schedule.seams)} by {tools}; press.json"
+    yield from _joint_facts(run)
     if run.schedule is not None and run.schedule.steps:
         force = run.schedule.steps[0].force_n / 1000
         yield (

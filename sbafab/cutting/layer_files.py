@@ -39,17 +39,20 @@ def write_layer_files(
     """Writes ``layers/<layer name>.dxf`` under ``folder`` for every layer, bottom to top.
 
     ``paths`` holds the beam's path for every pattern. The name of a compensated file ends in its
-    kerf: ``layers/001_TPE_base_kerf0.12.dxf``. Raises OutputError where a file does not read
+    kerf: ``layers/001_TPE_base_kerf0.12.dxf``. A folded film has one file, its lowest
+    layer's. Raises OutputError where a file does not read
     back as its path, OSError where it cannot be written.
     """
     written: dict[int, CutFile] = {}
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
     for pattern, layers in laminate.patterns.items():
+        if laminate.cut_with(layers[0]) != layers[0].index:
+            continue
         for file in _write_pattern(layers, paths[pattern], folder, settings):
             written[file.layer] = file
             if progress is not None:
                 progress(len(written), len(laminate.layers))
-    return [written[layer.index] for layer in laminate.layers]
+    return [written[layer.index] for layer in laminate.layers if layer.index in written]
 
 
 def _write_pattern(

@@ -65,7 +65,7 @@ from sbafab.design.toml_table import Section
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region
 from sbafab.laminate.base_plate import lone_pin_error, pin_error
-from sbafab.laminate.joints import FaceBond
+from sbafab.laminate.joints import FaceBond, Fold
 from sbafab.notebook import table_html
 
 
@@ -149,6 +149,11 @@ class Design(Section):
     def seamed_layers(self) -> frozenset[tuple[int, int]]:
         """Pairs of layers, by index, that seams bond."""
         return frozenset()
+
+    @property
+    def stated_folds(self) -> tuple[Fold, ...]:
+        """Films folded into two layers."""
+        return ()
 
     @property
     def stated_bonds(self) -> tuple[FaceBond, ...]:

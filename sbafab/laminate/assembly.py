@@ -58,9 +58,9 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 
 
 def laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
-    """Return all steps in which layers are laid on each other: presses and seams, in order.
+    """Return all steps in which layers are laid on each other: presses, seams and folds, in order.
 
-    A step of a seam has no pins, and is named as a flash bond.
+    A seam or fold has no pins, and is named as a flash bond.
     """
     return stored(laminate, "_laying", _laying)
 
@@ -69,20 +69,17 @@ def _laying(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     if is_only_pressed(laminate):
         return assembly(laminate)
     steps: list[AssemblyStep] = []
-    folds = 0
     for joining in joinings(laminate):
-        if joining.fold is not None:
-            folds += 1
-            continue
+        is_pressed = joining.process == PRESS
         adds = tuple(body[0] for body in joining.bodies if len(body) == 1)
-        plans = [_Plan("bond_all", "full", joining.bodies, adds)]
-        if joining.process == PRESS and not laminate.folds and adds == joining.layers:
+        plans = [_Plan("flash_middle", "flash", joining.bodies, adds)]
+        if is_pressed and adds == joining.layers:
             plans = [*_plans(laminate, joining.layers)]
-        if joining.seam is not None:
-            plans = [_Plan("flash_middle", "flash", joining.bodies, adds)]
+        elif is_pressed:
+            plans = [_Plan("bond_all", "full", joining.bodies, adds)]
         for plan in plans:
-            step = _step(len(steps) + folds + 1, plan, laminate)
-            pins = () if joining.seam is not None else step.pins
+            step = _step(len(steps) + 1, plan, laminate)
+            pins = step.pins if is_pressed else ()
             steps.append(replace(step, joining=joining, pins=pins))
     return tuple(steps)
 
@@ -92,7 +89,7 @@ def _steps(laminate: Laminate) -> tuple[AssemblyStep, ...]:
         return tuple(
             step
             for step in laying(laminate)
-            if step.joining is not None and step.joining.seam is None
+            if step.joining is not None and step.joining.process == PRESS
         )
     indices = tuple(layer.index for layer in laminate.layers)
     plans = [*_plans(laminate, indices)]

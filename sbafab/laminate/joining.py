@@ -318,19 +318,17 @@ def _steps(
     gaps = laminate.interfaces[first - 1 : last]
     layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
     laid = {index for past in done for index in _layers(laminate, past)}
-    for fold in laminate.folds:
-        halves = {fold.lower, fold.upper}
-        if halves <= {*layers} and not halves <= laid:
-            count += 1
-            yield Joining(
-                count,
-                "fold",
-                tuple(range(fold.lower, fold.upper + 1)),
-                (tuple(range(fold.lower, fold.upper + 1)),),
-                f"layers {fold.lower} and {fold.upper} are halves of one film",
-                fold=fold,
-            )
-    bodies = tuple(_bodies(laminate, layers, done))
+    folded = [fold for fold in laminate.folds if {fold.lower, fold.upper} <= laid]
+    for fold in sorted(laminate.folds, key=lambda fold: fold.lower):
+        halves = range(fold.lower, fold.upper + 1)
+        if fold in folded or not {*halves} <= {*layers}:
+            continue
+        count += 1
+        bodies = tuple(_bodies(laminate, halves, done, folded))
+        reason = f"layers {fold.lower} and {fold.upper} are halves of one film"
+        yield Joining(count, "fold", tuple(halves), bodies, reason, fold=fold)
+        folded.append(fold)
+    bodies = tuple(_bodies(laminate, layers, done, folded))
     reason = _reason(laminate, task, before)
     yield Joining(count + 1, task.process, layers, bodies, reason, task.seam)
 
@@ -341,7 +339,7 @@ def _layers(laminate: Laminate, task: _Task) -> range:
 
 
 def _bodies(
-    laminate: Laminate, layers: Sequence[int], done: Sequence[_Task]
+    laminate: Laminate, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
 ) -> Iterator[tuple[int, ...]]:
     """Yield what was joined before and single layers, lowest first."""
     joined = {index for past in done for index in range(past.first, past.last + 1)}
@@ -351,6 +349,7 @@ def _bodies(
         if gap.index in joined
         for index in range(gap.below.index, gap.above.index)
     }
+    inside |= {index for fold in folded for index in range(fold.lower, fold.upper)}
     body: list[int] = []
     for index in layers:
         body.append(index)

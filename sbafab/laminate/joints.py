@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Edge, Point
@@ -87,6 +87,14 @@ class Fold:
     lower: int
     upper: int
     line: tuple[Point, Point]
+
+
+class GapJoints(NamedTuple):
+    """What joins two films but masks: seams, the press or not, and folds."""
+
+    seams: tuple[Seam, ...] = ()
+    pressed: bool = True
+    folds: tuple[Fold, ...] = ()
 
 
 @dataclass(frozen=True)

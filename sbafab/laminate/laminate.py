@@ -16,7 +16,8 @@ from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
-from sbafab.laminate.joints import PRESS, FaceBond, Fold, Net, Port, Seam, chamber_gaps
+from sbafab.laminate.folding import flat_part, fold_roots, unfolded
+from sbafab.laminate.joints import PRESS, FaceBond, Fold, GapJoints, Net, Port, Seam, chamber_gaps
 from sbafab.markup import escape
 from sbafab.notebook import table_html
 
@@ -107,6 +108,7 @@ Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
 
 NOTHING = Region()
+PLAINLY_PRESSED = GapJoints()
 LOOSE = 0.2
 """Tolerance in mm of place and diameter within which a hole belongs to a pin."""
 
@@ -270,30 +272,24 @@ class Laminate:
                 masks.append(layer)
                 continue
             if below is not None:
-                seams, is_pressed = self.seams_between(below, layer), self.presses(below, layer)
-                key = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
-                joined = *key, is_pressed, seams
-                if joined not in regions:
-                    regions[joined] = joined_regions(
-                        interface_regions(
-                            below.profile, layer.profile, [mask.profile for mask in masks]
-                        ),
-                        seams,
-                        is_pressed,
-                    )
+                joints = self._joints_between(below, layer)
+                profiles = [mask.profile for mask in masks]
+                patterns = below.pattern, layer.pattern, tuple(mask.pattern for mask in masks)
+                key = *patterns, joints.pressed, joints.seams
+                if key not in regions:
+                    pressed = interface_regions(below.profile, layer.profile, profiles)
+                    regions[key] = joined_regions(pressed, joints)
+                number = len(interfaces) + 1
                 interfaces.append(
-                    Interface.between(
-                        len(interfaces) + 1,
-                        below,
-                        layer,
-                        masks,
-                        regions[joined],
-                        seams,
-                        is_pressed,
-                    )
+                    Interface.between(number, below, layer, masks, regions[key], joints)
                 )
             below, masks = layer, []
         return tuple(interfaces)
+
+    def _joints_between(self, below: Layer, above: Layer) -> GapJoints:
+        pair = below.index, above.index
+        folds = tuple(fold for fold in self.folds if (fold.lower, fold.upper) == pair)
+        return GapJoints(self.seams_between(below, above), self.presses(below, above), folds)
 
     def seams_between(self, below: Layer, above: Layer) -> tuple[Seam, ...]:
         """The seams that bond two structural layers, in the order in which they are made."""
@@ -357,12 +353,24 @@ class Laminate:
     def first_cut(self, layer: Layer) -> Region:
         """Return the region in a layer's cut file: its profile, or its registered sheet.
 
-        A mask sheet is laid face down, so it is cut turned over.
+        A mask sheet is laid face down, so it is cut turned over. Layers of a folded film are cut
+        as one flat part, that of the lowest of them.
         """
         if self.panel is None:
-            return layer.profile
+            root = self.cut_with(layer)
+            if not any(fold.lower == root for fold in self.folds):
+                return layer.profile
+            return flat_part(root, self.folds, [layer.profile for layer in self.layers])
         sheet = self.panel.sheets[layer.index - 1]
         return sheet.mirrored() if layer.is_mask else sheet
+
+    def cut_with(self, layer: Layer) -> int:
+        """Return the index of the layer whose cut file holds this one: its own, unless folded."""
+        return self._fold_roots.get(layer.index, layer.index)
+
+    @cached_attribute
+    def _fold_roots(self) -> dict[int, int]:
+        return fold_roots(self.folds)
 
     def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
         """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
@@ -399,7 +407,7 @@ class Interface:
 
     contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
     ``seams`` bond within their regions alone; an interface that is not ``pressed`` bonds in them
-    and nowhere else.
+    and nowhere else. At ``folds`` one film goes on from below to above.
     """
 
     index: int
@@ -413,6 +421,7 @@ class Interface:
     unbonded: Region
     seams: tuple[Seam, ...] = ()
     pressed: bool = True
+    folds: tuple[Fold, ...] = ()
 
     @staticmethod
     def between(
@@ -421,15 +430,26 @@ class Interface:
         above: Layer,
         masks: Sequence[Layer],
         regions: tuple[Region, Region, Region, Region],
-        seams: tuple[Seam, ...] = (),
-        pressed: bool = True,
+        joints: GapJoints = PLAINLY_PRESSED,
     ) -> Interface:
         roles = [below.role, *(mask.role for mask in masks), above.role]
         kind: InterfaceKind = "bond"
-        if not pressed or masks:
-            (is_chamber,) = chamber_gaps(roles, [(1, len(roles))] if seams else ()).values()
+        if not joints.pressed or masks:
+            seams = [(1, len(roles))] if joints.seams else ()
+            (is_chamber,) = chamber_gaps(roles, seams).values()
             kind = "chamber" if is_chamber else "separator"
-        return Interface(index, kind, below, above, tuple(masks), *regions, seams, pressed)
+        return Interface(index, kind, below, above, tuple(masks), *regions, *joints)
+
+    @property
+    def fold_lines(self) -> tuple[tuple[Point, Point], ...]:
+        """Lines on which one film goes on from below to above."""
+        return tuple(fold.line for fold in self.folds)
+
+    @cached_attribute
+    def whole_bond(self) -> Region:
+        """The bond, and that of the unfolded film beyond each fold, where it has no edge."""
+        beyond = [unfolded(self.bond, [line]) for line in self.fold_lines]
+        return union([self.bond, *beyond]) if beyond else self.bond
 
     @property
     def masked(self) -> Region:
@@ -461,6 +481,7 @@ class Interface:
             self.above.pattern,
             *(f"{seam.width} {seam.tool} {seam.path}" for seam in self.seams),
             *(() if self.pressed else ("not pressed",)),
+            *(f"folded at {line}" for line in self.fold_lines),
         )
 
 
@@ -474,17 +495,18 @@ def interface_regions(
 
 
 def joined_regions(
-    regions: tuple[Region, Region, Region, Region], seams: Sequence[Seam], is_pressed: bool
+    regions: tuple[Region, Region, Region, Region], joints: GapJoints
 ) -> tuple[Region, Region, Region, Region]:
-    """The regions of an interface, bonded by ``seams`` as well, or by them alone.
+    """The regions of an interface, bonded by seams alone if it is not pressed.
 
     No seam bonds through a mask.
     """
-    mask, contact, bond, _ = regions
-    if is_pressed or not seams:
-        return regions if is_pressed else (mask, contact, NOTHING, contact)
-    bond, _ = divided(contact, mask)
-    bond = bond & union([seam.region for seam in seams])
+    if joints.pressed:
+        return regions
+    mask, contact, bare, _ = regions
+    if not joints.seams:
+        return mask, contact, NOTHING, contact
+    bond = bare & union([seam.region for seam in joints.seams])
     return mask, contact, bond, contact - bond
 
 

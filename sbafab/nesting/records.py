@@ -150,6 +150,8 @@ def parts_of(
         return ()
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
+        if laminate.cut_with(layers[0]) != layers[0].index:
+            continue
         needed = len(layers) * copies
         layers_cut = needed + spares(needed)
         by_form: dict[Region, list[int]] = {}

@@ -502,7 +502,8 @@ def _films(laminate: Laminate, sheets: Sequence[SheetFile]) -> tuple[FilmClaim, 
 
 def _layer(plan: DesignPlan, layer: Layer) -> LayerClaim:
     kerf = plan.settings.kerf_width(layer.film.material)
-    bores = plan.checked.laminate.bores
+    laminate = plan.checked.laminate
+    bores, cut = laminate.bores, laminate.layer(laminate.cut_with(layer))
     return LayerClaim(
         index=layer.index,
         name=layer.name,
@@ -511,7 +512,7 @@ def _layer(plan: DesignPlan, layer: Layer) -> LayerClaim:
         balloon=layer.balloon,
         thickness=layer.film.thickness,
         z=layer.z,
-        file=layer_path(layer.name, kerf) if "cut" in plan.wanted else None,
+        file=layer_path(cut.name, kerf) if "cut" in plan.wanted else None,
         pattern=layer.pattern,
         area=round(layer.profile.area, 6),
         pieces=len(layer.profile.pieces),

@@ -24,7 +24,6 @@ from sbafab.laminate.assembly import (
 )
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
-from sbafab.laminate.joining import is_only_pressed, joinings
 from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up
@@ -568,15 +567,15 @@ def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
 
 def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
     """Yield the folds of a laminate, in order."""
-    for joining in () if is_only_pressed(laminate) else joinings(laminate):
-        fold = joining.fold
-        if fold is None:
+    for step in laying(laminate):
+        fold = None if step.joining is None else step.joining.fold
+        if step.joining is None or fold is None:
             continue
         (x, y), (u, v) = fold.line
         masks = tuple(range(fold.lower + 1, fold.upper))
         laid = f", {layers_in_words(masks)} on its half {fold.lower}" if masks else ""
         yield FoldStep(
-            step=joining.number,
+            step=step.number,
             title=f"Fold of layers {fold.lower} and {fold.upper}",
             layers=(fold.lower, fold.upper),
             line_mm=fold.line,
@@ -584,7 +583,7 @@ def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:
                 f"Lay the film flat{laid}, and fold half {fold.upper} over along the line from "
                 f"x {x:g}, y {y:g} to x {u:g}, y {v:g}."
             ),
-            reason=joining.reason,
+            reason=step.joining.reason,
         )
 
 

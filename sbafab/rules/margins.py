@@ -269,7 +269,7 @@ def narrow_places(
     # Of one bond all interfaces ask for the same places.
     widest: dict[Region, float] = {}
     for group, slack in zip(groups, slacks, strict=True):
-        bond = group.interfaces[0].bond
+        bond = group.interfaces[0].whole_bond
         widest[bond] = max(slack, widest.get(bond, 0.0))
     queries: list[tuple[int, Quantity, BondQuery | OverhangQuery]] = []
     flush = limits.mask_overhang
@@ -279,7 +279,7 @@ def narrow_places(
             continue
         profiles = profiles_of(interface)
         if group.bond is not None:
-            bond = interface.bond
+            bond = interface.whole_bond
             queries.append(
                 (number, "bond", BondQuery(bond, group.bond, slack, widest[bond], profiles))
             )

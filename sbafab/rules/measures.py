@@ -10,6 +10,7 @@ from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.folding import lies_on
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
 from sbafab.rules.freedoms import Freedoms, Laid, freedoms, lay_up
@@ -56,11 +57,14 @@ class Measures:
 
     def bond(self, interface: Interface) -> Width | None:
         """Return the least width of an interface's bond; None without a bond or facing edges."""
-        return self._bond(interface.bond)
+        return self._bond(interface.whole_bond)
 
     def reaches(self, interface: Interface) -> tuple[tuple[Edge, Reach], ...]:
         """Return film edges that bound unbonded film, each with its distance to the mask's edge."""
-        return self._reaches(interface.masked, interface.contact, interface.mask)
+        reaches = self._reaches(interface.masked, interface.contact, interface.mask)
+        if not interface.folds:
+            return reaches
+        return tuple(pair for pair in reaches if not lies_on(pair[0], interface.fold_lines))
 
     @cached_property
     def moves(self) -> Freedoms:

@@ -18,6 +18,7 @@ from sbafab.geometry.contour import in_reading_order, tidy
 from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle, union
+from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
 from sbafab.rules.boundary import beside, edges_along
@@ -104,7 +105,9 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     for interface in laminate.interfaces:
         gap = gaps.get(interface.pattern)
         if gap is None:
-            gap = gaps[interface.pattern] = _gap(interface.unbonded, interface.contact, frame)
+            gap = gaps[interface.pattern] = _gap(
+                interface.unbonded, interface.contact, frame, interface.fold_lines
+            )
         missing = [_missing(interface, home, gap) for home in range(len(gap.missing))]
         inlets = {
             number: inlet
@@ -171,7 +174,9 @@ def _tube_in(
 
 
 @cached
-def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
+def _gap(
+    unbonded: Region, contact: Region, frame: Region, folds: tuple[tuple[Point, Point], ...]
+) -> _Gap:
     pieces = unbonded.pieces
     missing = _around(contact, frame).pieces
     touching: list[tuple[int, int, Point]] = []
@@ -180,6 +185,9 @@ def _gap(unbonded: Region, contact: Region, frame: Region) -> _Gap:
     before: Edge | None = None
     number = home = 0
     for edge in edges_along(unbonded, contact):
+        if lies_on(edge, folds):
+            # Film goes on there: a fold leaks nothing.
+            continue
         p = edge.at(0.5)
         if not (goes_on and _follows(before, edge)):
             home = _holding(missing, beside(edge, -INSET))

@@ -24,7 +24,7 @@ from sbafab.pressing.cycles import batch_times
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
-from sbafab.reports.traveller.shapes import thumbnail
+from sbafab.reports.traveller.shapes import flat_shape, thumbnail
 from sbafab.reports.underlay import PAPER, leaves
 
 
@@ -126,13 +126,22 @@ class Cut:
 
 
 def cut_list(work: Work) -> list[Cut]:
-    """Return every pattern once, in the order of its first layer."""
-    return [_cut(work, layers) for layers in work.laminate.patterns.values()]
+    """Return every pattern that is cut once, in the order of its first layer."""
+    return [
+        _cut(work, layers)
+        for layers in work.laminate.patterns.values()
+        if work.laminate.cut_with(layers[0]) == layers[0].index
+    ]
 
 
 def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
     first = layers[0]
-    profile = first.profile
+    folded = [
+        layer for layer in work.laminate.layers if work.laminate.cut_with(layer) == first.index
+    ]
+    profile = work.laminate.first_cut(first) if len(folded) > 1 else first.profile
+    shape = flat_shape(first.pattern) if len(folded) > 1 else first.pattern
+    layers = (*layers, *(layer for layer in folded if layer is not first))
     name = work.design.name
     holding = [
         sheet.path.rpartition("/")[2].removesuffix(".dxf")
@@ -141,12 +150,12 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
     ]
     return Cut(
         first.pattern,
-        thumbnail(f"thumb-{first.pattern}", first.pattern, first.film, profile.bounds),
+        thumbnail(f"thumb-{first.pattern}", shape, first.film, profile.bounds),
         first.film.material,
         ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
         layer_numbers([layer.index for layer in layers]),
-        len(layers) * work.job.copies,
-        _spares(work, layers),
+        (len(layers) - len(folded) + 1) * work.job.copies,
+        _spares(work, layers[: len(layers) - len(folded) + 1]),
         len(profile.pieces),
         _cut_length(work, first),
         ", ".join(holding),
@@ -158,7 +167,8 @@ def _cut_length(work: Work, layer: Layer) -> float:
 
     Equal pieces are one part of a nest, cut as many times more.
     """
-    profile = layer.profile
+    laminate = work.laminate
+    profile = laminate.first_cut(layer) if laminate.folds else layer.profile
     parts = {
         part.piece: part
         for sheet in work.sheets

@@ -97,7 +97,7 @@ def context(work: Work) -> dict[str, Any]:
         "batch": batch_page(work),
         "step_pages": process.step_pages(work),
         "joint_pages": joint_pages(work),
-        "turned": layer_numbers([layer.index for layer in laminate.layers if layer.turned]),
+        "turned": _turned(laminate),
         "taking_down": order_of(work.schedule.steps) if work.schedule.steps else None,
         "finishing": process.finishing(work),
         "tubing": process.tubing(work),
@@ -110,6 +110,12 @@ def context(work: Work) -> dict[str, Any]:
         "expected_sizes": bill.expected_sizes(work),
         **panel.chapter(work),
     }
+
+
+def _turned(laminate: Laminate) -> str:
+    """Return the layers that are cut upper face down, by number."""
+    roots = {laminate.cut_with(layer) for layer in laminate.layers if layer.turned}
+    return layer_numbers([index for index in sorted(roots) if laminate.layer(index).turned])
 
 
 def _force_notes(work: Work) -> tuple[str, ...]:

@@ -176,13 +176,17 @@ def _actions(
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
-        f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, nothing is folded, no "
+        f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, {_flat(laminate)}no "
         f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})"
         + (", every pin reaches through the highest layer with its hole." if part.pins else ".")
     )
     yield Action(COVER)
     cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
     yield closing(step, work.schedule.heating, cycles if 1 < len(cycles) <= MOST_LINES else ())
+
+
+def _flat(laminate: Laminate) -> str:
+    return "" if laminate.folds else "nothing is folded, "
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:

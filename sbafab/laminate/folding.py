@@ -1,0 +1,115 @@
+"""Folded films: the flat part that two or more layers are cut as, and its halves read back.
+
+The part lies as its lowest layer does; each further layer is turned over about its fold line.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from sbafab.geometry.contour import Similarity
+from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.region import Region, polygon, union
+from sbafab.laminate.joints import Fold
+
+ON_LINE = 1e-5
+"""mm within which an edge lies on a fold line."""
+FAR = 1e4
+"""mm: farther than any part reaches from a fold."""
+
+
+def fold_roots(folds: Iterable[Fold]) -> dict[int, int]:
+    """Return, by index, the layer that each folded one is cut with, the lowest of its film."""
+    roots: dict[int, int] = {}
+    for fold in sorted(folds, key=lambda fold: fold.lower):
+        roots[fold.upper] = roots.get(fold.lower, fold.lower)
+    return roots
+
+
+def flat_part(layer: int, folds: Sequence[Fold], profiles: Sequence[Region]) -> Region:
+    """Return the part that a layer is cut as: its profile, and those of all that fold onto it.
+
+    ``profiles`` are those of all layers, bottom to top.
+    """
+    return union(
+        unfolded(profiles[index - 1], lines) for index, lines in _members(layer, folds).items()
+    )
+
+
+def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]:
+    """Return the layers that a flat part folds into, by index, each as it lies when folded.
+
+    Folded layers lie on the left of their fold lines (``toward``).
+    """
+    members = _members(layer, folds)
+    rest = part
+    regions: dict[int, Region] = {}
+    for index, lines in members.items():
+        mine = rest
+        upper = next(
+            (fold for fold in folds if fold.lower == index and fold.upper in members), None
+        )
+        if upper is not None:
+            # What lies beyond the next fold line belongs to the layers above.
+            side = _side(upper.line, lines)
+            rest, mine = rest - side, rest & side
+        regions[index] = unfolded(mine, lines[::-1])
+    return regions
+
+
+def _members(layer: int, folds: Sequence[Fold]) -> dict[int, list[tuple[Point, Point]]]:
+    """The layers of a part, lowest first, with the lines that each is unfolded about in turn."""
+    members: dict[int, list[tuple[Point, Point]]] = {layer: []}
+    for fold in sorted(folds, key=lambda fold: fold.lower):
+        if fold.lower in members:
+            members[fold.upper] = [fold.line, *members[fold.lower]]
+    return members
+
+
+def unfolded(region: Region, lines: Iterable[tuple[Point, Point]]) -> Region:
+    """Return a region turned over about lines, one after the other."""
+    for line in lines:
+        region = region.mapped(_reflection(line), 1.0, True)
+    return region
+
+
+def _reflection(line: tuple[Point, Point]) -> Similarity:
+    (x0, y0), (x1, y1) = line
+    length = math.dist(*line)
+    ux, uy = (x1 - x0) / length, (y1 - y0) / length
+
+    def reflected(p: Point) -> Point:
+        across = 2 * ((p[0] - x0) * -uy + (p[1] - y0) * ux)
+        return p[0] + across * uy, p[1] - across * ux
+
+    return reflected
+
+
+def _side(line: tuple[Point, Point], lines: Iterable[tuple[Point, Point]]) -> Region:
+    """The half of the plane to the left of a line, as far as parts reach, unfolded."""
+    (x0, y0), (x1, y1) = line
+    length = math.dist(*line)
+    ux, uy = (x1 - x0) / length * FAR, (y1 - y0) / length * FAR
+    start, end = (x0 - ux, y0 - uy), (x0 + ux, y0 + uy)
+    corners = [start, end, (end[0] - uy, end[1] + ux), (start[0] - uy, start[1] + ux)]
+    return unfolded(polygon(corners), lines)
+
+
+def lies_on(edge: Edge, lines: Iterable[tuple[Point, Point]]) -> bool:
+    """Return True if an edge lies on one of the lines."""
+    return isinstance(edge, Line) and any(
+        max(abs(distance_from(line, p)) for p in (edge.start, edge.end)) < ON_LINE for line in lines
+    )
+
+
+def distance_from(line: tuple[Point, Point], p: Point) -> float:
+    """Return the distance of a point from a line through two points, more than 0 on its left."""
+    (x0, y0), (x1, y1) = line
+    return ((x1 - x0) * (p[1] - y0) - (y1 - y0) * (p[0] - x0)) / math.dist(*line)
+
+
+def toward(line: tuple[Point, Point], region: Region) -> tuple[Point, Point]:
+    """Return the line in the direction that has most of a region on its left."""
+    ends = [distance_from(line, edge.start) for edge in region.edges]
+    return line if max(ends, default=0.0) >= -min(ends, default=0.0) else (line[1], line[0])
