@@ -23,7 +23,8 @@ OUTLINE = "outline"
 def read_drawing(path: Path, layer: str | None = None) -> Region:
     """Return all that the closed contours of a drawing enclose, where they lie in it, mm.
 
-    Contours are nested by the even-odd rule: one inside another is a hole. ``layer`` names a layer
+    Contours are nested by the even-odd rule: one inside another is a hole. What a DXF file has on
+    layers that are not plotted does not count unless it is named. ``layer`` names a layer
     of a DXF file, a group of an SVG file by its label or id, or a pattern of a ``laminate.json``.
     Units are read as those of an outline. Raises DesignError, which names the file and the place.
     """
@@ -40,7 +41,7 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
 @lru_cache(maxsize=64)
 def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
     """The region of a file that holds this; a run asks for it more than once."""
-    strands = list(counted(traced(path, layer).strands, MOST_OF_ENTITY))
+    strands = list(counted(traced(path, layer, is_plot=True).strands, MOST_OF_ENTITY))
     loops = [sealed(loop) for loop in closed_loops(strands)]
     for loop in loops:
         refuse_crossings(loop)

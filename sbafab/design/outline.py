@@ -97,11 +97,14 @@ def content(path: Path) -> bytes:
     return text
 
 
-def traced(path: Path, layer: str | None = None) -> Traced:
-    """Return the strands of a DXF or SVG file, or of one of its layers. Raises DesignError."""
+def traced(path: Path, layer: str | None = None, is_plot: bool = False) -> Traced:
+    """Return the strands of a DXF or SVG file, or of one of its layers. Raises DesignError.
+
+    ``is_plot``: layers of a DXF file that are not plotted count only where one is named.
+    """
     # Each reader brings its own library, loaded for the format at hand only.
     if path.suffix.lower() == ".dxf":
-        return dxf_strands(path, layer)
+        return dxf_strands(path, layer, is_plot)
     if path.suffix.lower() == ".svg":
         from sbafab.design.outline_svg import svg_strands
 
@@ -235,11 +238,12 @@ MOST_ITEMS = 20_000
 """Entities, table entries and flags of a drawing; the reader's time grows faster than these."""
 
 
-def dxf_strands(path: Path, layer: str | None = None) -> Traced:
+def dxf_strands(path: Path, layer: str | None = None, is_plot: bool = False) -> Traced:
     """Every line, arc, circle, polyline, ellipse and spline that the model space shows.
 
     They must lie in one plane at one height. Only what lies on ``layer`` counts where that is
-    given. Raises DesignError, also for what draws by other means, such as block references.
+    given, and else, of a plot, what lies on layers that are plotted. Raises DesignError, also for
+    what draws by other means, such as block references.
     """
     content = path.read_bytes()
     _refuse_excess(content)
@@ -252,11 +256,11 @@ def dxf_strands(path: Path, layer: str | None = None) -> Traced:
             f"has $INSUNITS {unit}; save it in millimetres (4), centimetres (5), metres (6) or "
             "inches (1)"
         )
-    return Traced(_strands(drawing, space, MM_PER_UNIT[unit], layer), SCALES[unit])
+    return Traced(_strands(drawing, space, MM_PER_UNIT[unit], layer, is_plot), SCALES[unit])
 
 
 def _strands(
-    drawing: Drawing, space: Modelspace, factor: float, layer: str | None
+    drawing: Drawing, space: Modelspace, factor: float, layer: str | None, is_plot: bool
 ) -> Iterator[Strand]:
     level: float | None = None
     drawn = [entity for entity in space if entity.dxftype() not in NO_PATHS]
@@ -265,6 +269,8 @@ def _strands(
         if not on_layer:
             raise nothing_on(layer, sorted({_layer_of(entity) for entity in drawn}))
         drawn = on_layer
+    elif is_plot:
+        drawn = [entity for entity in drawn if _is_plotted(_layer_of(entity), drawing)]
     shown = [entity for entity in drawn if _is_shown(entity, drawing)]
     if drawn and not shown:
         raise DesignError("holds hidden entities only; thaw and switch on the outline's layer")
@@ -287,6 +293,10 @@ def _strands(
 
 def _layer_of(entity: Any) -> str:
     return str(entity.dxf.get("layer", "0")) if entity.dxf.is_supported("layer") else "0"
+
+
+def _is_plotted(layer: str, drawing: Drawing) -> bool:
+    return layer not in drawing.layers or bool(drawing.layers.get(layer).dxf.get("plot", 1))
 
 
 def _is_shown(entity: Any, drawing: Drawing) -> bool:

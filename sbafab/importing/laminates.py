@@ -111,6 +111,9 @@ def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
         for key in Design.model_fields
         if key in rest and key not in OF_FAMILIES and rest[key] != {}
     }
+    if "films" in shared:
+        # Another product has none of the defaults, so that its table is whole.
+        shared["films"] = {name: plain_tables(design)["films"][name] for name in shared["films"]}
     if "inlet" in shared:
         shared["inlet"] = {k: v for k, v in shared["inlet"].items() if k in Inlets.model_fields}
     return {**shared, "name": laminate.name, "family": "drawn", "kit": design.kit}

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import LAYERS, import_table
+from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.records import Imported
 from sbafab.laminate.laminate_validator import SCHEMA
 
@@ -57,4 +58,5 @@ FORMATS = (
     SourceFormat(f"a folder of drawings with {LAYERS}", _has_table, import_table),
     SourceFormat("an output folder, with its design.toml", _has_design, import_folder),
     SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
+    SourceFormat("a circuit in ParchMint JSON", _holds('"components"'), import_parchmint),
 )

@@ -10,11 +10,13 @@ from typing import Any
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc
 from sbafab.laminate.laminate_file import FILE, laminate_json
 from tests.design.drawing import dxf, svg
+from tests.design.test_outline import same_shape
 
 PLATE = [(-20, -10), (20, -10), (20, 10), (-20, 10)]
 
@@ -42,6 +44,26 @@ def test_contours_are_nested_where_they_lie(tmp_path: Path) -> None:
 )
 def test_a_layer_of_a_dxf_is_read_alone(layer: str, area: float, tmp_path: Path) -> None:
     assert read_drawing(dxf(tmp_path, plate), layer).area == pytest.approx(area)
+
+
+def test_what_is_not_plotted_counts_only_by_name(tmp_path: Path) -> None:
+    def draw(space: Any) -> None:
+        space.doc.layers.add("REFERENCE", plot=False)
+        space.add_line((-1, 0), (1, 0), dxfattribs={"layer": "REFERENCE"})
+        space.add_circle((0, 0), 2)
+
+    path = dxf(tmp_path, draw)
+    assert read_drawing(path).area == pytest.approx(4 * math.pi)
+    with pytest.raises(DesignError, match="is open: a gap of 2"):
+        read_drawing(path, "REFERENCE")
+
+
+def test_a_cut_file_of_ours_is_read_back(tmp_path: Path) -> None:
+    laminate = build(load_design("3dof-15mm"))
+    for layer in laminate.layers[:4]:
+        path = tmp_path / "layer.dxf"
+        path.write_text(dxf_text(layer.profile.contours, {}), encoding="utf-8")
+        assert same_shape(read_drawing(path), layer.profile)
 
 
 GROUPS = """

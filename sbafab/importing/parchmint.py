@@ -1,0 +1,551 @@
+"""Circuits in ParchMint JSON (3DuF, Neptune) as designs of drawn layers, with their nets.
+
+Every layer of a circuit becomes a mask between two films: its channels, and its components as they
+are outlined. Ports of the circuit are holes in the outer films; what the circuit connects is a net.
+Lengths of the file are um, y runs down, and a component's place is its upper left corner.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sbafab.cutting.dxf_write import dxf_text
+from sbafab.design.files import shown
+from sbafab.errors import DesignError
+from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.offset import swept
+from sbafab.geometry.region import Region, disc, rectangle, union
+from sbafab.importing.records import Imported, file_name, key_name, named, read_text
+
+MM = 0.001
+"""mm to a unit of the file."""
+MARGIN = 3.0
+"""Film past everything that is drawn, mm."""
+OVERHANG = 0.5
+"""Mask past the hole of a port, mm, where its disc is that large."""
+LEAST_HOLE = 0.2
+MOST_BYTES = 20_000_000
+FARTHEST = 2_000_000.0
+"""No coordinate may be larger, um."""
+UNPLACED = (-1, -1)
+PORT, VIA = "PORT", "VIA"
+ROUND = {PORT: "portRadius", VIA: "radius", "VALVE3D": "valveRadius"}
+"""Components that are discs, and the parameter that is their radius."""
+PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
+"""Components whose outline is all that matters; of others the inside is not drawn."""
+NO_MASK = "INTEGRATION"
+"""Type of layers that hold electrodes and the like, and no channels."""
+
+
+class Spot(NamedTuple):
+    """A component or connection on a layer, by ids: what joins others there."""
+
+    layer: str
+    id: str
+
+
+@dataclass(frozen=True)
+class Component:
+    """A component: upper left corner, width and height, um; ``radius`` of those that are discs.
+
+    ``ports`` are offsets of its terminals by label, from the corner.
+    """
+
+    id: str
+    entity: str
+    layers: tuple[str, ...]
+    corner: Point
+    span: Point
+    radius: float | None
+    ports: Mapping[str, Point]
+
+    @property
+    def centre(self) -> Point:
+        return self.corner[0] + self.span[0] / 2, self.corner[1] + self.span[1] / 2
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A channel on one layer: its terminals' components, routes of points and width, um."""
+
+    id: str
+    layer: str
+    components: tuple[str, ...]
+    routes: tuple[tuple[Point, ...], ...]
+    width: float
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """A circuit as it is placed and routed; ``layers`` go bottom to top, by id."""
+
+    name: str
+    layers: tuple[str, ...]
+    titles: Mapping[str, str]
+    components: Mapping[str, Component]
+    connections: tuple[Connection, ...]
+    remarks: tuple[str, ...] = field(default=())
+
+
+def import_parchmint(path: Path) -> Imported:
+    """Return the design of a placed and routed circuit. Raises DesignError with the place."""
+    try:
+        document = json.loads(read_text(path, MOST_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise DesignError(f"{path} is no JSON: {error}; save it again") from None
+    try:
+        circuit = read_circuit(document, path.stem)
+        return _design(circuit)
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from None
+
+
+# Reading: every value is looked up with its place in the file.
+
+
+class Node(NamedTuple):
+    """A value of the document, and its place there."""
+
+    value: Any
+    place: str
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of a key of an object, None if it is not there or null."""
+        if not isinstance(self.value, dict):
+            raise DesignError(f"{self.place} is no object; export the circuit again")
+        value = self.value.get(key)
+        return None if value is None else Node(value, f"{self.place}.{key}".lstrip("."))
+
+    def need(self, key: str) -> Node:
+        """Return the value of a key. Raises DesignError if it is not there."""
+        node = self.get(key)
+        if node is None:
+            raise DesignError(f"{self.place or 'the file'} has no {key}; export the circuit again")
+        return node
+
+    def items(self) -> list[Node]:
+        if not isinstance(self.value, list):
+            raise DesignError(f"{self.place} is no list; export the circuit again")
+        return [Node(value, f"{self.place}[{i}]") for i, value in enumerate(self.value)]
+
+    @property
+    def text(self) -> str:
+        if not isinstance(self.value, str | int):
+            raise DesignError(f"{self.place} is {shown(self.value)}, which is no text")
+        return str(self.value)
+
+    @property
+    def number(self) -> float:
+        value = self.value
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise DesignError(f"{self.place} is {shown(value)}, which is no number")
+        if not abs(value) <= FARTHEST:
+            raise DesignError(
+                f"{self.place} is {value:g} um, where at most {FARTHEST:g} is allowed"
+            )
+        return float(value)
+
+    @property
+    def point(self) -> Point:
+        """A point as [x, y] or as an object with x and y."""
+        if isinstance(self.value, dict):
+            return self.need("x").number, self.need("y").number
+        pair = self.items()
+        if len(pair) != 2:
+            raise DesignError(f"{self.place} is no point of two numbers")
+        return pair[0].number, pair[1].number
+
+
+def read_circuit(document: Any, stem: str) -> Circuit:
+    """Return the circuit of a document. Raises DesignError, which names the place in it."""
+    root = Node(document, "")
+    remarks: list[str] = []
+    rows = [(row, _kind(row)) for row in root.need("layers").items()]
+    order = sorted(rows, key=lambda entry: _group(entry[0]))
+    titles = {row.need("id").text: _title(row) for row, kind in order if kind != NO_MASK}
+    skipped = [f"layer {_title(row)}" for row, kind in rows if kind == NO_MASK]
+    remarks += named("holds no channels; it is not imported", skipped)
+    if not titles:
+        raise DesignError("layers holds no layer with channels; export the circuit again")
+    placed = _placed_features(root)
+    _refuse_unplaced(root, placed)
+    components: dict[str, Component] = {}
+    for row in root.need("components").items():
+        component = _component(row, titles, placed, remarks)
+        if component is not None:
+            components[component.id] = component
+    routes = _routed_features(root)
+    connections = [
+        _connection(row, titles, components, routes) for row in root.need("connections").items()
+    ]
+    name = root.get("name")
+    return Circuit(
+        file_name(name.text if name is not None else stem, file_name(stem)),
+        tuple(titles),
+        titles,
+        components,
+        tuple(connections),
+        tuple(remarks),
+    )
+
+
+def _refuse_unplaced(root: Node, placed: Mapping[str, object]) -> None:
+    """Raises DesignError for a netlist alone: its components all lie on one spot, or nowhere."""
+    rows = [row for row in root.need("components").items() if row.need("id").text not in placed]
+    params = [row.get("params") for row in rows]
+    positions = {str(p and (at := p.get("position")) and at.value) for p in params}
+    if len(rows) > 1 and len(positions) == 1:
+        raise DesignError(
+            f"none of the {len(rows)} components has a place of its own (params.position, or a "
+            "feature with its location); place and route the circuit first"
+        )
+
+
+def _kind(row: Node) -> str:
+    kind = row.get("type")
+    return kind.text.upper() if kind is not None else "FLOW"
+
+
+def _group(row: Node) -> int:
+    group = row.get("group")
+    text = group.text if group is not None else "0"
+    return int(text) if text.isdecimal() else 0
+
+
+def _title(row: Node) -> str:
+    name = row.get("name")
+    return name.text if name is not None else row.need("id").text
+
+
+def _placed_features(root: Node) -> dict[str, tuple[Point, Point]]:
+    """Corner and span of components, um, where the circuit has them as features."""
+    features = root.get("features")
+    placed = {}
+    for row in features.items() if features is not None else ():
+        location = row.get("location")
+        if location is not None:
+            span = row.need("x-span").number, row.need("y-span").number
+            placed[row.need("id").text] = (location.point, span)
+    return placed
+
+
+def _routed_features(root: Node) -> dict[str, list[tuple[Point, Point, float]]]:
+    """Straight channels of connections, um, where the circuit has them as features."""
+    features = root.get("features")
+    routed: dict[str, list[tuple[Point, Point, float]]] = {}
+    for row in features.items() if features is not None else ():
+        connection = row.get("connection")
+        if connection is not None:
+            segment = row.need("source").point, row.need("sink").point, row.need("width").number
+            routed.setdefault(connection.text, []).append(segment)
+    return routed
+
+
+def _component(
+    row: Node,
+    titles: Mapping[str, str],
+    placed: Mapping[str, tuple[Point, Point]],
+    remarks: list[str],
+) -> Component | None:
+    """A component, or None for one that lies on no layer with channels."""
+    name, entity = row.need("id").text, row.need("entity").text.upper()
+    here = f"component {name} ({entity}, {row.place})"
+    layers = tuple(layer.text for layer in row.need("layers").items())
+    on_masks = tuple(layer for layer in layers if layer in titles)
+    if not on_masks:
+        remarks.append(f"{here}: lies on no layer with channels; it is not imported")
+        return None
+    corner, span = _place(row, name, placed, here)
+    if min(span) < 0 or (max(span) <= 0 and entity != "NODE"):
+        raise DesignError(
+            f"{here} has no size (x-span, y-span), for its kind was not known to what wrote the "
+            "file; give it one, or leave it out"
+        )
+    if entity not in PLAIN:
+        remarks.append(
+            f"{here}: drawn as its box of {span[0]:g} x {span[1]:g} um at x {corner[0]:g}, "
+            f"y {corner[1]:g}; what is inside is not drawn"
+        )
+    return Component(name, entity, on_masks, corner, span, _radius(row, entity), _terminals(row))
+
+
+def _place(
+    row: Node, name: str, placed: Mapping[str, tuple[Point, Point]], here: str
+) -> tuple[Point, Point]:
+    if name in placed:
+        return placed[name]
+    params = row.get("params")
+    position = params.get("position") if params is not None else None
+    if position is None or position.value == list(UNPLACED):
+        raise DesignError(
+            f"{here} has no place (params.position, or a feature with its location); place and "
+            "route the circuit first"
+        )
+    spans = [row.get(key) for key in ("x-span", "y-span")]
+    if None in spans and params is not None:
+        spans = [params.get(key) for key in ("width", "length")]
+    x, y = (0.0 if span is None else span.number for span in spans)
+    return position.point, (x, y)
+
+
+def _radius(row: Node, entity: str) -> float | None:
+    params = row.get("params")
+    radius = params.get(ROUND[entity]) if params is not None and entity in ROUND else None
+    return radius.number if radius is not None else None
+
+
+def _terminals(row: Node) -> dict[str, Point]:
+    ports = row.get("ports")
+    return {
+        port.need("label").text: (port.need("x").number, port.need("y").number)
+        for port in (ports.items() if ports is not None else ())
+    }
+
+
+def _connection(
+    row: Node,
+    titles: Mapping[str, str],
+    components: Mapping[str, Component],
+    routed: Mapping[str, list[tuple[Point, Point, float]]],
+) -> Connection:
+    name, layer = row.need("id").text, row.need("layer").text
+    here = f"connection {name} ({row.place})"
+    if layer not in titles:
+        raise DesignError(f"{here} lies on a layer {shown(layer)} that has no channels")
+    terminals = [row.need("source"), *row.need("sinks").items()]
+    joined = tuple(terminal.need("component").text for terminal in terminals)
+    strange = next((component for component in joined if component not in components), None)
+    if strange is not None:
+        raise DesignError(f"{here} names a component {shown(strange)} that is not there")
+    if name in routed:
+        segments = routed[name]
+        widths = {width for _, _, width in segments}
+        if len(widths) > 1:
+            raise DesignError(f"{here} has segments of several widths; give it one")
+        return Connection(name, layer, joined, tuple((a, b) for a, b, _ in segments), widths.pop())
+    paths = row.get("paths")
+    routes = []
+    for path in paths.items() if paths is not None else ():
+        points = path.get("wayPoints")
+        if points is not None and points.items():
+            routes.append(tuple(point.point for point in points.items()))
+    if not routes:
+        raise DesignError(
+            f"{here} has no path (paths[].wayPoints, or features); route the circuit first"
+        )
+    params = row.get("params")
+    width = params and (params.get("channelWidth") or params.get("width"))
+    if not width or width.number <= 0:
+        raise DesignError(f"{here} has no width (params.channelWidth); add it, in um")
+    return Connection(name, layer, joined, tuple(routes), width.number)
+
+
+# The laminate of a circuit.
+
+
+class _Frame(NamedTuple):
+    """Takes points of the file to mm, y upward, with the middle of all at (0, 0)."""
+
+    middle: Point
+
+    def point(self, p: Point) -> Point:
+        x, y = (p[0] - self.middle[0]) * MM, (self.middle[1] - p[1]) * MM
+        return round(x, 6) + 0.0, round(y, 6) + 0.0
+
+
+def _design(circuit: Circuit) -> Imported:
+    frame = _Frame(_middle(circuit))
+    numbers = {layer: 2 * i + 2 for i, layer in enumerate(circuit.layers)}
+    top = 2 * len(circuit.layers) + 1
+    masks = {layer: _mask(circuit, layer, frame) for layer in circuit.layers}
+    empty = next((layer for layer, mask in masks.items() if mask.is_empty), None)
+    if empty is not None:
+        raise DesignError(f"layer {circuit.titles[empty]} holds nothing; delete it")
+    low_x, low_y, high_x, high_y = _box(masks.values())
+    plain = rectangle((low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN))
+    remarks = list(circuit.remarks)
+    holes, ports = _ports(circuit, frame, numbers, top, remarks)
+    films = {n: plain - union(holes.get(n, ())) for n in range(1, top + 1, 2)}
+
+    shapes: dict[str, dict[str, Any]] = {}
+    drawings: dict[str, bytes] = {}
+    names: dict[Region, str] = {}
+    layers = []
+    for number in range(1, top + 1):
+        layer = circuit.layers[number // 2 - 1] if number % 2 == 0 else None
+        region = films[number] if layer is None else masks[layer]
+        title = "film" if layer is None else circuit.titles[layer]
+        if region not in names:
+            names[region] = key_name(title, shapes, "layer-")
+            shapes[names[region]] = {"file": f"{names[region]}.dxf"}
+            drawings[f"{names[region]}.dxf"] = dxf_text(region.contours, {}).encode()
+        role = "chamber-mask" if layer is not None else _film_role(number, top)
+        row: dict[str, Any] = {"role": role, "shape": names[region]}
+        if len(region.pieces) > 1:
+            row["pieces"] = len(region.pieces)
+        layers.append(row)
+    tables: dict[str, Any] = {
+        "name": circuit.name,
+        "family": "drawn",
+        "layers": layers,
+        "ports": ports,
+        "shapes": shapes,
+        "nets": _nets(circuit),
+    }
+    remarks.append("films: a ParchMint file names none, so layers are of tpe and ptfe as in layup")
+    return Imported(tables, drawings, tuple(remarks))
+
+
+def _film_role(number: int, top: int) -> str:
+    return "base" if number == 1 else "cap" if number == top else "wall"
+
+
+def _middle(circuit: Circuit) -> Point:
+    """The middle of the box round all components and routes, um."""
+    points = [
+        (component.corner[0] + share * component.span[0], component.corner[1] + share * span)
+        for component in circuit.components.values()
+        for share in (0, 1)
+        for span in component.span[1:]
+    ]
+    points += [p for connection in circuit.connections for r in connection.routes for p in r]
+    if not points:
+        raise DesignError("components and connections are empty; there is nothing to import")
+    (xs, ys) = zip(*points, strict=True)
+    return round((min(xs) + max(xs)) / 2), round((min(ys) + max(ys)) / 2)
+
+
+def _box(regions: Iterable[Region]) -> tuple[float, float, float, float]:
+    boxes = [region.bounds for region in regions]
+    return (
+        min(box[0] for box in boxes),
+        min(box[1] for box in boxes),
+        max(box[2] for box in boxes),
+        max(box[3] for box in boxes),
+    )
+
+
+def _mask(circuit: Circuit, layer: str, frame: _Frame) -> Region:
+    """The channels and components of a layer."""
+    parts = [
+        _outline(component, frame)
+        for component in circuit.components.values()
+        if layer in component.layers and max(component.span) > 0
+    ]
+    for connection in circuit.connections:
+        if connection.layer == layer:
+            parts += [_channel(route, connection, frame) for route in connection.routes]
+    return union(part for part in parts if not part.is_empty)
+
+
+def _outline(component: Component, frame: _Frame) -> Region:
+    if component.radius is not None:
+        return disc(frame.point(component.centre), component.radius * MM)
+    (x, y), (across, down) = component.corner, component.span
+    if min(across, down) <= 0:
+        return Region()
+    return rectangle(frame.point((x, y + down)), frame.point((x + across, y)))
+
+
+def _channel(route: Sequence[Point], connection: Connection, frame: _Frame) -> Region:
+    points = [frame.point(p) for p in route]
+    lines = tuple(Line(a, b) for a, b in pairwise(points) if math.dist(a, b) > MM)
+    if not lines:
+        return disc(points[0], connection.width * MM / 2)
+    if math.dist(lines[0].start, lines[-1].end) > MM:
+        return swept(lines, connection.width * MM, True)
+    return union(swept((line,), connection.width * MM, True) for line in lines)
+
+
+def _ports(
+    circuit: Circuit,
+    frame: _Frame,
+    numbers: Mapping[str, int],
+    top: int,
+    remarks: list[str],
+) -> tuple[dict[int, list[Region]], list[dict[str, Any]]]:
+    """Holes by the film's number, and the ports: holes of tubes, and a place a component."""
+    holes: dict[int, list[Region]] = {}
+    rows = []
+    for (layer, name), label in _labels(circuit).items():
+        component, number = circuit.components[name], numbers[layer]
+        at = frame.point(component.centre)
+        row: dict[str, Any] = {"name": label, "layers": [number - 1, number + 1], "at": [*at]}
+        if component.entity == PORT and component.radius is not None:
+            if number + 1 == top or number == 2:
+                film = number + 1 if number + 1 == top else 1
+                holes.setdefault(film, []).append(disc(at, _hole(component.radius)))
+                row["kind"] = "hole"
+            else:
+                remarks.append(
+                    f"port {name} at x {component.centre[0]:g}, y {component.centre[1]:g}: lies "
+                    "between inner films, which no tube reaches; it has no hole"
+                )
+        rows.append(row)
+    for component in circuit.components.values():
+        between = sorted(numbers[layer] for layer in component.layers)
+        if component.entity == VIA and component.radius is not None and len(between) > 1:
+            for number in range(between[0] + 1, between[-1], 2):
+                hole = disc(frame.point(component.centre), _hole(component.radius))
+                holes.setdefault(number, []).append(hole)
+    return holes, rows
+
+
+def _hole(radius: float) -> float:
+    """Radius in mm of a hole that leaves one overhang of its mask's disc, where there is room."""
+    return max(radius * MM - OVERHANG, min(LEAST_HOLE, radius * MM / 2))
+
+
+def _spots(circuit: Circuit) -> Iterator[Spot]:
+    for component in circuit.components.values():
+        for layer in component.layers:
+            if max(component.span) > 0:
+                yield Spot(layer, component.id)
+
+
+def _labels(circuit: Circuit) -> dict[Spot, str]:
+    """The name of every component's place on a layer: its id, with the layer where it is on two."""
+    labels: dict[Spot, str] = {}
+    taken: set[str] = set()
+    for spot in _spots(circuit):
+        several = len(circuit.components[spot.id].layers) > 1
+        text = f"{spot.id}-{circuit.titles[spot.layer]}" if several else spot.id
+        stem = name = file_name(text, "port")
+        number = 1
+        while name in taken:
+            number += 1
+            name = f"{stem[:60]}-{number}"
+        taken.add(name)
+        labels[spot] = name
+    return labels
+
+
+def _nets(circuit: Circuit) -> dict[str, list[str]]:
+    """What connections join, component by component and layer by layer; vias join layers."""
+    labels = _labels(circuit)
+    home: dict[Spot, Spot] = {}
+
+    def root(spot: Spot) -> Spot:
+        while home.get(spot, spot) != spot:
+            spot = home[spot]
+        return spot
+
+    for connection in circuit.connections:
+        first, *others = (Spot(connection.layer, name) for name in connection.components)
+        for other in others:
+            home[root(other)] = root(first)
+    for component in circuit.components.values():
+        if component.entity == VIA:
+            first, *others = (Spot(layer, component.id) for layer in component.layers)
+            for other in others:
+                home[root(other)] = root(first)
+    groups: dict[Spot, list[str]] = {}
+    for spot, label in labels.items():
+        groups.setdefault(root(spot), []).append(label)
+    return {f"net{i}": members for i, members in enumerate(groups.values(), start=1)}
