@@ -1,0 +1,319 @@
+"""ParchMint circuits imported: masks by closed formulas, nets against a union of shapely's."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import os
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+
+from sbafab.errors import SbafabError
+from sbafab.importing.parchmint import import_parchmint
+from sbafab.importing.write import Written, write_imported
+from sbafab.rules.limits import Limits
+from sbafab.rules.nets import connectivity
+from tests.importing.conftest import Importing
+from tests.quick import few
+
+CIRCUITS = Path(os.environ.get("SBAFAB_PARCHMINT", "none"))
+"""A folder of circuits of others, placed and routed; none are kept here."""
+
+
+def component(name: str, entity: str, corner: list[int], span: int, layer: str) -> dict[str, Any]:
+    radius = {"PORT": {"portRadius": span / 2}, "VIA": {"radius": span / 2}}.get(entity, {})
+    return {
+        "id": name,
+        "name": name,
+        "entity": entity,
+        "layers": layer.split(),
+        "params": {"position": corner, **radius},
+        "ports": [{"label": "1", "layer": layer[:1], "x": span // 2, "y": span // 2}],
+        "x-span": span,
+        "y-span": span,
+    }
+
+
+def channel(name: str, layer: str, ends: list[str], points: list[list[int]]) -> dict[str, Any]:
+    source, *sinks = ({"component": end, "port": "1"} for end in ends)
+    return {
+        "id": name,
+        "name": name,
+        "layer": layer,
+        "source": source,
+        "sinks": sinks,
+        "params": {"channelWidth": 1000},
+        "paths": [{"source": source, "sink": sinks[0], "wayPoints": points}],
+    }
+
+
+def circuit() -> dict[str, Any]:
+    """Two channels of 20 mm on the flow layer; the first goes up through a via to a valve."""
+    return {
+        "name": "two channels",
+        "layers": [
+            {"id": "f", "name": "flow", "type": "FLOW", "group": "0"},
+            {"id": "c", "name": "control", "type": "CONTROL", "group": "0"},
+            {"id": "i", "name": "electrodes", "type": "INTEGRATION", "group": "0"},
+        ],
+        "components": [
+            component("in1", "PORT", [0, 0], 3000, "f"),
+            component("via1", "VIA", [20000, 0], 3000, "f c"),
+            component("in2", "PORT", [0, 10000], 3000, "f"),
+            component("tank", "REACTION CHAMBER", [20000, 10000], 3000, "f"),
+            component("valve", "VALVE", [20000, 20000], 3000, "c"),
+            component("pad", "PAD", [0, 0], 10, "i"),
+        ],
+        "connections": [
+            channel("a", "f", ["in1", "via1"], [[1500, 1500], [21500, 1500]]),
+            channel("b", "f", ["in2", "tank"], [[1500, 11500], [21500, 11500]]),
+            channel("c", "c", ["via1", "valve"], [[21500, 1500], [21500, 21500]]),
+        ],
+        "features": [],
+        "version": "1.2",
+    }
+
+
+def written(document: dict[str, Any], folder: Path) -> Written:
+    path = folder / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return write_imported(import_parchmint(path), folder / "again.toml", path.name)
+
+
+def test_layers_are_masks_between_films_with_the_channels_as_drawn(tmp_path: Path) -> None:
+    laminate = written(circuit(), tmp_path).laminate
+    roles = ["base", "chamber-mask", "wall", "chamber-mask", "cap"]
+    assert [layer.role for layer in laminate.layers] == roles
+    # A disc of 3 mm, from which a channel of 1 mm leaves: what it adds begins on the circle.
+    disc, half = math.pi * 1.5**2, math.asin(0.5 / 1.5)
+    within = 2 * 0.5 * 1.5 * math.cos(half) / 2 + 1.5**2 * half
+    free = 20 * 1.0 - 2 * within
+    # The chamber is a square of 3 mm, which holds 1.5 mm of its channel.
+    flow = 3 * disc + 9 + free + (20 - 1.5 - within)
+    control = disc + 9 + (20 - 1.5 - within)
+    assert laminate.layers[1].profile.area == pytest.approx(flow, rel=1e-9)
+    assert laminate.layers[3].profile.area == pytest.approx(control, rel=1e-9)
+    # y runs up here, and the middle of all lies at (0, 0).
+    assert laminate.layers[1].profile.bounds == pytest.approx((-11.5, -1.5, 11.5, 11.5))
+    holes = {layer.index: len(layer.profile.holes) for layer in laminate.layers}
+    assert holes == {1: 2, 2: 0, 3: 1, 4: 0, 5: 0}
+    assert laminate.layers[2].profile.holes[0].circle == ((10.0, 10.0), 1.0)
+    kinds = {port.name: port.kind for port in laminate.ports}
+    assert kinds["in1"] == kinds["in2"] == "hole"
+    assert kinds["tank"] == kinds["valve"] == kinds["via1-flow"] == "place"
+
+
+def test_the_nets_of_a_circuit_match_its_channels(tmp_path: Path) -> None:
+    laminate = written(circuit(), tmp_path).laminate
+    nets = {frozenset(net.ports) for net in laminate.nets}
+    assert nets == {
+        frozenset(("in1", "via1-flow", "via1-control", "valve")),
+        frozenset(("in2", "tank")),
+    }
+    assert connectivity(laminate, Limits()).faults == ()
+
+
+def rewired(document: dict[str, Any], points: list[list[int]]) -> dict[str, Any]:
+    document["connections"][1]["paths"][0]["wayPoints"] = points
+    return document
+
+
+def test_a_channel_that_crosses_another_is_a_short(tmp_path: Path) -> None:
+    crossing = [
+        [1500, 11500],
+        [10000, 11500],
+        [10000, 0],
+        [15000, 0],
+        [15000, 11500],
+        [21500, 11500],
+    ]
+    laminate = written(rewired(circuit(), crossing), tmp_path).laminate
+    assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"short"}
+
+
+def test_a_channel_that_ends_before_its_component_is_an_open(tmp_path: Path) -> None:
+    laminate = written(rewired(circuit(), [[1500, 11500], [18000, 11500]]), tmp_path).laminate
+    assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"open"}
+
+
+def test_places_and_channels_may_be_features(tmp_path: Path) -> None:
+    plain = written(circuit(), tmp_path).laminate
+    document = circuit()
+    for row in document["components"][:5]:
+        x, y = row["params"].pop("position")
+        feature = {"id": row["id"], "name": row["name"], "layer": "f", "location": {"x": x, "y": y}}
+        document["features"].append({**feature, "x-span": 3000, "y-span": 3000, "depth": 10})
+    for row in document["connections"]:
+        ((start, end),) = (path["wayPoints"] for path in row.pop("paths"))
+        (x0, y0), (x1, y1) = start, end
+        ends = {"source": {"x": x0, "y": y0}, "sink": {"x": x1, "y": y1}}
+        feature = {"id": f"of {row['id']}", "connection": row["id"], "layer": row["layer"]}
+        document["features"].append({**feature, **ends, "width": 1000, "type": "channel"})
+    (tmp_path / "features").mkdir()
+    again = written(document, tmp_path / "features").laminate
+    assert [layer.profile for layer in again.layers] == [layer.profile for layer in plain.layers]
+    assert again.nets == plain.nets
+
+
+def at(*keys: str | int) -> Callable[[dict[str, Any], object], None]:
+    def put(document: Any, value: object) -> None:
+        for key in keys[:-1]:
+            document = document[key]
+        if value is None:
+            del document[keys[-1]]
+        else:
+            document[keys[-1]] = value
+
+    return put
+
+
+REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = {
+    "no layers": (at("layers"), None, "the file has no layers"),
+    "no list": (at("components"), {}, "components is no list"),
+    "unplaced": (
+        at("components", 1, "params", "position"),
+        [-1, -1],
+        "component via1 (VIA, components[1]) has no place",
+    ),
+    "no size": (
+        at("components", 3, "x-span"),
+        -1,
+        "component tank (REACTION CHAMBER, components[3])",
+    ),
+    "text": (
+        at("components", 0, "x-span"),
+        "wide",
+        "components[0].x-span is 'wide', which is no n",
+    ),
+    "far": (at("components", 0, "x-span"), 1e9, "components[0].x-span is 1e+09 um, where at most"),
+    "unrouted": (
+        at("connections", 2, "paths"),
+        [],
+        "connection c (connections[2]) has no path (paths[].wayPoints, or features); route the",
+    ),
+    "no width": (at("connections", 0, "params"), {}, "connection a (connections[0]) has no width"),
+    "no layer": (at("connections", 0, "layer"), "x", "lies on a layer 'x' that has no channels"),
+    "no component": (
+        at("connections", 0, "source", "component"),
+        "in9",
+        "names a component 'in9' that is not there",
+    ),
+    "no point": (
+        at("connections", 0, "paths", 0, "wayPoints", 1),
+        [3],
+        "connections[0].paths[0].wayPoints[1] is no point of two numbers",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_drawn_is_named_at_its_place(
+    name: str, importing: Importing, tmp_path: Path
+) -> None:
+    put, value, sentence = REFUSED[name]
+    document = circuit()
+    put(document, value)
+    path = tmp_path / "circuit.json"
+    # The key that tells a circuit is named, whatever else is missing.
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert sentence in importing(path).output
+
+
+def test_a_netlist_alone_is_refused(importing: Importing, tmp_path: Path) -> None:
+    document = circuit()
+    for row in document["components"]:
+        row["params"]["position"] = [0, 0]
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    said = importing(path).output
+    assert "none of the 6 components has a place of its own" in said
+    assert "place and route the circuit first" in said
+
+
+def test_what_is_inside_of_a_component_is_named(importing: Importing, tmp_path: Path) -> None:
+    document = circuit()
+    document["components"][3]["entity"] = "MIXER"
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    result = importing(path, "--json")
+    remarks = json.loads(result.stdout)["remarks"]
+    assert any(
+        remark.startswith("component tank (MIXER, components[3]): drawn as its box of 3000 x 3000")
+        for remark in remarks
+    )
+    assert any(remark.startswith("layer electrodes: holds no channels") for remark in remarks)
+
+
+# Circuits of others, where they lie on this machine.
+
+
+def groups(document: dict[str, Any], layer: str) -> tuple[set[frozenset[str]], set[frozenset[str]]]:
+    """Components of a layer as channels join them on the plane, and as connections declare it."""
+    radius = {"PORT": "portRadius", "VIA": "radius", "VALVE3D": "valveRadius"}
+    places: dict[str, shapely.Point] = {}
+    parts: list[Any] = []
+    for row in document["components"]:
+        (x, y), w, h = row["params"]["position"], row["x-span"], row["y-span"]
+        if layer not in row["layers"] or w <= 0:
+            continue
+        places[row["id"]] = shapely.Point(x + w / 2, y + h / 2)
+        key = radius.get(row["entity"], "")
+        is_round = key in row["params"]
+        disc = places[row["id"]].buffer(row["params"].get(key, 0), 64)
+        parts.append(disc if is_round else shapely.box(x, y, x + w, y + h))
+    joined = {name: name for name in places}
+
+    def root(name: str) -> str:
+        return name if joined[name] == name else root(joined[name])
+
+    for row in document["connections"]:
+        if row["layer"] != layer:
+            continue
+        for path in row["paths"]:
+            points = [p for i, p in enumerate(path["wayPoints"]) if p != path["wayPoints"][i - 1]]
+            line = shapely.LineString(points) if len(points) > 1 else shapely.Point(points[0])
+            parts.append(line.buffer(row["params"]["channelWidth"] / 2))
+        ends = [row["source"]["component"], *(sink["component"] for sink in row["sinks"])]
+        known = [end for end in ends if end in places]
+        for end in known[1:]:
+            joined[root(end)] = root(known[0])
+    pieces = list(getattr(shapely.union_all(parts), "geoms", [shapely.union_all(parts)]))
+    real, declared = defaultdict(set), defaultdict(set)
+    for name, place in places.items():
+        real[next(i for i, piece in enumerate(pieces) if piece.intersects(place))].add(name)
+        declared[root(name)].add(name)
+    return {frozenset(g) for g in real.values()}, {frozenset(g) for g in declared.values()}
+
+
+def test_the_plane_of_shapely_tells_a_crossing(tmp_path: Path) -> None:
+    real, declared = groups(circuit(), "f")
+    assert real == declared
+    crossing = [[1500, 11500], [10000, 11500], [10000, 0], [21500, 11500]]
+    real, declared = groups(rewired(circuit(), crossing), "f")
+    assert len(real) == 1
+    assert len(declared) == 2
+
+
+FILES = sorted(CIRCUITS.rglob("*_PR.json")) if CIRCUITS.is_dir() else []
+
+
+@pytest.mark.skipif(not FILES, reason="SBAFAB_PARCHMINT names no folder of circuits")
+@pytest.mark.parametrize("path", few(FILES or [CIRCUITS], 2), ids=lambda path: path.stem)
+def test_circuits_of_others_are_wired_as_a_union_of_shapely_says(
+    path: Path, tmp_path: Path
+) -> None:
+    document = json.loads(path.read_text())
+    try:
+        laminate = written(copy.deepcopy(document), tmp_path).laminate
+    except SbafabError as error:
+        pytest.skip(str(error))
+    kinds = {fault.kind for fault in connectivity(laminate, Limits()).faults}
+    layers = [row["id"] for row in document["layers"] if row["type"] != "INTEGRATION"]
+    is_sound = all(real == declared for real, declared in (groups(document, i) for i in layers))
+    assert is_sound == (not kinds & {"open", "short"})
