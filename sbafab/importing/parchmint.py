@@ -109,30 +109,30 @@ def import_parchmint(path: Path) -> Imported:
 # Reading: every value is looked up with its place in the file.
 
 
-class Node(NamedTuple):
+class JsonPlace(NamedTuple):
     """A value of the document, and its place there."""
 
     value: Any
     place: str
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> JsonPlace | None:
         """Return the value of a key of an object, None if it is not there or null."""
         if not isinstance(self.value, dict):
             raise DesignError(f"{self.place} is no object; export the circuit again")
         value = self.value.get(key)
-        return None if value is None else Node(value, f"{self.place}.{key}".lstrip("."))
+        return None if value is None else JsonPlace(value, f"{self.place}.{key}".lstrip("."))
 
-    def need(self, key: str) -> Node:
+    def need(self, key: str) -> JsonPlace:
         """Return the value of a key. Raises DesignError if it is not there."""
         node = self.get(key)
         if node is None:
             raise DesignError(f"{self.place or 'the file'} has no {key}; export the circuit again")
         return node
 
-    def items(self) -> list[Node]:
+    def items(self) -> list[JsonPlace]:
         if not isinstance(self.value, list):
             raise DesignError(f"{self.place} is no list; export the circuit again")
-        return [Node(value, f"{self.place}[{i}]") for i, value in enumerate(self.value)]
+        return [JsonPlace(value, f"{self.place}[{i}]") for i, value in enumerate(self.value)]
 
     @property
     def text(self) -> str:
@@ -164,7 +164,7 @@ class Node(NamedTuple):
 
 def read_circuit(document: Any, stem: str) -> Circuit:
     """Return the circuit of a document. Raises DesignError, which names the place in it."""
-    root = Node(document, "")
+    root = JsonPlace(document, "")
     remarks: list[str] = []
     rows = [(row, _kind(row)) for row in root.need("layers").items()]
     order = sorted(rows, key=lambda entry: _group(entry[0]))
@@ -195,7 +195,7 @@ def read_circuit(document: Any, stem: str) -> Circuit:
     )
 
 
-def _refuse_unplaced(root: Node, placed: Mapping[str, object]) -> None:
+def _refuse_unplaced(root: JsonPlace, placed: Mapping[str, object]) -> None:
     """Raises DesignError for a netlist alone: its components all lie on one spot, or nowhere."""
     rows = [row for row in root.need("components").items() if row.need("id").text not in placed]
     params = [row.get("params") for row in rows]
@@ -207,23 +207,23 @@ def _refuse_unplaced(root: Node, placed: Mapping[str, object]) -> None:
         )
 
 
-def _kind(row: Node) -> str:
+def _kind(row: JsonPlace) -> str:
     kind = row.get("type")
     return kind.text.upper() if kind is not None else "FLOW"
 
 
-def _group(row: Node) -> int:
+def _group(row: JsonPlace) -> int:
     group = row.get("group")
     text = group.text if group is not None else "0"
     return int(text) if text.isdecimal() else 0
 
 
-def _title(row: Node) -> str:
+def _title(row: JsonPlace) -> str:
     name = row.get("name")
     return name.text if name is not None else row.need("id").text
 
 
-def _placed_features(root: Node) -> dict[str, tuple[Point, Point]]:
+def _placed_features(root: JsonPlace) -> dict[str, tuple[Point, Point]]:
     """Corner and span of components, um, where the circuit has them as features."""
     features = root.get("features")
     placed = {}
@@ -235,7 +235,7 @@ def _placed_features(root: Node) -> dict[str, tuple[Point, Point]]:
     return placed
 
 
-def _routed_features(root: Node) -> dict[str, list[tuple[Point, Point, float]]]:
+def _routed_features(root: JsonPlace) -> dict[str, list[tuple[Point, Point, float]]]:
     """Straight channels of connections, um, where the circuit has them as features."""
     features = root.get("features")
     routed: dict[str, list[tuple[Point, Point, float]]] = {}
@@ -248,7 +248,7 @@ def _routed_features(root: Node) -> dict[str, list[tuple[Point, Point, float]]]:
 
 
 def _component(
-    row: Node,
+    row: JsonPlace,
     titles: Mapping[str, str],
     placed: Mapping[str, tuple[Point, Point]],
     remarks: list[str],
@@ -276,7 +276,7 @@ def _component(
 
 
 def _place(
-    row: Node, name: str, placed: Mapping[str, tuple[Point, Point]], here: str
+    row: JsonPlace, name: str, placed: Mapping[str, tuple[Point, Point]], here: str
 ) -> tuple[Point, Point]:
     if name in placed:
         return placed[name]
@@ -294,13 +294,13 @@ def _place(
     return position.point, (x, y)
 
 
-def _radius(row: Node, entity: str) -> float | None:
+def _radius(row: JsonPlace, entity: str) -> float | None:
     params = row.get("params")
     radius = params.get(ROUND[entity]) if params is not None and entity in ROUND else None
     return radius.number if radius is not None else None
 
 
-def _terminals(row: Node) -> dict[str, Point]:
+def _terminals(row: JsonPlace) -> dict[str, Point]:
     ports = row.get("ports")
     return {
         port.need("label").text: (port.need("x").number, port.need("y").number)
@@ -309,7 +309,7 @@ def _terminals(row: Node) -> dict[str, Point]:
 
 
 def _connection(
-    row: Node,
+    row: JsonPlace,
     titles: Mapping[str, str],
     components: Mapping[str, Component],
     routed: Mapping[str, list[tuple[Point, Point, float]]],
