@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sbafab.design.files import listed, shown
 from sbafab.design.outline import closed_loops, content, refuse_crossings, traced
-from sbafab.design.strands import MOST_OF_ENTITY, Strand, counted, sealed
+from sbafab.design.strands import MOST_OF_ENTITY, Strand, counted, is_closed, sealed
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
@@ -24,9 +24,10 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
     """Return all that the closed contours of a drawing enclose, where they lie in it, mm.
 
     Contours are nested by the even-odd rule: one inside another is a hole. What a DXF file has on
-    layers that are not plotted does not count unless it is named. ``layer`` names a layer
-    of a DXF file, a group of an SVG file by its label or id, or a pattern of a ``laminate.json``.
-    Units are read as those of an outline. Raises DesignError, which names the file and the place.
+    layers that are not plotted does not count unless it is named. ``layer`` names a layer of a DXF
+    file, a group of an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
+    ``laminate.json``. Units are read as those of an outline. Raises DesignError, which names the
+    file and the place.
     """
     try:
         if path.suffix.lower() == ".json":
@@ -97,7 +98,15 @@ def _profiles(path: Path, content: bytes) -> dict[str, Region]:
     except DesignError as error:
         raise DesignError(str(error).removeprefix(f"{path} ")) from None
     profiles = {layer.pattern: layer.profile for layer in laminate.layers}
+    for seam in laminate.seams:
+        if all(is_closed(chain) for chain in seam.path):
+            profiles[seam_layer(seam.name)] = Region(tuple(map(Contour, seam.path)))
     return profiles | ({} if laminate.outline.is_empty else {OUTLINE: laminate.outline})
+
+
+def seam_layer(name: str) -> str:
+    """Return the name that the closed path of a seam has among a laminate's patterns."""
+    return f"seam {name}"
 
 
 def _profile(path: Path, content: bytes, layer: str | None) -> Region:

@@ -11,15 +11,18 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.actuators import load_design
-from sbafab.design.drawing import OUTLINE
+from sbafab.actuators.drawn import DrawnDesign
+from sbafab.design.drawing import OUTLINE, seam_layer
 from sbafab.design.files import ASSEMBLY, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
 from sbafab.design.records import Design, plain_tables, without_kit
 from sbafab.design.sections import Inlet as Inlets
+from sbafab.design.strands import is_closed
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import Point, unit
+from sbafab.geometry.edges import Edge, Line, Point, unit
 from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.films import Film
+from sbafab.laminate.joints import FaceBond
 from sbafab.laminate.laminate import Chamber, Inlet, Laminate
 from sbafab.laminate.laminate_file import FILE, laminate_json, read_laminate
 
@@ -59,6 +62,8 @@ def import_folder(folder: Path) -> Imported:
         tube = {"outer_diameter": wrap.tube_diameter, "pitch": wrap.pitch}
         tube |= {"overlap": wrap.overlap, "glue": wrap.glue}
     remarks = []
+    if isinstance(design, DrawnDesign) and design.mechanism is not None:
+        tables["mechanism"] = plain_tables(design)["mechanism"]
     if design.family != "drawn":
         remarks = [
             f"family {design.family}: its keys are not carried over, its layers as built are",
@@ -88,6 +93,8 @@ def import_laminate(path: Path) -> Imported:
     if laminate.tube is not None:
         tube = {"outer_diameter": laminate.tube, "pitch": _pitch(laminate), "glue": NO_GLUE}
         remarks.append("tube.glue: a laminate.json does not say what holds the sheet; write it")
+    if laminate.bonds:
+        tables["face_bonds"] = {bond.name: _bond_table(bond) for bond in laminate.bonds}
     tables["registration"] = {"method": laminate.registration}
     if laminate.pins_in_full_bonds:
         tables["registration"]["full_bond_pins"] = "in"
@@ -143,6 +150,7 @@ def _drawn(
         shapes[OUTLINE] = {"file": FILE, "layer": OUTLINE}
     if laminate.lumen is not None:
         design["lumen"] = laminate.lumen
+    _add_joints(laminate, design, shapes, remarks)
     design["pins"] = [
         {"name": p.name, "at": [*p.centre], "diameter": p.diameter, "clearance": p.clearance}
         for p in laminate.pins
@@ -162,6 +170,7 @@ def _drawn(
 def _layer_rows(
     laminate: Laminate, stock: Mapping[str, Film], layup: Mapping[str, str]
 ) -> Iterator[dict[str, Any]]:
+    folded = {fold.upper for fold in laminate.folds}
     for layer in laminate.layers:
         row: dict[str, Any] = {"role": layer.role, "shape": layer.pattern.lower()}
         usual = layup.get(layer.role.replace("-", "_"), "ptfe" if layer.is_mask else "tpe")
@@ -170,6 +179,8 @@ def _layer_rows(
             row["film"] = table
         if layer.pieces != 1:
             row["pieces"] = layer.pieces
+        if layer.turned and layer.index not in folded:
+            row["turned"] = True
         yield row
 
 
@@ -185,7 +196,7 @@ def _chamber_rows(laminate: Laminate, remarks: list[str]) -> Iterator[dict[str, 
 
 
 def _chamber_row(chamber: Chamber, inlet: Inlet) -> dict[str, Any]:
-    return {
+    row = {
         "name": chamber.name,
         "centres": [[*centre] for centre in chamber.centres],
         "mouth": [*inlet.mouth],
@@ -193,6 +204,45 @@ def _chamber_row(chamber: Chamber, inlet: Inlet) -> dict[str, Any]:
         "width": inlet.width,
         "length": inlet.length,
     }
+    return row | ({"balloons": [*chamber.balloons]} if chamber.balloons else {})
+
+
+def _add_joints(
+    laminate: Laminate, design: dict[str, Any], shapes: dict[str, Any], remarks: list[str]
+) -> None:
+    """Add seams, folds, ports and nets to a design's tables, and the seams' paths to its shapes."""
+    seams = []
+    for seam in sorted(laminate.seams, key=lambda seam: seam.order):
+        row: dict[str, Any] = {"name": seam.name, "layers": [seam.below, seam.above]}
+        if all(is_closed(chain) for chain in seam.path):
+            row["shape"] = key_name(seam_layer(seam.name), shapes)
+            shapes[row["shape"]] = {"file": FILE, "layer": seam_layer(seam.name)}
+        elif len(seam.path) == 1:
+            row["path"] = _corners(seam.path[0])
+        else:
+            remarks.append(f"seam {seam.name}: it has several open paths, and is left out; draw it")
+            continue
+        seams.append(row | {"width": seam.width, "tool": seam.tool, "kind": seam.kind})
+    folds = [
+        {"layers": [fold.lower, fold.upper], "line": [[*end] for end in fold.line]}
+        for fold in laminate.folds
+    ]
+    ports = [
+        {"name": p.name, "layers": [p.below, p.above], "at": [*p.at], "kind": p.kind}
+        for p in laminate.ports
+    ]
+    nets = {net.name: [*net.ports] for net in laminate.nets}
+    for key, rows in (("seams", seams), ("folds", folds), ("ports", ports), ("nets", nets)):
+        if rows:
+            design[key] = rows
+
+
+def _corners(chain: Sequence[Edge]) -> list[list[float]]:
+    """The corners of an open chain: x, y, and the bulge of the edge to the next if it is an arc."""
+    corners = [
+        [*edge.start] if isinstance(edge, Line) else [*edge.start, edge.bulge] for edge in chain
+    ]
+    return [*corners, [*chain[-1].end]]
 
 
 def angle_of(direction: Point) -> float:
@@ -255,7 +305,15 @@ def _film_table(name: str, film: Film) -> dict[str, Any]:
         if name != "tpe":
             limit = None if film.limit == HOTTEST else film.limit
             keys |= {"kind": film.kind, "temperature_limit": limit, "warning": film.warning}
+    if film.faces is not None:
+        keys["faces"] = dict(zip(("upper", "lower"), film.faces, strict=True))
     return {key: value for key, value in keys.items() if value not in (None, "")}
+
+
+def _bond_table(bond: FaceBond) -> dict[str, Any]:
+    keys: dict[str, Any] = {"faces": [*bond.faces], "by": bond.by}
+    keys |= {"temperature_c": bond.temperature_c, "after": bond.after}
+    return {key: value for key, value in keys.items() if value is not None}
 
 
 def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:
