@@ -41,6 +41,7 @@ from sbafab.as_built.records import (
     read_claims,
     read_job,
 )
+from sbafab.as_built.seams import read_seams, seam_departures
 from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
@@ -92,8 +93,13 @@ class AsBuiltFolder:
         is_same_panel = (
             laminate is None or expected is None or laminate.panel is expected.laminate.panel
         )
-        return is_same_panel and all(
-            file.part is not None and file.part.is_expected for file in self.files
+        has_same_seams = (
+            laminate is None or expected is None or laminate.seams == expected.laminate.seams
+        )
+        return (
+            is_same_panel
+            and has_same_seams
+            and all(file.part is not None and file.part.is_expected for file in self.files)
         )
 
 
@@ -229,6 +235,8 @@ def read_folder(
     files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
     problems += file_errors
     files = _folded(files, () if expected is None else expected.laminate.folds)
+    seams, file_errors = read_seams(folder, claims, expected)
+    problems += file_errors
     panel, files, file_errors = read_panel(folder, claims, files, expected)
     problems += file_errors
     layers = stacked_layers(files, design)
@@ -244,6 +252,8 @@ def read_folder(
     if len(parts) == len(files):
         try:
             laminate = _laminate(files, claims, design, expected, panel)
+            if seams is not None:
+                laminate = replace(laminate, seams=seams)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
             outline = expected.laminate.outline if expected is not None else Region()
@@ -324,6 +334,8 @@ def layer_departures(built: AsBuiltFolder) -> list[Problem]:
                 f"{file.label} is not what design.toml makes: {difference}; regenerate the folder"
             )
             problems.append(Problem(DESIGNED, message, (file.position,)))
+    if built.laminate is not None:
+        problems += seam_departures(built.laminate, built.expected)
     if built.files and expected[0] is None:
         count = len(built.expected.laminate.layers)
         message = f"design.toml makes {count} layers, and the manifest lists {len(built.files)}"

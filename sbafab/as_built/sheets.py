@@ -21,6 +21,7 @@ from sbafab.cutting.properties import (
     CUT_SHEET,
     ENGRAVE,
     LIMITS,
+    SEAM,
     kerf_properties,
     kerf_suffix,
     limit_properties,
@@ -330,6 +331,8 @@ def _read(folder: Path, sheet_claim: SheetClaim) -> ReadBack:
     try:
         drawing = read_profile(path)
         check_sequence(drawing)
+        if any(layer == SEAM for layer, _ in drawing.strokes):
+            raise OutputError(f"it holds a path on {SEAM}, which is no sheet's; regenerate it")
         if drawing.region.is_empty:
             raise OutputError("it cuts nothing; regenerate it")
         return drawing

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.cutting.chaining import check_clear, closed_loops, nested_region
 from sbafab.cutting.dxf_write import skeleton
-from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE
+from sbafab.cutting.properties import COLOURS, CUT_INNER, CUT_OUTER, REFERENCE, SEAM
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, Copies, circle
 from sbafab.geometry.edges import EPSILON, Arc, Edge, Line, Point, edge_from_bulge, quarter_arcs
@@ -436,7 +436,7 @@ def _put_together(
         drawn = contour.edges if contour else edges
         if any(map(_is_short, drawn[:1] if kind == "CIRCLE" else drawn)):
             raise OutputError(f"{_place(kind, drawn)} has an edge of no length; remove it.")
-        if layer not in COLOURS:
+        if layer not in COLOURS and layer != SEAM:
             on = f"is on layer {layer}; use {', '.join(COLOURS)}."
             raise OutputError(f"{_place(kind, drawn)} {on}")
         layers.append(layer)

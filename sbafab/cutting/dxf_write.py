@@ -17,10 +17,12 @@ from sbafab.cutting.properties import (
     CUT_SHEET,
     ENGRAVE,
     REFERENCE,
+    SEAM,
+    SEAM_COLOUR,
     DxfProfile,
 )
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, quarter_arcs
+from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, quarter_arcs
 
 QUARTER = math.sqrt(2)
 """The chord of a quarter turn, in radii."""
@@ -74,7 +76,6 @@ def dxf_text(
     has a cross at the origin on REFERENCE, after all that is cut, and there the strokes of its
     ``notes``; a ``sheet`` has its engraving, parting cut and frame instead.
     """
-    form = skeleton()
     cuts = _cuts(contours, profile)
     if sheet is None:
         entities = [*cuts, *_datum_cross(), *(_stroke(REFERENCE, run) for run in notes)]
@@ -87,7 +88,51 @@ def dxf_text(
             *(_stroke(REFERENCE, run) for run in (*_frames(sheet), *sheet.marks)),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
-    seed = form.first_handle + len(entities)
+    return _document(
+        entities, [*(contour.bounds for contour in contours), (*low, *high)], properties
+    )
+
+
+def seam_text(path: Sequence[Sequence[Edge]], properties: Mapping[str, str]) -> str:
+    """A DXF document of the path of a seam: its chains on SEAM, open or closed, in order."""
+    runs = [[part for edge in chain for part in _quarters(edge)] for chain in path]
+    entities = [*map(_seam_run, runs), *_datum_cross()]
+    arm = (-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM)
+    boxes = [edge.bounds for run in runs for edge in run]
+    return _with_layer(_document(entities, [*boxes, arm], properties, spare=1), SEAM, SEAM_COLOUR)
+
+
+def _seam_run(edges: Sequence[Edge]) -> _Entity:
+    vertices = [(*edge.start, edge.bulge) for edge in edges]
+    closed = math.dist(edges[0].start, edges[-1].end) < EPSILON
+    return _polyline(SEAM, vertices if closed else [*vertices, (*edges[-1].end, 0.0)], closed)
+
+
+def _with_layer(text: str, name: str, colour: int) -> str:
+    """Return a document with one more layer in its table, made after that of engraving."""
+    seed_tag = "  9\n$HANDSEED\n  5\n"
+    _, _, after = text.partition(seed_tag)
+    handle = f"{int(after.partition(chr(10))[0], 16) - 1:X}"
+    found = re.search(
+        rf"  0\nLAYER\n  5\n\w+\n(?:(?!  0\n).*\n)*?  2\n{ENGRAVE}\n(?:(?!  0\n).*\n)*", text
+    )
+    if found is None:
+        raise ValueError("skeleton.dxf has no layer for engraving: regenerate it.")
+    record = re.sub(r"(?<=LAYER\n  5\n)\w+", handle, found[0])
+    record = record.replace(f"  2\n{ENGRAVE}\n", f"  2\n{name}\n")
+    record = record.replace(f" 62\n{COLOURS[ENGRAVE]}\n", f" 62\n{colour}\n")
+    return text[: found.end()] + record + text[found.end() :]
+
+
+def _document(
+    entities: Sequence[_Entity],
+    boxes: Sequence[Bounds],
+    properties: Mapping[str, str],
+    spare: int = 0,
+) -> str:
+    """The document of the entities, with room for so many ``spare`` handles after theirs."""
+    form = skeleton()
+    seed = form.first_handle + len(entities) + spare
     drawn = "".join(
         f"  0\n{entity.kind}\n  5\n{handle:X}\n330\n{form.model_space}\n100\nAcDbEntity\n"
         f"  8\n{entity.layer}\n100\n{entity.subclass}\n{entity.body}"
@@ -98,7 +143,7 @@ def dxf_text(
             form.before_properties,
             _custom_properties(properties),
             form.before_extents,
-            _extents([*(contour.bounds for contour in contours), (*low, *high)]),
+            _extents(boxes),
             form.before_seed,
             f"{seed:X}",
             form.before_entities,

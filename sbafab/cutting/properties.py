@@ -226,5 +226,9 @@ REFERENCE = "REFERENCE"
 COLOURS = {ENGRAVE: 7, CUT_INNER: 5, CUT_OUTER: 1, CUT_SHEET: 6, REFERENCE: 8}
 """AutoCAD colour index of every layer; REFERENCE is neither cut nor plotted."""
 
+SEAM = "SEAM"
+"""Layer of the path of a seam, which a tool follows; it lies in files of its own."""
+SEAM_COLOUR = 3
+
 CUT_SEQUENCE = (ENGRAVE, CUT_INNER, CUT_OUTER, CUT_SHEET)
 """What is cut first comes first: a hole cut after its outline would be cut in a loose part."""

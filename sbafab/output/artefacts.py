@@ -19,6 +19,7 @@ from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
 from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
+from sbafab.cutting.seam_files import write_seam_files
 from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
@@ -179,7 +180,7 @@ def _write_layers(folder: DesignFolder) -> None:
 
 
 def write_cut_files(plan: DesignPlan, folder: Path, progress: Progress) -> None:
-    """Write the layer files and the base plate of a design."""
+    """Write the layer files, the paths of seams and the base plate of a design."""
     laminate = plan.checked.laminate
     write_layer_files(laminate, plan.paths, folder, plan.settings, partial(progress, "cut files"))
     write_plates(plan.checked, plan.paths, folder, plan.settings)
@@ -188,8 +189,11 @@ def write_cut_files(plan: DesignPlan, folder: Path, progress: Progress) -> None:
 def write_plates(
     checked: Checked, paths: Mapping[str, Region], folder: Path, settings: CutSettings
 ) -> None:
-    """Write the base plate, and of registered sheets the second cut and LightBurn's projects."""
+    """Write the base plate and the paths of seams; of registered sheets the second cut and
+    LightBurn's projects.
+    """
     design, laminate = checked.design, checked.laminate
+    write_seam_files(laminate, folder, settings)
     places = design_runs(design, laminate).places
     write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
     if laminate.panel is not None:

@@ -18,12 +18,15 @@ from pydantic import BaseModel, ConfigDict, Field
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.lightburn import projects
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
+from sbafab.cutting.seam_files import seam_path
 from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
 from sbafab.geometry.offset import Kerf
+from sbafab.laminate.assembly import laying
 from sbafab.laminate.films import Film, Material
+from sbafab.laminate.joints import SeamKind, SeamTool
 from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role, SheetPanel
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
@@ -74,6 +77,23 @@ class InterfaceClaim(_Claim):
     kind: InterfaceKind
     contact_area: float
     bond_area: float
+
+
+class SeamClaim(_Claim):
+    """A seam and the file of its path; ``order`` is that in which the seams are listed, ``step``
+    the number of its step in ``press.json``.
+    """
+
+    name: str
+    file: str | None
+    below: int
+    above: int
+    tool: SeamTool
+    kind: SeamKind
+    width: float
+    length: float
+    order: int
+    step: int
 
 
 class BoreClaim(_Claim):
@@ -250,6 +270,7 @@ class Manifest(_Claim):
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
     meshes: tuple[MeshClaim, ...] = ()
     mesh_statistics: dict[str, Any] = Field(default_factory=dict)
+    seams: Annotated[tuple[SeamClaim, ...], Field(max_length=200)] = ()
     files: dict[str, str]
 
 
@@ -310,6 +331,8 @@ def manifest(
         optional["batch"] = _batch(runs)
     if is_cut and laminate.panel is not None:
         optional["panel"] = _panel(laminate, laminate.panel, plan.settings)
+    if laminate.seams:
+        optional["seams"] = _seams(laminate, is_cut)
     if plan.conforming is not None:
         optional["mesh_statistics"] = plan.conforming.statistics
     return Manifest(
@@ -532,6 +555,26 @@ def _interface(interface: Interface) -> InterfaceClaim:
         kind=interface.kind,
         contact_area=round(interface.contact.area, 6),
         bond_area=round(interface.bond.area, 6),
+    )
+
+
+def _seams(laminate: Laminate, is_cut: bool) -> tuple[SeamClaim, ...]:
+    steps = [(step.joining.seam, step.number) for step in laying(laminate) if step.joining]
+    return tuple(
+        SeamClaim(
+            name=seam.name,
+            file=seam_path(seam) if is_cut else None,
+            below=seam.below,
+            above=seam.above,
+            tool=seam.tool,
+            kind=seam.kind,
+            width=seam.width,
+            length=round(seam.length, 6),
+            order=seam.order,
+            step=number,
+        )
+        for seam, number in steps
+        if seam is not None
     )
 
 

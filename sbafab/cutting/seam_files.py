@@ -1,0 +1,116 @@
+"""Files of seam paths: what the middle of a tool follows, one file a seam, in order.
+
+A path lies on the layer SEAM and nothing else is cut; the tool bonds half of its width on both
+sides of it. Coordinates are those of the layer files, mm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from sbafab.cutting.dxf_read import ReadBack, read_profile
+from sbafab.cutting.dxf_write import seam_text
+from sbafab.cutting.properties import FOLDER, REFERENCE, SEAM, CutSettings
+from sbafab.errors import OutputError
+from sbafab.geometry.edges import Edge, Point, distance_to
+from sbafab.laminate.joints import Seam
+from sbafab.laminate.laminate import Laminate
+
+TOLERANCE = 0.001
+"""mm within which a path read back is the one that was written."""
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Places along an edge at which it is compared."""
+
+Chains = Sequence[Sequence[Edge]]
+
+
+def seam_path(seam: Seam) -> str:
+    """Return the path in an output folder of a seam's file."""
+    return f"{FOLDER}/seam_{seam.order:03d}_{seam.name}.dxf"
+
+
+def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
+    """Return the custom properties of a seam's file."""
+    return {
+        "DESIGN": settings.design,
+        "DESIGN_SHA256": settings.design_sha256,
+        "SEAM": seam.name,
+        "ORDER": str(seam.order),
+        "LAYERS": f"{seam.below}, {seam.above}",
+        "TOOL": seam.tool,
+        "TOOL_WIDTH": f"{seam.width:g}",
+        "KIND": seam.kind,
+        "UNITS": "mm",
+        "GENERATOR": settings.generator,
+    }
+
+
+def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
+    """Writes the path of every seam under ``folder``. Raises OutputError where a file does not
+    read back as its path, OSError where it cannot be written.
+    """
+    for seam in laminate.seams:
+        path = folder / seam_path(seam)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        properties = seam_properties(seam, settings)
+        path.write_text(seam_text(seam.path, properties), encoding="utf-8", newline="\n")
+        chains, written = read_seam(path)
+        off = deviation(chains, seam.path)
+        if off is not None or written != properties:
+            raise OutputError(f"{path.name}: {off or 'its properties differ'}; regenerate it.")
+
+
+def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]:
+    """Return the chains of a seam's file and its custom properties.
+
+    Raises OutputError where it holds anything else, or no path.
+    """
+    drawing = read_profile(path)
+    strangers = [layer for layer, _ in drawing.strokes if layer not in (SEAM, REFERENCE)]
+    if strangers or not drawing.region.is_empty:
+        raise OutputError(
+            f"{path.name}: it holds more than a path on {SEAM}; remove what is on "
+            f"{strangers[0] if strangers else 'the layers of cuts'}, or regenerate it"
+        )
+    chains = _chains(drawing)
+    if not chains:
+        raise OutputError(f"{path.name}: it has no path on {SEAM}; regenerate it")
+    return chains, drawing.properties
+
+
+def _chains(drawing: ReadBack) -> tuple[tuple[Edge, ...], ...]:
+    return tuple(edges for layer, edges in drawing.strokes if layer == SEAM)
+
+
+def deviation(chains: Chains, expected: Chains) -> str | None:
+    """Return how a path departs from the expected one, in words; None within a micrometre."""
+    if len(chains) != len(expected):
+        return f"it has {len(chains)} paths, not {len(expected)}"
+    worst: tuple[float, Point] = (0.0, (0.0, 0.0))
+    for ours, theirs in zip(expected, chains, strict=True):
+        worst = max(worst, _farthest(ours, theirs), _farthest(theirs, ours))
+        ends = zip(_ends(ours), _ends(theirs), strict=True)
+        worst = max(worst, *((math.dist(a, b), a) for a, b in ends))
+    off, (x, y) = worst
+    return None if off <= TOLERANCE else f"its path is {off:.3f} mm off at x {x:.3f}, y {y:.3f}"
+
+
+def _farthest(chain: Sequence[Edge], target: Sequence[Edge]) -> tuple[float, Point]:
+    """The greatest distance of a chain from another, and where."""
+    places = [edge.at(share) for edge in chain for share in SHARES]
+    return max((min(distance_to(edge, p) for edge in target), p) for p in places)
+
+
+def _ends(chain: Sequence[Edge]) -> tuple[Point, Point]:
+    return chain[0].start, chain[-1].end
+
+
+def stated_width(properties: Mapping[str, str]) -> float | None:
+    """Return the width of the tool that a seam's file states, mm, or None."""
+    try:
+        width = float(properties.get("TOOL_WIDTH", ""))
+    except ValueError:
+        return None
+    return width if 0 < width < math.inf else None

@@ -1,0 +1,161 @@
+"""Seam paths in files of their own: read back, verified, measured as made, read by others."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from copy import deepcopy
+from pathlib import Path
+
+import ezdxf
+import pytest
+import tomli_w
+from ezdxf.document import Drawing
+
+from sbafab.api import check_folder, generate
+from sbafab.as_built.check import read_back
+from sbafab.rules.finding import Finding
+from tests.actuators.test_free_layers import WELDED
+
+
+@pytest.fixture(scope="module")
+def welded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The files of a welded pouch."""
+    folder = tmp_path_factory.mktemp("welded")
+    data = deepcopy(WELDED)
+    # A small arc at one corner: seams keep true arcs.
+    path = data["seams"][0]["path"]
+    path[3:4] = [[-20, -18, math.tan(math.pi / 8)], [-18, -20]]
+    design = folder / "welded.toml"
+    design.write_text(tomli_w.dumps(data), encoding="utf-8")
+    out = generate(design, out=folder / "out").folder
+    return {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in out.rglob("*")
+        if path.is_file()
+    }
+
+
+def laid_out(files: dict[str, bytes], folder: Path) -> Path:
+    for name, data in files.items():
+        path = folder / "welded" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    return folder / "welded"
+
+
+SEAM_FILE = "layers/seam_001_rim.dxf"
+
+
+def failures(folder: Path) -> dict[str, Finding]:
+    return {f.rule: f for f in check_folder(folder) if f.verdict == "fail"}
+
+
+def test_a_seam_file_is_read_by_others_with_its_arc(
+    welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    assert failures(folder) == {}
+    document = ezdxf.readfile(folder / SEAM_FILE)
+    assert not document.audit().errors
+    assert document.layers.get("SEAM").dxf.color == 3
+    (path,) = document.modelspace().query('LWPOLYLINE[layer=="SEAM"]')
+    assert not path.closed
+    bulges = [bulge for *_, bulge in path.get_points("xyb") if bulge]
+    assert bulges == pytest.approx([math.tan(math.pi / 8)])
+    (claim,) = json.loads(welded["manifest.json"])["seams"]
+    assert claim["file"] == SEAM_FILE
+    # Seven straight runs less two times 2 mm at the round corner, and a quarter circle of 2 mm.
+    assert claim["length"] == pytest.approx(176 - 4 + math.pi)
+    press = json.loads(welded["press.json"])
+    assert press["steps"] == []
+    assert [(seam["seam"], seam["width_mm"]) for seam in press["seams"]] == [("rim", 1.0)]
+
+
+def moved(document: Drawing, dx: float) -> None:
+    """Move the right-hand side of the path."""
+    (path,) = document.modelspace().query('LWPOLYLINE[layer=="SEAM"]')
+    path.set_points(
+        [(x + (dx if x > 19 else 0), y, *rest) for x, y, *rest in path.get_points("xyseb")],
+        format="xyseb",
+    )
+
+
+def resave(folder: Path, change: Callable[[Drawing], None]) -> None:
+    document = ezdxf.readfile(folder / SEAM_FILE)
+    change(document)
+    document.saveas(folder / SEAM_FILE)
+
+
+def test_a_path_moved_by_0_3_mm_is_found(welded: dict[str, bytes], tmp_path: Path) -> None:
+    folder = laid_out(welded, tmp_path)
+    resave(folder, lambda document: moved(document, 0.3))
+    found = failures(folder)
+    assert {"manifest-claims", "as-designed"} <= set(found)
+    assert "seam rim is not what design.toml makes: its path is 0.300 mm off" in (
+        found["as-designed"].message
+    )
+
+
+def test_bonds_are_measured_on_the_seam_as_it_is_drawn(
+    welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    # The middle of the tool runs 0.2 mm inside the film's edge at x = 23: 0.7 mm of it bond.
+    resave(folder, lambda document: moved(document, 2.8))
+    (built,) = read_back(folder).designs
+    bond = next(f for f in built.measured if f.rule == "bond-width")
+    assert (bond.verdict, bond.measured) == ("fail", pytest.approx(0.7, abs=1e-6))
+
+
+def opened(document: Drawing) -> None:
+    (path,) = document.modelspace().query('LWPOLYLINE[layer=="SEAM"]')
+    path.set_points(path.get_points("xyseb")[:-2], format="xyseb")
+
+
+def test_a_seam_that_ends_early_leaks_as_built(welded: dict[str, bytes], tmp_path: Path) -> None:
+    folder = laid_out(welded, tmp_path)
+    resave(folder, opened)
+    found = failures(folder)
+    assert "sealing" in found
+    assert "leaks to the outside" in found["sealing"].message
+
+
+SPOILED: list[tuple[Callable[[Drawing], object], str]] = [
+    (
+        lambda d: d.modelspace().add_circle((0, 0), 1, dxfattribs={"layer": "CUT_OUTER"}),
+        "holds more than a path on SEAM",
+    ),
+    (
+        lambda d: [d.modelspace().delete_entity(e) for e in d.modelspace().query("LWPOLYLINE")],
+        "has no path on SEAM",
+    ),
+    (lambda d: d.header.__setitem__("$INSUNITS", 1), "not in millimetres"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "words"), SPOILED)
+def test_an_unsound_seam_file_is_named(
+    spoil: Callable[[Drawing], object], words: str, welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    resave(folder, lambda document: (spoil(document), None)[1])
+    found = failures(folder)
+    assert words in found["file-integrity"].message
+
+
+def test_a_missing_file_and_another_width_are_named(
+    welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    narrow = welded[SEAM_FILE].replace(
+        b"TOOL_WIDTH\n  9\n$CUSTOMPROPERTY\n  1\n1\n",
+        b"TOOL_WIDTH\n  9\n$CUSTOMPROPERTY\n  1\n0.5\n",
+    )
+    assert narrow != welded[SEAM_FILE]
+    (folder / SEAM_FILE).write_bytes(narrow)
+    found = failures(folder)
+    assert found["bond-width"].measured == pytest.approx(0.5, abs=1e-6)
+    (folder / SEAM_FILE).unlink()
+    assert SEAM_FILE in failures(folder)["file-integrity"].message
