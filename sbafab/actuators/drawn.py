@@ -438,6 +438,10 @@ class DrawnDesign(Design):
         return tuple(row.role for row in self.layers)
 
     @property
+    def has_nets(self) -> bool:
+        return bool(_nets(self))
+
+    @property
     def seamed_layers(self) -> frozenset[tuple[int, int]]:
         return frozenset(seam.layers for seam in self.seams or ())
 

@@ -58,7 +58,7 @@ from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
 from sbafab.output.checked import limits as limits_of
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
-from sbafab.rules import film_limits
+from sbafab.rules import film_limits, nets
 from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, lowered
@@ -455,7 +455,7 @@ def rules_by_layer(
     for rule in RULES:
         if layers and rule.name in BY_LAYER:
             findings += findings_as_built(rule, measures)
-        else:
+        elif rule.name != nets.NAME or design.has_nets:
             message = f"not run: {why}"
             findings.append(Finding(rule.name, "warn", None, None, "", Place(None, lost), message))
     return tuple(findings)

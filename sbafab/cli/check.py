@@ -33,11 +33,13 @@ from sbafab.design.files import template_names
 from sbafab.design.identity import cited
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, SbafabError
+from sbafab.laminate.netlist import read_netlist
 from sbafab.models.formulas import size_phrases, sizes
 from sbafab.output.advice import Advice, advise
-from sbafab.output.checked import checks, refuse_undoable
+from sbafab.output.checked import checks, limits, refuse_undoable
 from sbafab.output.job import CheckedJob, check_job
 from sbafab.rules.deck import has_failed
+from sbafab.rules.nets import netlist_findings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,6 +60,7 @@ class CheckRequest(NamedTuple):
     target: float | None
     as_json: bool
     verbose: bool
+    nets: Path | None = None
 
     @property
     def is_folder(self) -> bool:
@@ -93,14 +96,21 @@ class CheckOutcome(NamedTuple):
     help="Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest "
     "bond and overhang that reach it.",
 )
+@click.option(
+    "--nets",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Also compare what the layers join with a netlist: JSON of sbafab/nets@1 or ParchMint.",
+)
 @click.option("-v", "--verbose", is_flag=True, help="All findings, with places and reasons.")
 @click.option("--watch", is_flag=True, help="Check again whenever a file of the design changes.")
 @json_option
-def check(
+def check(  # noqa: PLR0913, PLR0917 - one an option
     source: str,
     assignments: tuple[str, ...],
     waivers: tuple[str, ...],
     target_yield: float | None,
+    nets: Path | None,
     verbose: bool,
     watch: bool,
     as_json: bool,
@@ -109,7 +119,7 @@ def check(
 
     Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
     """
-    request = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose)
+    request = CheckRequest(source, assignments, waivers, target_yield, as_json, verbose, nets)
     if watch:
         if as_json:
             raise click.UsageError("--watch and --json exclude each other; leave one out")
@@ -173,12 +183,28 @@ def _check_source(request: CheckRequest) -> CheckOutcome:
                     "--target-yield goes with a design, and this is an assembly; check its "
                     "parts' designs one by one"
                 )
+            if request.nets is not None:
+                raise DesignError(
+                    "--nets goes with a design, and this is an assembly; check its parts' designs "
+                    "one by one"
+                )
             return _outcome(check_job(source, progress=progress))
         has_target = source.rules.target_yield is not None
         if request.target is not None:
             assignments = _with_target(request, request.target)
             source = load_design(request.source, assignments, request.waivers)
-        return _outcome(check_job(source, progress=progress))._replace(has_target=has_target)
+        job = check_job(source, progress=progress)
+        outcome = _outcome(job)._replace(has_target=has_target)
+        return outcome if request.nets is None else _against_netlist(outcome, job, request.nets)
+
+
+def _against_netlist(outcome: CheckOutcome, job: CheckedJob, file: Path) -> CheckOutcome:
+    """Return the outcome with the findings of a design against a netlist."""
+    (checked,) = job.designs
+    netlist = read_netlist(file)
+    more = netlist_findings(checked.laminate, limits(checked.design), netlist, file.name)
+    findings = (*outcome.findings, *more)
+    return outcome._replace(findings=findings, groups=[Group(outcome.name, findings)])
 
 
 def _outcome(job: CheckedJob) -> CheckOutcome:
@@ -220,7 +246,7 @@ def _check_folder(request: CheckRequest) -> CheckOutcome:
         )
     # A broken file becomes a finding; the log of ezdxf would repeat it on the screen.
     logging.getLogger("ezdxf").addHandler(logging.NullHandler())
-    findings = check_folder(Path(request.source))
+    findings = check_folder(Path(request.source), request.nets)
     return CheckOutcome("as-built", request.source, findings, [Group(request.source, findings)])
 
 

@@ -16,9 +16,10 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
-from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam
+from sbafab.laminate.joints import FaceBond, Fold, Net, Port, PortKind, Seam
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
 from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
+from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
 from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
@@ -419,6 +420,25 @@ def _laminate() -> dict[str, Any]:
     )
 
 
+def _nets() -> dict[str, Any]:
+    place = {**array(number()), "description": "x, y, mm", "minItems": 2, "maxItems": 2}
+    layers = {
+        **array({"type": "integer", "minimum": 1}),
+        "description": "structural layers below and above, from 1",
+        "minItems": 2,
+        "maxItems": 2,
+    }
+    kind = {"enum": [*get_args(PortKind)]}
+    port = and_perhaps(table(name=TEXT), at=place, layers=layers, kind=kind)
+    nets = {
+        "type": "object",
+        "minProperties": 1,
+        "additionalProperties": {**array({"oneOf": [TEXT, port]}), "minItems": 1},
+        "description": "by name: ports and chambers of the design, or ports with their place",
+    }
+    return table(schema={"const": NETS_SCHEMA}, nets=nets)
+
+
 def _error() -> dict[str, Any]:
     kinds = ["usage", "input", "too-large", "defect", "stopped", "memory", "files"]
     error = table(kind={"enum": kinds}, message=TEXT, exit_code={"type": "integer"})
@@ -638,6 +658,7 @@ FORMATS: Mapping[str, Format] = {
     "laminate": Format(
         LAMINATE_SCHEMA, "`laminate.json`: layers with exact edges, films, inlets", _laminate
     ),
+    "nets": Format(NETS_SCHEMA, "a netlist, for `check --nets`", _nets),
     "manifest": Format(
         SCHEMA, "`manifest.json` of a design's folder", lambda: _manifest(Manifest, SCHEMA)
     ),

@@ -146,6 +146,11 @@ class Design(Section):
         return ()
 
     @property
+    def has_nets(self) -> bool:
+        """True if the design says which ports its voids join."""
+        return False
+
+    @property
     def seamed_layers(self) -> frozenset[tuple[int, int]]:
         """Pairs of layers, by index, that seams bond."""
         return frozenset()

@@ -85,4 +85,13 @@ AS_BUILT: Mapping[str, Explanation] = {
 }
 """The checks on a folder, beside the rules on what it will cut."""
 
-EXPLAINED: Mapping[str, Explanation] = {**DECK, **BETWEEN_PARTS, **AS_BUILT}
+AGAINST_NETLIST: Mapping[str, Explanation] = {
+    "netlist": Explanation(
+        "the voids join what the netlist of check --nets lists, and nothing else",
+        "A circuit from another program is only made if the layers join what it joins.",
+        "Change the layer at the place named, or the netlist.",
+    ),
+}
+"""The check of a design or folder against a netlist."""
+
+EXPLAINED: Mapping[str, Explanation] = {**DECK, **BETWEEN_PARTS, **AS_BUILT, **AGAINST_NETLIST}

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cached_property
 from itertools import chain
 from typing import Literal, NamedTuple
@@ -20,6 +21,7 @@ from sbafab.geometry.width import Width, least_width
 from sbafab.laminate.films import Film
 from sbafab.laminate.joints import Net
 from sbafab.laminate.laminate import Interface, Laminate, Layer
+from sbafab.laminate.netlist import Netlist, compare
 from sbafab.rules.boundary import without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
@@ -36,6 +38,8 @@ from sbafab.rules.void_axes import (
 from sbafab.rules.voids import OUTSIDE, Cavity, Void, VoidGraph, cavities, void_graph
 
 NAME = "nets"
+NETLIST = "netlist"
+"""Check of a laminate against a netlist in a file of its own."""
 
 FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
 
@@ -164,6 +168,46 @@ def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Con
         tuple(chain(*differences)) if faults else (),
         tuple(reading.narrow()) if faults else (),
     )
+
+
+def netlist_findings(
+    laminate: Laminate, limits: Limits, netlist: Netlist, file: str
+) -> list[Finding]:
+    """Return the findings of a laminate against a netlist alone, in place of its own nets.
+
+    Ports of the netlist that have a place need not be the laminate's; of others, and of chambers,
+    the names must be.
+    """
+    placed = {port.name for port in netlist.ports}
+    own = (port for port in laminate.ports if port.name not in placed)
+    ports = (*own, *netlist.ports)
+    names = {chamber.name for chamber in laminate.chambers} | {port.name for port in ports}
+    nets = tuple(
+        Net(name, tuple(member for member in members if member in names))
+        for name, members in netlist.nets.items()
+    )
+    found = connectivity(replace(laminate, ports=ports, nets=nets), limits)
+    comparison = compare(found.groups, netlist.nets)
+    findings = [
+        Finding(NETLIST, "fail", 0.0, 1.0, "differences", Place(), _missing(name, file, names))
+        for name in comparison.missing
+    ]
+    for fault in found.faults:
+        if fault.kind in ("open", "short", "leak"):
+            place = Place(fault.interface, fault.layers, *fault.at)
+            message = f"{file}: {fault.message}"
+            findings.append(Finding(NETLIST, "fail", 0.0, 1.0, "differences", place, message))
+    if not findings:
+        count = _counted(len(comparison.matched), "net")
+        message = f"{file}: {count} joined as listed, and to nothing else"
+        findings.append(Finding(NETLIST, "pass", 0.0, 0.0, "differences", Place(), message))
+    return findings
+
+
+def _missing(name: str, file: str, names: Iterable[str]) -> str:
+    near = get_close_matches(name, sorted(names), 1)
+    hint = f"did you mean {near[0]}?" if near else "give its layers and its place, or correct it"
+    return f"{file} names {name}, which is no port or chamber of the design; {hint}"
 
 
 class _Terminal(NamedTuple):

@@ -37,6 +37,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.cutting.verify import TOLERANCE, check_contours
 from sbafab.errors import DesignError, GeometryError, OutputError
 from sbafab.geometry.region import Region
+from sbafab.laminate.netlist import read_netlist
 from sbafab.meshing.surface import Surface, open_edges
 from sbafab.models.figures import Factors, PredictionRequest
 from sbafab.models.prediction import predict
@@ -64,7 +65,8 @@ from sbafab.output.folder import write_design, write_folder
 from sbafab.output.job import CheckedJob, find_nests, of_assembly, plan_job
 from sbafab.output.manifest import JobManifest, Manifest, as_json, file_names
 from sbafab.process import ignore_progress
-from sbafab.rules.finding import Finding
+from sbafab.rules.finding import Finding, Place
+from sbafab.rules.nets import NETLIST, netlist_findings
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.version import GENERATOR
 
@@ -81,15 +83,30 @@ NOT_COMPARED = ("files", "mesh_statistics", "meshes")
 """Keys of a manifest that hold hashes, or meshes of several commands."""
 
 
-def check_folder(folder: Path) -> tuple[Finding, ...]:
+def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     """Everything found in an output folder: file integrity, the manifest's claims, the deck, and
-    whether all that lies in it is what its design makes.
+    whether all that lies in it is what its design makes; with ``nets``, a file, also whether its
+    layers join what that netlist lists.
 
     Of a job's folder, that of every design, and of the film sheets they share. Raises OutputError
-    with one sentence for a folder that holds no sound manifest or no cut files.
+    with one sentence for a folder that holds no sound manifest or no cut files, DesignError for a
+    netlist that cannot be read, or one of a job.
     """
+    netlist = None if nets is None else read_netlist(nets)
     read = read_back(folder)
-    return read.against_design(design_problems_of(folder, read))
+    findings = read.against_design(design_problems_of(folder, read))
+    if netlist is None or nets is None:
+        return findings
+    if read.job is not None:
+        raise DesignError(
+            f"{folder} holds several designs, and a netlist is one design's; check the folder of "
+            "that one"
+        )
+    (built,) = read.designs
+    if built.laminate is None:
+        message = f"{nets.name} was not compared: not all layers could be read"
+        return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
+    return (*findings, *netlist_findings(built.laminate, built.limits, netlist, nets.name))
 
 
 def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:

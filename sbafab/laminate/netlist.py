@@ -1,0 +1,196 @@
+"""Netlists: what is meant to be joined, by name, compared with what the voids of a laminate join.
+
+Read from JSON: this program's own form (``sbafab/nets@1``), or the connections of a ParchMint file
+(3DuF's and the benchmarks' exchange format).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from sbafab.errors import DesignError
+from sbafab.laminate.joints import Port, PortKind
+
+SCHEMA = "sbafab/nets@1"
+OTHER_LETTERS = re.compile("[^A-Za-z0-9._-]")
+"""What no name of a port may have."""
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """Nets by name, each with the names of its ports and chambers, and ports with a place."""
+
+    nets: Mapping[str, tuple[str, ...]]
+    ports: tuple[Port, ...] = ()
+
+
+@dataclass(frozen=True)
+class NetlistComparison:
+    """Nets that match, nets that are open, pairs of nets that are joined, names that are missing.
+
+    A net of which a name is missing is neither open nor matched.
+    """
+
+    matched: tuple[str, ...]
+    open: tuple[str, ...]
+    shorted: tuple[tuple[str, str], ...]
+    missing: tuple[str, ...]
+
+    @property
+    def is_equal(self) -> bool:
+        """True if every net matches."""
+        return not (self.open or self.shorted or self.missing)
+
+
+def compare(
+    groups: Iterable[frozenset[str]], nets: Mapping[str, Sequence[str]]
+) -> NetlistComparison:
+    """Compare nets with the ports that are joined; every port of a laminate is in a group.
+
+    Ports that no net names count as a net of their own, by their name. A port that lies in two
+    groups, as the inlet and the pocket of a chamber may, makes its net open.
+    """
+    parts = [*groups]
+    home: dict[str, set[int]] = {}
+    for number, part in enumerate(parts):
+        for port in part:
+            home.setdefault(port, set()).add(number)
+    named = {port for ports in nets.values() for port in ports}
+    missing = tuple(dict.fromkeys(p for ports in nets.values() for p in ports if p not in home))
+    broken = tuple(
+        name
+        for name, ports in nets.items()
+        if len({part for port in ports for part in home.get(port, ())}) > 1
+    )
+    alone = {port: (port,) for port in sorted(home) if port not in named}
+    owners: dict[int, dict[str, None]] = {}
+    for name, ports in {**nets, **alone}.items():
+        for port in ports:
+            for place in sorted(home.get(port, ())):
+                owners.setdefault(place, {})[name] = None
+    shorted = dict.fromkeys(
+        (first, other) for first, *others in owners.values() for other in others
+    )
+    faulty = {*broken, *(name for pair in shorted for name in pair)}
+    matched = tuple(
+        name
+        for name, ports in nets.items()
+        if name not in faulty and not any(port in missing for port in ports)
+    )
+    return NetlistComparison(matched, broken, tuple(shorted), missing)
+
+
+# Files.
+
+
+def read_netlist(path: Path) -> Netlist:
+    """Return the netlist of a JSON file. Raises DesignError, which names file and place."""
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise DesignError(f"{path} cannot be read as a netlist: {error}") from error
+    if isinstance(document, dict) and document.get("schema") == SCHEMA:
+        return _netlist(path, document)
+    if isinstance(document, dict) and isinstance(document.get("connections"), list):
+        try:
+            return Netlist(parchmint_nets(document))
+        except (LookupError, TypeError, AttributeError) as error:
+            raise DesignError(
+                f"{path} has connections that are not ParchMint's ({error!r}); each has a source "
+                "and sinks, which name a component"
+            ) from None
+    raise DesignError(
+        f'{path} is no netlist; it is JSON with "schema": "{SCHEMA}" and "nets", or a ParchMint '
+        'file with "connections"'
+    )
+
+
+def _netlist(path: Path, document: dict[str, Any]) -> Netlist:
+    tables = document.get("nets")
+    if not isinstance(tables, dict) or not tables:
+        raise DesignError(f"{path}: nets must be an object of lists by name, and hold one or more")
+    ports: dict[str, Port] = {}
+    nets: dict[str, tuple[str, ...]] = {}
+    home: dict[str, str] = {}
+    for net, rows in tables.items():
+        if not isinstance(rows, list) or not rows:
+            raise DesignError(f"{path}: nets.{net} must be a list of ports, one or more")
+        names = []
+        for number, row in enumerate(rows):
+            place = f"{path}: nets.{net}[{number}]"
+            name, port = _member(place, row)
+            if name in home:
+                raise DesignError(
+                    f"{place} names {name!r}, and so does nets.{home[name]}; a port belongs to "
+                    "one net, once"
+                )
+            home[name] = net
+            names.append(name)
+            if port is not None:
+                ports[name] = port
+        nets[net] = tuple(names)
+    return Netlist(nets, tuple(ports.values()))
+
+
+def _member(place: str, row: Any) -> tuple[str, Port | None]:
+    """Return the name of a row, and its port where it states a place."""
+    if isinstance(row, str):
+        return row, None
+    if not isinstance(row, dict) or not isinstance(row.get("name"), str):
+        raise DesignError(f'{place} must be a name, or an object with "name"')
+    if "at" not in row:
+        return row["name"], None
+    layers, at, kind = row.get("layers", []), row["at"], row.get("kind", "place")
+    if not (_is_pair(layers, int) and _is_pair(at, int, float) and kind in get_args(PortKind)):
+        raise DesignError(
+            f'{place} must have "at": [x, y], "layers": [below, above] and, if at all, '
+            f'"kind": {" or ".join(get_args(PortKind))}'
+        )
+    below, above = layers
+    return row["name"], Port(row["name"], below, above, (float(at[0]), float(at[1])), kind)
+
+
+def _is_pair(values: Any, *kinds: type) -> bool:
+    return (
+        isinstance(values, list)
+        and len(values) == 2
+        and all(isinstance(value, kinds) and not isinstance(value, bool) for value in values)
+    )
+
+
+def port_name(component: str, port: str | None) -> str:
+    """Return the name of a component's port in a netlist: "component.port"."""
+    name = component if port in (None, "") else f"{component}.{port}"
+    return OTHER_LETTERS.sub("_", name)
+
+
+def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """Return the nets of a ParchMint document: ports that channels join, by the first channel.
+
+    Connections that end at one port of a component are one net. What a component joins within
+    itself is not in the file, so that its ports are apart here.
+    """
+    home: dict[str, str] = {}
+    members: dict[str, dict[str, None]] = {}
+    for row in document["connections"]:
+        name = OTHER_LETTERS.sub("_", str(row.get("name") or row["id"]))
+        ends = [port_name(end["component"], end.get("port")) for end in _ends(row)]
+        for joined in dict.fromkeys(home[end] for end in ends if end in home):
+            if joined != name:
+                # The earlier channel's net takes this one in.
+                members.setdefault(joined, {}).update(members.pop(name, {}))
+                name = joined
+        members.setdefault(name, {}).update(dict.fromkeys(ends))
+        home.update(dict.fromkeys(members[name], name))
+    return {name: tuple(ports) for name, ports in members.items()}
+
+
+def _ends(row: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    if row.get("source"):
+        yield row["source"]
+    yield from row.get("sinks") or ()
