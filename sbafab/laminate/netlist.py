@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -17,8 +17,12 @@ from sbafab.errors import DesignError
 from sbafab.laminate.joints import Port, PortKind
 
 SCHEMA = "sbafab/nets@1"
-OTHER_LETTERS = re.compile("[^A-Za-z0-9._-]")
+OTHER_LETTERS = re.compile("[^A-Za-z0-9._-]+")
 """What no name of a port may have."""
+VIA = "VIA"
+"""Component that joins the layers it lies on."""
+NO_MASK = "INTEGRATION"
+"""Type of layers that hold electrodes and the like, and no channels."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +105,8 @@ def read_netlist(path: Path) -> Netlist:
             return Netlist(parchmint_nets(document))
         except (LookupError, TypeError, AttributeError) as error:
             raise DesignError(
-                f"{path} has connections that are not ParchMint's ({error!r}); each has a source "
-                "and sinks, which name a component"
+                f"{path} has connections that are not ParchMint's ({error!r}); each has a layer, "
+                "and a source and sinks that name a component"
             ) from None
     raise DesignError(
         f'{path} is no netlist; it is JSON with "schema": "{SCHEMA}" and "nets", or a ParchMint '
@@ -163,34 +167,57 @@ def _is_pair(values: Any, *kinds: type) -> bool:
     )
 
 
-def port_name(component: str, port: str | None) -> str:
-    """Return the name of a component's port in a netlist: "component.port"."""
-    name = component if port in (None, "") else f"{component}.{port}"
-    return OTHER_LETTERS.sub("_", name)
-
-
 def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Return the nets of a ParchMint document: ports that channels join, by the first channel.
+    """Return the nets of a ParchMint document, as ``sbafab import`` names them.
 
-    Connections that end at one port of a component are one net. What a component joins within
-    itself is not in the file, so that its ports are apart here.
+    A component is a port by its id on every layer, with the layer's name where it is on several.
+    Connections join the components at their ends, on their layer; a VIA joins its layers.
     """
-    home: dict[str, str] = {}
-    members: dict[str, dict[str, None]] = {}
+    titles = {
+        row["id"]: row.get("name") or row["id"]
+        for row in document.get("layers", ())
+        if str(row.get("type", "")).upper() != NO_MASK
+    }
+    labels: dict[_Spot, str] = {}
+    near: dict[_Spot, _Spot] = {}
+    for row in document.get("components", ()):
+        spots = [(layer, row["id"]) for layer in row["layers"] if layer in titles]
+        for spot in spots if row.get("x-span", 1) or row.get("y-span", 1) else ():
+            text = f"{row['id']}-{titles[spot[0]]}" if len(spots) > 1 else row["id"]
+            labels[spot] = _free_name(text, labels.values())
+        if str(row.get("entity", "")).upper() == VIA:
+            _join(near, spots)
     for row in document["connections"]:
-        name = OTHER_LETTERS.sub("_", str(row.get("name") or row["id"]))
-        ends = [port_name(end["component"], end.get("port")) for end in _ends(row)]
-        for joined in dict.fromkeys(home[end] for end in ends if end in home):
-            if joined != name:
-                # The earlier channel's net takes this one in.
-                members.setdefault(joined, {}).update(members.pop(name, {}))
-                name = joined
-        members.setdefault(name, {}).update(dict.fromkeys(ends))
-        home.update(dict.fromkeys(members[name], name))
-    return {name: tuple(ports) for name, ports in members.items()}
+        ends = [row["source"], *row["sinks"]]
+        spots = [(row.get("layer", ""), end["component"]) for end in ends]
+        for spot in spots if not document.get("components") else ():
+            labels.setdefault(spot, _free_name(spot[1], labels.values()))
+        _join(near, spots)
+    groups: dict[_Spot, list[str]] = {}
+    for spot, label in labels.items():
+        groups.setdefault(_root(near, spot), []).append(label)
+    return {f"net{i}": tuple(members) for i, members in enumerate(groups.values(), start=1)}
 
 
-def _ends(row: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    if row.get("source"):
-        yield row["source"]
-    yield from row.get("sinks") or ()
+_Spot = tuple[str, str]
+"""A component on a layer: the ids of layer and component."""
+
+
+def _join(near: dict[_Spot, _Spot], spots: Sequence[_Spot]) -> None:
+    for spot in spots[1:]:
+        near[_root(near, spot)] = _root(near, spots[0])
+
+
+def _root(near: Mapping[_Spot, _Spot], spot: _Spot) -> _Spot:
+    while near.get(spot, spot) != spot:
+        spot = near[spot]
+    return spot
+
+
+def _free_name(text: str, taken: Iterable[str]) -> str:
+    stem = name = OTHER_LETTERS.sub("-", text).strip("-._")[:64] or "port"
+    number, names = 1, set(taken)
+    while name in names:
+        number += 1
+        name = f"{stem[:60]}-{number}"
+    return name

@@ -17,12 +17,16 @@ from sbafab.actuators import load_design
 from sbafab.cli import main
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, strip
-from sbafab.laminate.netlist import compare, parchmint_nets, port_name, read_netlist
+from sbafab.laminate.netlist import compare, parchmint_nets, read_netlist
 from sbafab.rules.finding import Finding
+from sbafab.rules.limits import Limits
+from sbafab.rules.nets import netlist_findings
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.actuators.test_drawn_nets import ROUTED
 from tests.as_built.doctoring import Doctor
+from tests.importing.test_parchmint import circuit as circuit_of_two_channels
+from tests.importing.test_parchmint import written
 from tests.site.formats import hold
 
 
@@ -145,10 +149,14 @@ def test_a_netlist_may_give_places_of_its_own(
 
 PARCHMINT = {
     "name": "circuit",
-    "components": [{"id": "supply"}, {"id": "left"}, {"id": "tube"}, {"id": "right"}],
+    "layers": [{"id": "f", "name": "flow", "type": "FLOW"}],
+    "components": [
+        {"id": name, "entity": "PORT", "layers": ["f"]}
+        for name in ("supply", "left", "tube", "right")
+    ],
     "connections": [
-        {"id": "c1", "source": {"component": "supply"}, "sinks": [{"component": "left"}]},
-        {"id": "c2", "source": {"component": "tube"}, "sinks": [{"component": "right"}]},
+        {"id": first, "layer": "f", "source": {"component": first}, "sinks": [{"component": last}]}
+        for first, last in (("supply", "left"), ("tube", "right"))
     ],
 }
 
@@ -161,22 +169,54 @@ def test_parchmints_connections_are_a_netlist(
     assert check_against(clean_routed, path, capsys)["verdicts"] == ["pass"]
 
 
-def test_connections_that_share_a_port_are_one_net() -> None:
-    def end(component: str, port: str | None = None) -> dict[str, str | None]:
-        return {"component": component, "port": port}
+def test_connections_join_components_layer_by_layer_and_a_via_joins_layers() -> None:
+    def component(name: str, entity: str, *layers: str) -> dict[str, object]:
+        return {"id": name, "entity": entity, "layers": layers, "x-span": 9, "y-span": 9}
 
-    rows = [
-        {"id": "a", "name": "one", "source": end("p"), "sinks": [end("m", "1")]},
-        {"id": "b", "name": "two", "source": end("q"), "sinks": [end("r"), end("s 2", "x")]},
-        {"id": "c", "name": "three", "source": end("m", "1"), "sinks": [end("q")]},
-        {"id": "d", "name": "four", "source": end("m", "2"), "sinks": [end("t")]},
-    ]
-    nets = parchmint_nets({"connections": rows})
-    assert {frozenset(ports) for ports in nets.values()} == {
-        frozenset({"p", "m.1", "q", "r", "s_2.x"}),
-        frozenset({"m.2", "t"}),
+    def joins(layer: str, first: str, *others: str) -> dict[str, object]:
+        sinks = [{"component": other, "port": "1"} for other in others]
+        return {"id": f"c{first}", "layer": layer, "source": {"component": first}, "sinks": sinks}
+
+    document = {
+        "layers": [{"id": "l1", "name": "flow"}, {"id": "l2", "name": "control"}],
+        "components": [
+            component("p 1", "PORT", "l1"),
+            component("mix", "MIXER", "l1"),
+            component("q", "PORT", "l1"),
+            component("valve", "VALVE", "l1", "l2"),
+            component("gas", "PORT", "l2"),
+            component("up", "VIA", "l1", "l2"),
+            component("far", "PORT", "l2"),
+            component("alone", "PORT", "l1"),
+        ],
+        "connections": [
+            joins("l1", "p 1", "mix"),
+            joins("l1", "mix", "q", "valve"),
+            joins("l2", "gas", "valve"),
+            joins("l1", "q", "up"),
+            joins("l2", "up", "far"),
+        ],
     }
-    assert port_name("in 1", "a/b") == "in_1.a_b"
+    assert {frozenset(ports) for ports in parchmint_nets(document).values()} == {
+        frozenset({"p-1", "mix", "q", "valve-flow", "up-flow", "up-control", "far"}),
+        frozenset({"valve-control", "gas"}),
+        frozenset({"alone"}),
+    }
+
+
+def test_an_imported_circuit_matches_its_own_file(tmp_path: Path) -> None:
+    laminate = written(circuit_of_two_channels(), tmp_path).laminate
+    path = tmp_path / "circuit.json"
+    (finding,) = netlist_findings(laminate, Limits(), read_netlist(path), path.name)
+    assert finding.message == "circuit.json: 2 nets joined as listed, and to nothing else"
+    # Another channel in the netlist is an open of the layers.
+    document = circuit_of_two_channels()
+    document["connections"].append(
+        {"id": "d", "layer": "f", "source": {"component": "in1"}, "sinks": [{"component": "in2"}]}
+    )
+    path.write_text(json.dumps(document), encoding="utf-8")
+    (finding,) = netlist_findings(laminate, Limits(), read_netlist(path), path.name)
+    assert (finding.verdict, finding.message[:34]) == ("fail", "circuit.json: net net1 is open: in")
 
 
 BAD: list[tuple[object, str]] = [
