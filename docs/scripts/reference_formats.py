@@ -30,6 +30,7 @@ ASCII DXF R2010 in millimetres (`$INSUNITS` 4), model space only, everything at 
 | `CUT_OUTER` | 1 | outlines |
 | `CUT_SHEET` | 6 | the parting cut, last |
 | `REFERENCE` | | not cut: datum cross, sheet frame |
+| `SEAM` | 3 | in files of its own: the path that the middle of a tool follows |
 
 One closed `LWPOLYLINE` with bulges a contour, `CIRCLE` for a full circle. Layer files have the actuator's axis at
 (0, 0); sheets have their lower left corner there. Custom properties hold the design's hash, the state of the kerf and
