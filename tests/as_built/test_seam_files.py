@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 from ezdxf.document import Drawing
 
-from sbafab.api import check_folder, generate
+from sbafab.api import check_folder, generate, press
 from sbafab.as_built.check import read_back
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
@@ -159,3 +159,13 @@ def test_a_missing_file_and_another_width_are_named(
     assert found["bond-width"].measured == pytest.approx(0.5, abs=1e-6)
     (folder / SEAM_FILE).unlink()
     assert SEAM_FILE in failures(folder)["file-integrity"].message
+
+
+def test_seams_stay_listed_when_another_part_is_written(
+    welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    folder = laid_out(welded, tmp_path)
+    press(folder / "design.toml", out=tmp_path)
+    (claim,) = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["seams"]
+    assert claim["file"] == SEAM_FILE
+    assert failures(folder) == {}

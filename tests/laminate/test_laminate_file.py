@@ -26,8 +26,10 @@ from sbafab.laminate.laminate import ROLES, Laminate
 from sbafab.laminate.laminate_file import laminate_json, read_laminate
 from sbafab.laminate.laminate_validator import FIELDS, HEAD, PANEL, faults
 from sbafab.laminate.laminate_validator import ROLES as ROLES_OF_THE_FORMAT
+from tests.judge.welded_drafts import welded_draft
 from tests.properties.designs import Draft, valid
 from tests.properties.test_designs import share
+from tests.quick import few
 from tests.site.formats import hold
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm", "pouch")
@@ -251,3 +253,16 @@ def test_a_file_without_later_keys_is_read_as_before(tmp_path: Path) -> None:
     path = tmp_path / "laminate.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     assert read_laminate(path) == laminate
+
+
+# Of a stack whose seams have no order, or whose films nothing joins, there is no laminate.
+UNMADE = ("wide top", "no neck")
+ORDERED = [n for n in range(160) if welded_draft(5, n).fault not in UNMADE][:100]
+
+
+@pytest.mark.parametrize("number", few(ORDERED, 6))
+def test_random_seams_and_folds_are_read_back_exactly(number: int, tmp_path: Path) -> None:
+    draft = welded_draft(5, number)
+    laminate = build(load_design(draft.write(tmp_path)))
+    assert laminate.seams or laminate.folds or draft.fault == "not folded"
+    assert_read_back(laminate, tmp_path)
