@@ -11,10 +11,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
+from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
+from sbafab.importing.polygons import SUFFIXES, polygon_layer
 from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.laminate import Role
 
@@ -55,7 +57,8 @@ class CsvRow(NamedTuple):
 def import_table(folder: Path) -> Imported:
     """Return the design of a folder of DXF or SVG files and its tables. Raises DesignError.
 
-    A ``kit.toml`` beside the tables gives films, press, laser and limits.
+    A layer of polygons of foldable_robotics, by its number, is a drawing too. A ``kit.toml`` beside
+    the tables gives films, press, laser and limits.
     """
     rows = read_table(folder / LAYERS, LAYER_COLUMNS)
     shapes: dict[str, dict[str, Any]] = {}
@@ -69,7 +72,8 @@ def import_table(folder: Path) -> Imported:
             name, content = _drawing(folder, row)
             if drawings.setdefault(name, content) != content:
                 raise DesignError(f"{row.place}: two files are named {name}; rename one of them")
-            layer = {} if drawing[1] is None else {"layer": drawing[1]}
+            is_part = drawing[1] is not None and name == Path(drawing[0]).name
+            layer = {"layer": drawing[1]} if is_part else {}
             shapes[names[drawing]] = {"file": name, **layer}
         layers.append(_layer(row, names[drawing]))
     chambers = _chambers(folder / CHAMBERS) if (folder / CHAMBERS).is_file() else []
@@ -149,10 +153,17 @@ def _row(
 
 def _drawing(folder: Path, row: CsvRow) -> tuple[str, bytes]:
     """The name and content of a row's drawing, which must be one."""
-    path = folder / row.cells["file"]
-    if path.suffix.lower() not in DRAWINGS:
-        raise DesignError(f"{row.place}: file = {shown(row.cells['file'])} is neither DXF nor SVG")
+    path, layer = folder / row.cells["file"], row.cells.get("layer", "")
+    suffix = path.suffix.lower()
+    if suffix not in (*DRAWINGS, *SUFFIXES):
+        raise DesignError(
+            f"{row.place}: file = {shown(row.cells['file'])} is no DXF or SVG, and no JSON or YAML "
+            "of polygons"
+        )
     try:
+        if suffix in SUFFIXES:
+            region = polygon_layer(path, layer)
+            return f"{path.stem}-{layer}.dxf", dxf_text(region.contours, {}).encode()
         read_drawing(path, row.cells.get("layer"))
         return path.name, path.read_bytes()
     except DesignError as error:

@@ -10,6 +10,7 @@ from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import LAYERS, import_table
 from sbafab.importing.parchmint import import_parchmint
+from sbafab.importing.polygons import POPUPCAD, refuse_without_table
 from sbafab.importing.records import Imported
 from sbafab.laminate.laminate_validator import SCHEMA
 
@@ -54,9 +55,19 @@ def _has_table(source: Path) -> bool:
     return (source / LAYERS).is_file()
 
 
+def _is_polygons(source: Path) -> bool:
+    suffix = source.suffix.lower()
+    return suffix in (POPUPCAD, ".yaml", ".yml") or _holds('"geoms"')(source)
+
+
+def _no_table(source: Path) -> Imported:
+    raise refuse_without_table(source, LAYERS)
+
+
 FORMATS = (
     SourceFormat(f"a folder of drawings with {LAYERS}", _has_table, import_table),
     SourceFormat("an output folder, with its design.toml", _has_design, import_folder),
     SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
     SourceFormat("a circuit in ParchMint JSON", _holds('"components"'), import_parchmint),
+    SourceFormat("a laminate of polygons, with a table of its layers", _is_polygons, _no_table),
 )

@@ -1,0 +1,213 @@
+"""Folders of drawings and polygons with a table: areas by closed formulas, faults by their line."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import ezdxf
+import pytest
+
+from sbafab.importing.layer_table import import_table
+from sbafab.importing.write import Written, write_imported
+from sbafab.rules.deck import run_deck
+from sbafab.rules.limits import Limits
+from tests.importing.conftest import Importing
+
+LAYERS = """file,role,film,layer,pieces
+pouch.dxf,base,,FILM,
+pouch.dxf,chamber-mask,,MASK,
+cover.svg,cap,,,
+"""
+CHAMBERS = "name;x;y;mouth_x;mouth_y;angle;width\npouch;0;0;0;24;90;2\n"
+FILM = [(-21, -16), (21, -16), (21, 16), (2, 16), (2, 24), (-2, 24), (-2, 16), (-21, 16)]
+MASK = [
+    *[(-20, -15), (20, -15), (20, 15), (1, 15), (1, 24.5), (-1, 24.5), (-1, 15), (-20, 15)],
+]
+FILM_AREA, MASK_AREA = 42 * 32 + 4 * 8, 40 * 30 + 2 * 9.5
+POINTS = " ".join(f"{x},{-y}" for x, y in FILM)
+SVG = f"""<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="60mm"
+viewBox="-30 -30 60 60"><polygon points="{POINTS}"/></svg>"""
+
+
+def pouch(folder: Path, layers: str = LAYERS, chambers: str = CHAMBERS) -> Path:
+    """A folder with both films and the mask of a pouch of 40 x 30 mm, bonded by 1 mm."""
+    source = folder / "drawn pouch"
+    source.mkdir()
+    drawing = ezdxf.new(units=4)
+    for layer, points in (("FILM", FILM), ("MASK", MASK)):
+        drawing.modelspace().add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
+    drawing.saveas(source / "pouch.dxf")
+    (source / "cover.svg").write_text(SVG)
+    (source / "layers.csv").write_text(layers)
+    (source / "chambers.csv").write_text(chambers)
+    return source
+
+
+def written(source: Path) -> Written:
+    return write_imported(import_table(source), source.parent / "again.toml", source.name)
+
+
+def failing(made: Written) -> set[str]:
+    findings = run_deck(made.laminate, Limits(yield_builds=50))
+    return {finding.rule for finding in findings if finding.verdict == "fail"}
+
+
+def test_a_folder_of_drawings_is_a_laminate_that_keeps_the_rules(tmp_path: Path) -> None:
+    made = written(pouch(tmp_path))
+    areas = [layer.profile.area for layer in made.laminate.layers]
+    assert areas == pytest.approx([FILM_AREA, MASK_AREA, FILM_AREA], rel=1e-9)
+    assert made.design.name == "drawn-pouch"
+    assert made.laminate.inlets[0].mouth == (0, 24)
+    assert failing(made) == set()
+
+
+def test_a_narrower_bond_in_the_drawing_fails_the_rule_of_bonds(tmp_path: Path) -> None:
+    source = pouch(tmp_path)
+    (source / "cover.svg").write_text(SVG.replace("21,", "20.5,"))
+    assert "bond-width" in failing(written(source))
+
+
+def test_further_rows_of_a_chamber_are_further_centres(tmp_path: Path) -> None:
+    source = pouch(tmp_path, chambers=f"{CHAMBERS}pouch;5;5;;;;\n")
+    (chamber,) = written(source).laminate.chambers
+    assert chamber.centres == ((0, 0), (5, 5))
+
+
+def test_drawings_that_no_row_names_are_named(importing: Importing, tmp_path: Path) -> None:
+    source = pouch(tmp_path)
+    (source / "old.dxf").write_text("")
+    result = importing(source, "--json")
+    remark = "old.dxf: layers.csv does not name it, so it is not imported"
+    assert json.loads(result.stdout)["remarks"] == [remark]
+
+
+REFUSED: dict[str, tuple[str, str, str]] = {
+    "column": (
+        LAYERS.replace("film", "flim", 1),
+        CHAMBERS,
+        "has a column 'flim' that is not known",
+    ),
+    "no column": (LAYERS.replace("role", "layer", 1), CHAMBERS, "has the column layer twice"),
+    "no role": (LAYERS.replace("chamber-mask", ""), CHAMBERS, "layers.csv, line 3 has no role"),
+    "role": (
+        LAYERS.replace("cap", "lid"),
+        CHAMBERS,
+        "layers.csv, line 4: role = 'lid' must be one",
+    ),
+    "no file": (LAYERS.replace("cover", "lid"), CHAMBERS, "layers.csv, line 4: drawing "),
+    "kind": (
+        LAYERS.replace("cover.svg", "cover.png"),
+        CHAMBERS,
+        "line 4: file = 'cover.png' is no",
+    ),
+    "layer": (LAYERS.replace("MASK", "MSK"), CHAMBERS, "paths lie on FILM, MASK"),
+    "pieces": (
+        LAYERS.replace("FILM,", "FILM,many"),
+        CHAMBERS,
+        "line 2: pieces = 'many' is no count",
+    ),
+    "both": (LAYERS.replace("FILM", ""), CHAMBERS, "cross or touch each other at x "),
+    "film": (LAYERS.replace("base,,", "base,foil,"), CHAMBERS, "film of layer 1 = 'foil' names no"),
+    "empty": ("file,role\n", CHAMBERS, "layers.csv has 0 rows under its head; add some"),
+    "cells": (f"{LAYERS}a,b,c,d,e,f\n", CHAMBERS, "layers.csv, line 5 has 6 cells for 5 columns"),
+    "mouth": (LAYERS, "name,x,y\npouch,0,0\n", "chambers.csv, line 2 has no mouth_x, of the first"),
+    "length": (
+        LAYERS,
+        CHAMBERS.replace("24;90", "up;90"),
+        "line 2: mouth_y = 'up' must be a length",
+    ),
+    "second": (
+        LAYERS,
+        f"{CHAMBERS}pouch;5;5;;;;2\n",
+        "line 3: width of pouch stands in an earlier",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_fault_of_a_table_is_named_by_its_line(
+    name: str, importing: Importing, tmp_path: Path
+) -> None:
+    layers, chambers, sentence = REFUSED[name]
+    assert sentence in importing(pouch(tmp_path, layers, chambers)).output
+
+
+# Polygons of foldable_robotics.
+
+HOLED = "POLYGON ((-21 -16, 21 -16, 21 16, -21 16, -21 -16), (0 0, 4 0, 4 3, 0 0))"
+STRIP = "POLYGON ((-2 15, 2 15, 2 24, -2 24, -2 15))"
+POLYGONS: dict[str, Any] = {
+    "id": 1,
+    "layers": [
+        {"id": 2, "geoms": [HOLED, STRIP]},
+        {"id": 3, "geoms": ["MULTIPOLYGON (((-20 -15, 20 -15, 20 15, -20 15, -20 -15)))"]},
+        {"id": 4, "geoms": [HOLED.split("), (", maxsplit=1)[0] + "))"]},
+    ],
+}
+ROWS = "file,role,layer\nlam.json,base,1\nlam.json,chamber-mask,2\nlam.json,cap,3\n"
+
+
+def polygons(folder: Path, document: Any, rows: str = ROWS) -> Path:
+    source = folder / "polygons"
+    source.mkdir()
+    (source / "lam.json").write_text(json.dumps(document))
+    (source / "layers.csv").write_text(rows)
+    (source / "chambers.csv").write_text(CHAMBERS)
+    return source
+
+
+def test_layers_of_polygons_are_drawings_with_their_areas(tmp_path: Path) -> None:
+    made = written(polygons(tmp_path, POLYGONS))
+    areas = [layer.profile.area for layer in made.laminate.layers]
+    assert areas == pytest.approx([42 * 32 - 6 + 4 * 8, 40 * 30, 42 * 32], rel=1e-9)
+    assert math.isclose(made.laminate.layers[0].profile.bounds[3], 24)
+
+
+def test_yaml_of_foldable_robotics_is_read_alike(tmp_path: Path) -> None:
+    yaml = pytest.importorskip("yaml")
+    source = polygons(tmp_path, POLYGONS, ROWS.replace(".json", ".yaml"))
+    lines = ["id: 1", "layers:"]
+    for row in POLYGONS["layers"]:
+        lines += ["- !Layer", f"  id: {row['id']}", "  geoms:"]
+        lines += [f"  - {geom}" for geom in row["geoms"]]
+    (source / "lam.yaml").write_text("\n".join(lines))
+    plain = yaml.safe_load("\n".join(lines).replace("!Layer\n  id", "id"))
+    assert plain == POLYGONS
+    areas = [layer.profile.area for layer in written(source).laminate.layers]
+    assert areas == pytest.approx([42 * 32 - 6 + 4 * 8, 40 * 30, 42 * 32], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("geom", "sentence"),
+    [
+        ("LINESTRING (1 2, 3 4)", "layer 1, geometry 1 holds a LineString at x 1, y 2"),
+        ("POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))", "layer 1, geometry 1: Self-intersection[2 2]"),
+        ("POLYGON", "layer 1, geometry 1 is 'POLYGON', which is no WKT"),
+        (7, "layer 1 has no list of geoms as text"),
+        (None, "layer 1 holds no polygon; leave its row out"),
+    ],
+)
+def test_a_geometry_that_is_no_polygon_is_named_at_its_place(
+    geom: object, sentence: str, importing: Importing, tmp_path: Path
+) -> None:
+    first = {"geoms": [] if geom is None else [geom]}
+    document = {"layers": [first, *POLYGONS["layers"][1:]]}
+    assert sentence in importing(polygons(tmp_path, document)).output
+
+
+def test_a_layer_that_is_not_there_is_named(importing: Importing, tmp_path: Path) -> None:
+    source = polygons(tmp_path, POLYGONS, ROWS.replace("cap,3", "cap,4"))
+    assert "has no layer '4'; its layers are 1 to 3" in importing(source).output
+
+
+def test_polygons_without_a_table_say_what_is_missing(importing: Importing, tmp_path: Path) -> None:
+    source = polygons(tmp_path, POLYGONS) / "lam.json"
+    assert "holds 3 layers of polygons and not what they are for; write layers.csv" in (
+        importing(source).output
+    )
+    (tmp_path / "hinge.cad").write_text("!!python/object:popupcad.filetypes.design.Design\n")
+    said = importing(tmp_path / "hinge.cad").output
+    assert "is a popupCAD design, which holds operations on sketches and no layers" in said
