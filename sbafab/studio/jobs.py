@@ -6,6 +6,7 @@ longer needed. Files are looked for in ``folder`` alone.
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from sbafab.studio.model import (
     CancelCheck,
     finding_model,
     laminate_model,
+    nets_model,
     parts_model,
     shapes_model,
 )
@@ -89,6 +91,10 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
             "page. sbafab check measures them.",
         }
     yield {"kind": "checked"}
+    pause()
+    # After the rules, which a person waits for.
+    with contextlib.suppress(ModuleNotFoundError):
+        yield nets_model(laminate, api.nets_of(design), has)
 
 
 def _values(design: Design | Assembly) -> Answer:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sbafab.geometry.region import Region
     from sbafab.laminate.laminate import Laminate, Layer
     from sbafab.meshing.surface import Surface
+    from sbafab.reports.nets_svg import NetMap
     from sbafab.rules.finding import Finding
 
 CancelCheck = Callable[[], None]
@@ -105,6 +106,39 @@ def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> di
     shapes = AnswerShapes(has)
     named = {name: region and shapes.key(region) for name, region in drawn.items()}
     return {"kind": "shapes", "named": named, "shapes": shapes.new}
+
+
+def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[str, Any]:
+    """Voids with their nets by gap, the gaps of films, ports, and faults with their places."""
+    shapes = AnswerShapes(has)
+    return {
+        "kind": "nets",
+        "declared": bool(laminate.nets),
+        "colours": dict(nets.colours),
+        "gaps": [
+            {
+                "interface": gap.index,
+                "layers": list(gap.layer_indices),
+                "contact": shapes.key(gap.contact),
+            }
+            for gap in laminate.interfaces
+        ],
+        "areas": [
+            {
+                "nets": list(area.nets),
+                "interface": area.interface,
+                "colour": area.colour,
+                "shape": shapes.key(area.region),
+            }
+            for area in nets.areas
+        ],
+        "ports": [
+            {"name": port.name, "layers": [port.below, port.above], "at": list(port.at)}
+            for port in laminate.ports
+        ],
+        "faults": [asdict(fault) for fault in nets.faults],
+        "shapes": shapes.new,
+    }
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import { Studio } from "./state.js";
 import { Form } from "./form.js";
 import { Editor } from "./editor.js";
 import { Draw } from "./draw.js";
+import { Nets } from "./nets.js";
 import { Layers, svgBlob } from "./layers.js";
 import { Section } from "./section.js";
 import { Solid } from "./solid.js";
@@ -39,7 +40,7 @@ async function start() {
 
   new Form(studio);
   new Editor(studio);
-  views = { solid: new Solid(studio), layers: new Layers(studio), draw: new Draw(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), swing: new PartsMotion(studio), make: new Make(studio), compare: new Compare(studio), beside: new PartsCompare(studio) };
+  views = { solid: new Solid(studio), layers: new Layers(studio), draw: new Draw(studio), nets: new Nets(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), swing: new PartsMotion(studio), make: new Make(studio), compare: new Compare(studio), beside: new PartsCompare(studio) };
   studio.motion = views.motion;
   studio.drawing = views.draw;
   studio.moving = () => !views.motion.element.hidden || views.swing.moving;
@@ -141,7 +142,7 @@ function suitTabs() {
   const whole = studio.family === "assembly", { reference } = studio;
   // Only what is of one kind stands side by side.
   const alike = reference && (reference.family === "assembly") === whole;
-  const hidden = (name) => name in (whole ? INSTEAD : BACK) || (name === "draw" && (whole || !views.draw.present)) || (["compare", "beside"].includes(name) && !alike);
+  const hidden = (name) => name in (whole ? INSTEAD : BACK) || (name === "draw" && (whole || !views.draw.present)) || (name === "nets" && whole) || (["compare", "beside"].includes(name) && !alike);
   for (const name of Object.keys(views)) $(`#tab-${name}`).hidden = hidden(name);
   if (upper.shown && hidden(upper.shown)) show(upper.shown);
 }
@@ -158,7 +159,7 @@ function show(name) {
     if (own !== name) view.hide?.();
   }
   // What needs the room takes the section's as well.
-  $("#views").classList.toggle("whole", ["draw", "motion", "make", "compare", ...Object.keys(BACK)].includes(name));
+  $("#views").classList.toggle("whole", ["draw", "nets", "motion", "make", "compare", ...Object.keys(BACK)].includes(name));
   $("#low").hidden = $("#views").classList.contains("whole");
   views[name].show?.();
   if (!["compare", "beside"].includes(name)) remember("sbafab-view", name);
@@ -176,6 +177,7 @@ function goto(finding, section) {
   }
   phonePanel("views");
   const inside = own.find((index) => studio.layer(index)?.mask) ?? own[0];
+  if (finding.rule === "nets") { show("nets"); views.nets.gotoPlace(x, y, own); return; }
   if (!["solid", "layers", "draw"].includes(upper.shown)) show("layers");
   if (upper.shown === "draw") views.draw.goto(x, y);
   views.layers.goto(studio.layer(inside), x, y);
@@ -232,7 +234,7 @@ function marks(section) {
       const words = $(".stale-mark", element);
       if (words) words.textContent = bad ? "Last good design" : element.classList.contains("section-block") ? "Updating" : "Updating";
     };
-    for (const view of [views.solid, views.layers, views.draw, views.compare, views.parts, views.plan, views.swing, views.beside]) mark(view.element, studio.stale.laminate || bad);
+    for (const view of [views.solid, views.layers, views.draw, views.nets, views.compare, views.parts, views.plan, views.swing, views.beside]) mark(view.element, studio.stale.laminate || bad);
     mark(section.element, studio.stale.laminate || bad);
     mark($("#panel-findings").children[0], studio.stale.rules || bad);
     mark($("#panel-findings").children[1], studio.stale.figures || bad);

@@ -54,7 +54,7 @@ export class Studio {
 
   // What is opened: a text with the file it came from (or none) and what lies on disk.
   open(text, { name = null, seen = null, saved = text, back = null } = {}) {
-    Object.assign(this, { text, name, seen, savedText: saved, back, prediction: null, picked: null, pickedParts: [], cut: null });
+    Object.assign(this, { text, name, seen, savedText: saved, back, prediction: null, nets: null, picked: null, pickedParts: [], cut: null });
     this.keepBack();
     this.pending.clear();
     this.history = [text];
@@ -203,6 +203,11 @@ export class Studio {
         this.askElastic();
       },
       unpredicted: () => this.heardFigures(answer.message),
+      nets: () => {
+        for (const [key, shape] of Object.entries(answer.shapes)) this.shapes.set(key, shape);
+        this.nets = { ...answer, laminate: this.laminate };
+        this.emit("nets");
+      },
       rule: () => {
         this.running.push(answer);
         this.emit("rule", answer);
@@ -261,7 +266,7 @@ export class Studio {
   drop() {
     // Shapes of states long gone.
     if (this.shapes.size < 400) return;
-    const used = new Set([...[this.laminate, this.reference?.laminate].filter(Boolean).flatMap(shapeKeys), ...Object.values(this.named ?? {})]);
+    const used = new Set([...[this.laminate, this.reference?.laminate].filter(Boolean).flatMap(shapeKeys), ...Object.values(this.named ?? {}), ...(this.nets?.areas ?? []).map(({ shape }) => shape), ...(this.nets?.gaps ?? []).map(({ contact }) => contact)]);
     for (const key of this.shapes.keys()) if (!used.has(key)) this.shapes.delete(key);
   }
   time(what, flight) {
