@@ -126,7 +126,8 @@ def _fields(table: JsonSchema, schema: JsonSchema, prefix: str) -> Iterator[Fiel
                 yield from _fields(inner, schema, f"{prefix}{name}.")
             continue
         key = prefix + name
-        is_table = rule.get("type") == "object" or "$ref" in rule.get("items", {})
+        ways = rule.get("anyOf", [rule])
+        is_table = any(w.get("type") == "object" or "$ref" in w.get("items", {}) for w in ways)
         if key != "family" and not is_table:
             yield _field(key, rule)
 

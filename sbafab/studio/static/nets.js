@@ -75,7 +75,7 @@ export class Nets {
   }
 
   // Plane and sheet: where a place of a gap lies in the drawing, mm, y up.
-  get lift() { const [, y0, , y1] = this.map.laminate.bounds; return FLAT * (y1 - y0) * 0.62 + (y1 - y0) * 0.14; }
+  get lift() { const [, y0, , y1] = this.map.laminate.bounds; return 0.7 * (y1 - y0); }
   at(gap, [x, y]) { return this.gap ? [x, y] : [x + LEAN * y, FLAT * y + (gap - 1) * this.lift]; }
   bounds() {
     const [x0, y0, x1, y1] = this.map.laminate.bounds;
@@ -94,10 +94,15 @@ export class Nets {
   }
   sheet(gap) {
     const { eye, map, studio } = this, [ox, oy] = this.px(gap.interface, [0, 0]), s = eye.scale, line = { "vector-effect": "non-scaling-stroke", "fill-rule": "evenodd" };
+    // What a short joins has the colours of all its nets.
+    const colours = (one) => one.nets.map((name) => map.colours[name]), shorts = [...new Map(map.areas.filter((one) => one.nets.length > 1).map((one) => [one.nets.join(" "), colours(one)])).values()], wide = 9 / s;
+    const stripes = shorts.map((all) => el("pattern", { id: `short-${all.join("").replaceAll("#", "")}`, patternUnits: "userSpaceOnUse", width: wide * all.length, height: wide * all.length, patternTransform: "rotate(45)" }, ...all.map((colour, i) => el("rect", { x: i * wide, y: 0, width: wide, height: wide * all.length, fill: colour }))));
+    const fill = (one) => (one.nets.length > 1 ? `url(#short-${colours(one).join("").replaceAll("#", "")})` : one.colour);
     const pale = (one) => this.net !== null && !one.nets.includes(this.net);
     return el("g", { transform: this.gap ? `translate(${ox} ${oy}) scale(${s} ${-s})` : `matrix(${s} 0 ${LEAN * s} ${-FLAT * s} ${ox} ${oy})` },
+      el("defs", {}, ...stripes),
       el("path", { d: pathOf(studio.shape(gap.contact)), fill: "var(--panel)", "fill-opacity": this.gap ? 1 : 0.82, stroke: "var(--faint)", "stroke-width": 1, ...line }),
-      ...map.areas.filter((one) => one.interface === gap.interface).map((one) => el("path", { d: pathOf(studio.shape(one.shape)), class: "void", "data-nets": one.nets.join(" "), fill: one.colour, "fill-opacity": pale(one) ? 0.15 : 0.85, stroke: one.nets.length > 1 ? "var(--fail)" : one.colour, "stroke-width": one.nets.length > 1 ? 2.5 : 1, ...line }, el("title", {}, one.nets.length > 1 ? `short: ${one.nets.join(" and ")}` : one.nets[0] ?? "no net"))));
+      ...map.areas.filter((one) => one.interface === gap.interface).map((one) => el("path", { d: pathOf(studio.shape(one.shape)), class: "void", "data-nets": one.nets.join(" "), fill: fill(one), "fill-opacity": pale(one) ? 0.15 : 0.85, stroke: one.nets.length > 1 ? "var(--fail)" : one.colour, "stroke-width": one.nets.length > 1 ? 2.5 : 1, ...line }, el("title", {}, one.nets.length > 1 ? `short: ${one.nets.join(" and ")}` : one.nets[0] ?? "no net"))));
   }
   titleOf(gap) {
     if (this.gap) return [text(`Gap ${gap.interface}, between layers ${gap.layers[0]} and ${gap.layers.at(-1)}`, 14, 22)];

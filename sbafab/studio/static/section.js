@@ -23,7 +23,7 @@ export class Section {
     this.surface.addEventListener("pointermove", (event) => this.point(event));
     this.surface.addEventListener("pointerleave", () => studio.hover(null));
     this.surface.addEventListener("click", (event) => { if (this.eye.dragged <= 3) { const found = this.under(event); if (found?.layer) studio.pick(found.layer); } });
-    studio.on("laminate cut", () => this.update());
+    studio.on("laminate cut nets", () => this.update());
     studio.on("hover pick theme", () => this.draw());
     studio.on("opened", () => { this.eye.touched = false; this.mark = null; });
     new ResizeObserver(() => this.refit(true)).observe(this.surface);
@@ -41,11 +41,14 @@ export class Section {
     const across = (index) => of(laminate.patterns[laminate.layers[index - 1].pattern].shape);
     this.rows = laminate.layers.map((layer) => ({ layer, spans: across(layer.index) }));
     this.bonds = laminate.bonds.map((bond) => ({ bond, spans: bonded(bond.layers, across) }));
+    this.voids = this.netted ? this.studio.nets.areas.map((one) => ({ one, bond: laminate.bonds[one.interface - 1], spans: of(one.shape) })).filter(({ bond }) => bond?.gap) : [];
     const ends = this.rows.flatMap((row) => row.spans.flat());
     this.low = ends.length ? Math.min(...ends) : -1;
     this.high = ends.length ? Math.max(...ends) : 1;
     this.refit(true);
   }
+  // Nets are coloured where a design declares them, and where they are those of the laminate that is shown.
+  get netted() { const { nets, laminate } = this.studio; return Boolean(nets?.declared && nets.laminate === laminate); }
   refit(quiet = false) {
     const { laminate } = this.studio;
     if (!laminate || !this.surface.clientWidth || this.low === undefined) return;
@@ -101,6 +104,14 @@ export class Section {
         pen.fillStyle = colour.faint;
         pen.fillRect(eye.px(own.at(-1)[1], 0)[0] + 3, y, Math.max(0, x + 10 - eye.px(own.at(-1)[1], 0)[0] - 3), 0.5);
         last = y;
+      }
+    }
+    for (const { one, bond, spans: within } of this.voids ?? []) {
+      pen.fillStyle = one.colour; pen.strokeStyle = css("--fail"); pen.lineWidth = 1.5;
+      for (const [a, b] of within) {
+        const at = box(a, b, bond.z + bond.gap * 0.3, bond.z + bond.gap * 0.7);
+        pen.fillRect(...at);
+        if (one.nets.length > 1) pen.strokeRect(...at);
       }
     }
     this.axes(pen, colour, w, h);
