@@ -28,7 +28,7 @@ def test_the_answers_come_in_the_order_a_person_waits_for_them(tmp_path: Path) -
     got = answers(job(tmp_path, SMALL))
     kinds = [answer["kind"] for answer in got]
     assert kinds[:4] == ["text", "design", "laminate", "prediction"]
-    assert kinds[-2:] == ["checked", "nets"]
+    assert kinds[-2:] == ["nets", "checked"]
     assert got[-3]["rule"] == "registration-yield"
     found = [
         finding for answer in got if answer["kind"] == "rule" for finding in answer["findings"]

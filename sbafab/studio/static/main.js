@@ -42,7 +42,7 @@ async function start() {
   new Editor(studio);
   views = { solid: new Solid(studio), layers: new Layers(studio), draw: new Draw(studio), nets: new Nets(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), swing: new PartsMotion(studio), make: new Make(studio), compare: new Compare(studio), beside: new PartsCompare(studio) };
   studio.motion = views.motion;
-  studio.drawing = views.draw;
+  Object.assign(studio, { drawing: views.draw, netMap: views.nets });
   studio.moving = () => !views.motion.element.hidden || views.swing.moving;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);

@@ -123,10 +123,20 @@ export class Nets {
     });
   }
   ports(gap) {
-    return this.map.ports.filter(({ layers }) => layers[0] === gap.layers[0] && layers[1] === gap.layers.at(-1)).flatMap(({ name, at }) => {
+    return this.places().filter(({ layers }) => layers[0] === gap.layers[0] && layers[1] === gap.layers.at(-1)).flatMap(({ name, at }) => {
       const [x, y] = this.px(gap.interface, at);
       return [el("circle", { cx: x, cy: y, r: 4, fill: "var(--canvas)", stroke: "var(--ink)", "stroke-width": 1.6, class: "port" }), text(name, x + 8, y - 6)];
     });
+  }
+  // Ports, and the first pocket of each chamber.
+  places() {
+    const { map, studio } = this;
+    const pockets = map.laminate.chambers.flatMap(({ name, centres: [at] }) => {
+      const there = map.areas.filter((one) => contains(studio.shape(one.shape), ...at)).sort((a, b) => a.interface - b.interface)[0];
+      const gap = map.gaps.find((one) => one.interface === there?.interface);
+      return gap ? [{ name, at, layers: [gap.layers[0], gap.layers.at(-1)] }] : [];
+    });
+    return [...map.ports, ...pockets];
   }
   faultMarks(gaps) {
     return this.map.faults.flatMap((fault, i) => levels(this.map, fault).filter((level) => gaps.some((gap) => gap.interface === level)).flatMap((level) => {
