@@ -21,7 +21,7 @@ from sbafab.errors import DesignError, OutputError
 MOST_LISTED = 200
 MOST_BYTES = 2_000_000
 """Bytes of a design file."""
-REFERRING = ("outline", "kit", "design")
+REFERRING = ("outline", "kit", "design", "file", "calibration")
 """Keys whose values may be paths of files."""
 
 
@@ -137,9 +137,11 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
 
 def _references(tables: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     for key, value in tables.items():
-        if isinstance(value, Mapping):
-            yield from _references(value, f"{prefix}{key}.")
-        elif isinstance(value, str) and key in REFERRING:
+        rows = value if isinstance(value, list) else [value]
+        for row in rows:
+            if isinstance(row, Mapping):
+                yield from _references(row, f"{prefix}{key}.")
+        if isinstance(value, str) and key in REFERRING:
             yield prefix + key, value
 
 

@@ -157,6 +157,9 @@ def test_an_error_has_the_command_line_s_words_and_its_field(
         '[chamber]\noutline = "../shape.dxf"',
         'kit = "/etc/passwd"',
         '[parts.a]\nkind = "sba"\ndesign = "../x.toml"',
+        '[shapes]\npocket = {file = "../shape.dxf"}',
+        '[models]\ncalibration = "/etc/passwd"',
+        '[[layers]]\nfile = "../shape.dxf"',
     ],
 )
 def test_a_design_names_no_file_outside_the_folder(tmp_path: Path, line: str) -> None:
