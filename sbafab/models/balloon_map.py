@@ -1,19 +1,19 @@
 """One balloon as a smooth map: its volume and its force, at any pressure and height.
 
 Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
--dW/dp. It is a quintic spline in the height and in asinh(p / P0), fitted by least squares to W and
-both derivatives of balloons between plates. So the map conserves energy: no cycle of pressure and
-height gives or takes work. A balloon of least energy holds the more the higher its pressure, and
-pushes the less the higher it stands (W is concave in p, convex in h): of all splines whose
-Bernstein coefficients say so, and that hold a volume above 0, the map is the one nearest to the
-balloons. So both hold at every place of the map, by construction. Lengths mm, pressures kPa,
-volumes ul, forces mN, energies uJ.
+-dW/dp. It is a quintic spline in the height and in asinh(p / p0), fitted by least squares to W and
+both derivatives of balloons between plates, and to free ones. So the map conserves energy: no cycle
+of pressure and height gives or takes work. A balloon of least energy holds the more the higher its
+pressure, and pushes the less the higher it stands (W is concave in p, convex in h): of all splines
+whose Bernstein coefficients say so, whose volumes are above 0 and no more than balloons hold at the
+pressure, the map is the one nearest to the balloons. So these hold at every place of the map, by
+construction. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes
-from sbafab.models.rippled import compressed_shapes, free_shapes
+from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -33,16 +33,22 @@ PRESSURE_SPANS, HEIGHT_SPANS = 12, 12
 """Pieces of the spline by pressure and by height."""
 PRESSURE_POINTS, HEIGHT_POINTS = 16, 24
 """Balloons computed by pressure and by height."""
-P0 = 0.1
-"""Pressure in kPa below which the spline's pieces are equal in pressure, above equal in ratio."""
+SCALE_STRAIN = 3e-4
+"""Film strain, p R / (E t), below which the spline's pieces are equal in pressure, above equal in
+ratio.
+"""
 RISE_POINTS = 65
 """Pressures at which free heights are tabulated, to start from."""
 COLLAPSE_SUCTION = 0.1
 """Suction in kPa at which a slack film collapses: about what brings one taut, not measured."""
 HEADROOM = 1.15
 """Height of the map over that of the highest free balloon."""
-LEAST_HEIGHT = 0.01
-"""Least height in mm that is computed; below it the map extrapolates."""
+LEAST_HEIGHT, LEAST_SHARE = 0.01, 0.01
+"""Least height in mm that is computed, and its largest share of the map's height; below it the map
+extrapolates.
+"""
+FREE_WEIGHT = 2.0
+"""Weight of free balloons."""
 FLAT_WEIGHT = 0.1
 """Weight of balloons that are pressed flat and hold nothing."""
 LOW_PRESSURE = 0.1
@@ -57,6 +63,8 @@ height. A polynomial whose Bernstein coefficients on a part are above 0 is above
 """
 LOW_PARTS = np.array([0.005, 0.02])
 """Further ends of parts near the flat, as shares of the map's height."""
+HELD_MARGIN = 0.01
+"""Share by which volumes may be above the largest one computed at a pressure."""
 LEAST_CHECK = 0.005
 """Share of the map's height by which limits are scaled below it."""
 MARGIN = 5e-5
@@ -135,7 +143,7 @@ class BalloonMap:
     most_pressure: float
     most_height: float
     coefficients: Array
-    scale_pressure: float = P0
+    scale_pressure: float
 
     def stiffened(self, ratio: float) -> BalloonMap:
         """Return the map of the balloon whose films have ``ratio`` times the modulus.
@@ -143,15 +151,7 @@ class BalloonMap:
         Energies are proportional to the modulus at equal pressure over modulus:
         W(ratio E; p, h) = ratio W(E; p / ratio, h). The map reaches ``ratio`` times the pressure.
         """
-        if ratio == 1:
-            return self
-        return BalloonMap(
-            self.balloon.stiffened(ratio),
-            ratio * self.most_pressure,
-            self.most_height,
-            ratio * self.coefficients,
-            ratio * self.scale_pressure,
-        )
+        return self if ratio == 1 else _stiffened(self, ratio)
 
     @cached_property
     def spans(self) -> float:
@@ -266,6 +266,18 @@ class BalloonMap:
         return x, self.free_height(pressures)
 
 
+@lru_cache(maxsize=64)
+def _stiffened(made: BalloonMap, ratio: float) -> BalloonMap:
+    """Return ``made.stiffened(ratio)``, the same one each time: it keeps its range."""
+    return BalloonMap(
+        made.balloon.stiffened(ratio),
+        ratio * made.most_pressure,
+        made.most_height,
+        ratio * made.coefficients,
+        ratio * made.scale_pressure,
+    )
+
+
 class Along(NamedTuple):
     """Value, first and second derivative of splines, by pieces."""
 
@@ -326,15 +338,25 @@ def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
     top = HEADROOM * highest(balloon, most_pressure)
-    p = P0 * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / P0))
+    scale = scale_pressure_of(balloon)
+    p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
     # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
     even = _spread(HEIGHT_POINTS)
-    h = LEAST_HEIGHT + (top - LEAST_HEIGHT) * (even + even**2) / 2
+    least = min(LEAST_HEIGHT, LEAST_SHARE * top)
+    h = least + (top - least) * (even + even**2) / 2
     pressures, heights = (grid.ravel() for grid in np.meshgrid(p, h))
     shapes = compressed_shapes(balloon, pressures, heights, tied=True)
-    return BalloonMap(
-        balloon, most_pressure, top, _fitted(pressures, heights, shapes, most_pressure, top)
-    )
+    blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
+    frame = BalloonMap(balloon, most_pressure, top, blank, scale)
+    stands = least_free_states(balloon, p[1:])
+    is_inside = stands.height < top
+    free = _Free(p[1:][is_inside], stands.height[is_inside], stands.volume[is_inside])
+    return replace(frame, coefficients=_fitted(frame, pressures, heights, shapes, free))
+
+
+def scale_pressure_of(balloon: Balloon) -> float:
+    """Return the pressure p0 in kPa below which pieces are equal in pressure."""
+    return SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
 
 
 def highest(balloon: Balloon, most_pressure: float) -> float:
@@ -351,10 +373,18 @@ def _spread(count: int) -> Array:
     return (even + (1 - np.cos(math.pi * even)) / 2) / 2
 
 
-def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Array:
+class _Free(NamedTuple):
+    """Free balloons at pressures (kPa): heights in mm, volumes in ul."""
+
+    pressure: Array
+    height: Array
+    volume: Array
+
+
+def _fitted(frame: BalloonMap, p: Array, h: Array, shapes: Shapes, free: _Free) -> Array:
     """Coefficients of the potential: least squares of W, the force and the volume."""
-    blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
-    x, rate = BalloonMap(Balloon(), most, top, blank).scaled(p)
+    top, blank = frame.most_height, frame.coefficients
+    x, rate = frame.scaled(p)
     y = np.minimum(h * HEIGHT_SPANS / top, HEIGHT_SPANS * (1 - 1e-12))
     by_p = [_rows(x, order, blank.shape[0]) for order in (0, 1)]
     by_h = [_rows(y, order, blank.shape[1]) for order in (0, 1)]
@@ -368,6 +398,7 @@ def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Arra
     # ``inflate`` keeps what wrinkles carry while it looks for balance, so that its forces and its
     # volumes are not quite slopes of one potential. Heights and bends hang on the forces.
     area = shapes.r[:, -1].max() ** 2 * math.pi
+    stand, lift = _free_rows(frame, free, area)
     push = 1 / (area * (p + LOW_PRESSURE) + 3 * np.abs(shapes.force))
     room = VOLUME_WEIGHT / (area * np.minimum(h + LOW_HEIGHT, top))
     potential = shapes.energy - p * shapes.volume
@@ -379,69 +410,117 @@ def _fitted(p: Array, h: Array, shapes: Shapes, most: float, top: float) -> Arra
             equations(1, 0, (-rate * room)[:, None]),
             # Pressed flat, it holds nothing.
             equations(1, 0, (-FLAT_WEIGHT * rate * room)[:, None], flat)[lowest],
+            stand,
+            lift[0],
         ]
     )
     right_side = np.concatenate(
-        [potential * scale, shapes.force * push, shapes.volume * room, np.zeros(lowest.sum())]
+        [
+            potential * scale,
+            shapes.force * push,
+            shapes.volume * room,
+            np.zeros(lowest.sum() + len(stand)),
+            lift[1],
+        ]
     )
-    best = _admissible(matrix, right_side, _limits(most, top, area))
+    held = shapes.volume.reshape(HEIGHT_POINTS, -1).max(0)
+    best = _admissible(matrix, right_side, _limits(frame, area, p[:PRESSURE_POINTS], held))
     if best is None:
         raise DesignError(
-            f"no smooth map of a balloon fits up to {most:g} kPa; ask for less pressure"
+            f"no smooth map of a balloon fits up to {frame.most_pressure:g} kPa; ask for less "
+            "pressure"
         )
     return np.asarray(best.reshape(blank.shape))
 
 
+def _free_rows(frame: BalloonMap, free: _Free, area: float) -> tuple[Array, tuple[Array, Array]]:
+    """Return equations of free balloons: no force, and their volumes with the right side."""
+    counts = frame.coefficients.shape
+    x, rate = frame.scaled(free.pressure)
+    y = np.minimum(free.height * frame.spans, HEIGHT_SPANS * (1 - 1e-12))
+    values, slopes = (_rows(x, order, counts[0]) for order in (0, 1))
+    by_h = [_rows(y, order, counts[1]) for order in (0, 1)]
+    push = FREE_WEIGHT / (area * (free.pressure + LOW_PRESSURE))
+    room = (
+        FREE_WEIGHT
+        * VOLUME_WEIGHT
+        / (area * np.minimum(free.height + LOW_HEIGHT, frame.most_height))
+    )
+    count = len(x)
+    force = (values[:, :, None] * by_h[1][:, None]).reshape(count, -1) * push[:, None]
+    volume = (slopes[:, :, None] * by_h[0][:, None]).reshape(count, -1) * (-rate * room)[:, None]
+    return force * frame.spans, (volume, free.volume * room)
+
+
 class MapLimits(NamedTuple):
-    """Linear functions of a spline's coefficients that must be above 0, and are to be MARGIN: the
-    matrices by pressure and by height (Bernstein coefficients, coefficients) of each kind.
+    """Functions of a spline's coefficients that must be above 0, and are to be MARGIN: the matrices
+    by pressure and by height (Bernstein coefficients, coefficients) of each kind, and a constant
+    for each row by pressure, to which these are added.
     """
 
-    kinds: tuple[tuple[Array, Array], ...]
+    kinds: tuple[tuple[Array, Array, Array], ...]
 
     def values(self, coefficients: Array) -> list[Array]:
         """Return the values of each kind: (by pressure, by height)."""
         grid = coefficients.reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
-        return [across @ grid @ along.T for across, along in self.kinds]
+        return [across @ grid @ along.T + room[:, None] for across, along, room in self.kinds]
 
-    def rows(self, chosen: list[NDArray[np.bool_]]) -> Array:
-        """Return the equations of the values chosen: (values, coefficients)."""
-        rows = []
-        for (across, along), these in zip(self.kinds, chosen, strict=True):
+    def rows(self, chosen: list[NDArray[np.bool_]]) -> tuple[Array, Array]:
+        """Return the equations of the values chosen, (values, coefficients), and constants."""
+        rows, rooms = [], []
+        for (across, along, room), these in zip(self.kinds, chosen, strict=True):
             i, j = np.nonzero(these)
             size = across.shape[1] * along.shape[1]
             rows.append((across[i][:, :, None] * along[j][:, None]).reshape(len(i), size))
-        return np.concatenate(rows)
+            rooms.append(room[i])
+        return np.concatenate(rows), np.concatenate(rooms)
 
 
-def _limits(most: float, top: float, area: float) -> MapLimits:
-    """Return the limits on W: volumes that rise with pressure and are above 0 without any, as
-    shares of area times height; forces that fall with height, as shares of pressure times area.
+def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> MapLimits:
+    """Return the limits on W: volumes that rise with pressure, are above 0 without any, and at the
+    end of each piece within the largest that a balloon ``held`` at the next of ``pressures`` at any
+    height, as shares of area times height; forces that fall with height, as shares of pressure
+    times area.
 
     The limits are on Bernstein coefficients, so that they hold between places as well.
     """
-    each = PRESSURE_SPANS / math.asinh(most / P0)
+    top, scale_pressure = frame.most_height, frame.scale_pressure
+    each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
     x = np.linspace(0, PRESSURE_SPANS, PRESSURE_SPANS * PRESSURE_PARTS + 1)
     even = np.linspace(0, 1, HEIGHT_SPANS * HEIGHT_PARTS + 1)
     y = HEIGHT_SPANS * np.unique(np.concatenate([even, LOW_PARTS]))
     value, slope, curve = (_parts(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
     slope, curve = each * slope, each**2 * curve
-    # With p = P0 sinh s the volume is -W_s / (P0 cosh s). It rises where tanh(s) W_s - W_ss > 0.
+    # With p = p0 sinh s the volume is -W_s / (p0 cosh s). It rises where tanh(s) W_s - W_ss > 0.
     # W_s < 0, and no tangent of tanh lies below it: that at a part's middle takes its place.
     low, high = x[:-1] / each, x[1:] / each
     middle = (low + high) / 2
     bend = (high - low) / 2 / np.cosh(middle) ** 2
     tangent = np.tanh(middle) + np.stack([-bend, bend])
-    scale = (P0 * np.cosh(middle))[:, None, None]
+    scale = (scale_pressure * np.cosh(middle))[:, None, None]
     rises = (_times_line(slope, tangent) - curve) / (scale * area * top)
     falls = value * HEIGHT_SPANS**2 / top
-    falls /= (area * (P0 * np.sinh(middle) + LOW_PRESSURE))[:, None, None]
+    falls /= (area * (scale_pressure * np.sinh(middle) + LOW_PRESSURE))[:, None, None]
     share = np.maximum(y[1:] / HEIGHT_SPANS, LEAST_CHECK)[:, None, None]
     by_height, bent = (_parts(y, order, HEIGHT_SPANS + DEGREE) for order in (0, 2))
     by_height /= share
-    by_height, none = _joined(by_height), -slope[0, :1] / (P0 * area * top)
+    along, none = _joined(by_height), -slope[0, :1] / (scale_pressure * area * top)
     every = rises.reshape(-1, rises.shape[-1])
-    return MapLimits(((every, by_height), (_joined(falls), _joined(bent)), (none, by_height)))
+    # Volumes rise with pressure: in a piece they are within what they are at its end.
+    ends = slice(PRESSURE_PARTS - 1, None, PRESSURE_PARTS)
+    at = scale_pressure * np.sinh(high[ends])
+    content = slope[ends, -1] / (np.hypot(at, scale_pressure) * area * top)[:, None]
+    next_one = np.minimum(np.searchsorted(pressures, at * (1 - 1e-9)), len(pressures) - 1)
+    most = (1 + HELD_MARGIN) * np.maximum.accumulate(held)[next_one] / (area * top)
+    plain = _joined(_parts(y, 0, HEIGHT_SPANS + DEGREE))
+    return MapLimits(
+        (
+            (every, along, np.zeros(len(every))),
+            (_joined(falls), _joined(bent), np.zeros(len(falls) * DEGREE + 1)),
+            (none, along, np.zeros(1)),
+            (content, plain, most),
+        )
+    )
 
 
 def _joined(parts: Array) -> Array:
@@ -491,9 +570,10 @@ def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | 
         if min(kind.min() for kind in values) >= MARGIN / 2:
             return np.asarray(best)
         chosen = [old | (kind < 2 * MARGIN) for old, kind in zip(chosen, values, strict=True)]
-        rows = limits.rows(chosen) @ back
+        rows, room = limits.rows(chosen)
+        rows = rows @ back
         size = np.linalg.norm(rows, axis=1)
-        closest = nearest_admissible(free, rows / size[:, None], MARGIN / size)
+        closest = nearest_admissible(free, rows / size[:, None], (MARGIN - room) / size)
         if closest is None:
             return None
         best = back @ closest

@@ -126,7 +126,7 @@ import math
 LEVELS = {levels}
 FLAT_LEVEL = {pitch}  # mm, to be added to a balloon's height for that of its level
 CHAMBER_AXES = {axes}  # mm
-P0, SPANS_P, SPANS_H = {p0}, {spans_p}, {spans_h}
+SPANS_P, SPANS_H = {spans_p}, {spans_h}
 PIECES = {pieces}
 BALLOONS = {balloons}
 
@@ -151,12 +151,13 @@ def _spline(balloon, p, h, by_p, by_h):
     if not (0.0 <= p <= b["most_pressure"] and 0.0 <= h <= b["most_height"]):
         most = (b["most_pressure"], b["most_height"])
         raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
-    each = SPANS_P / math.asinh(b["most_pressure"] / P0)
-    x = min(math.asinh(p / P0) * each, SPANS_P * (1 - 1e-12))
+    p0 = b["scale_pressure"]
+    each = SPANS_P / math.asinh(b["most_pressure"] / p0)
+    x = min(math.asinh(p / p0) * each, SPANS_P * (1 - 1e-12))
     y = min(h * SPANS_H / b["most_height"], SPANS_H * (1 - 1e-12))
     i, j = int(x), int(y)
     across, along = _weights(x - i, by_p), _weights(y - j, by_h)
-    rate = (each / math.hypot(p, P0)) ** by_p * (SPANS_H / b["most_height"]) ** by_h
+    rate = (each / math.hypot(p, p0)) ** by_p * (SPANS_H / b["most_height"]) ** by_h
     rows = b["coefficients"][i : i + {count}]
     return rate * sum(
         a * sum(w * c for w, c in zip(along, row[j : j + {count}])) for a, row in zip(across, rows)
@@ -170,12 +171,13 @@ def _array_spline(b, p, h, by_p, by_h):
     most = (b["most_pressure"], b["most_height"])
     if not ((p >= 0) & (p <= most[0]) & (h >= 0) & (h <= most[1])).all():
         raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
-    each = SPANS_P / math.asinh(most[0] / P0)
-    x = np.minimum(np.arcsinh(p / P0) * each, SPANS_P * (1 - 1e-12))
+    p0 = b["scale_pressure"]
+    each = SPANS_P / math.asinh(most[0] / p0)
+    x = np.minimum(np.arcsinh(p / p0) * each, SPANS_P * (1 - 1e-12))
     y = np.minimum(h * SPANS_H / most[1], SPANS_H * (1 - 1e-12))
     i, j = x.astype(int), y.astype(int)
     across, along = _weights(x - i, by_p), _weights(y - j, by_h)
-    rate = (each / np.hypot(p, P0)) ** by_p * (SPANS_H / most[1]) ** by_h
+    rate = (each / np.hypot(p, p0)) ** by_p * (SPANS_H / most[1]) ** by_h
     table = np.array(b["coefficients"])
     return rate * sum(
         a * w * table[i + k, j + n] for k, a in enumerate(across) for n, w in enumerate(along)
@@ -214,6 +216,7 @@ def _python(name: str, stack: Stack) -> str:
             **_dimensions(balloon),
             "most_pressure": balloon.most_pressure,
             "most_height": balloon.most_height,
+            "scale_pressure": balloon.scale_pressure,
             "coefficients": [
                 [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
             ],
@@ -225,7 +228,6 @@ def _python(name: str, stack: Stack) -> str:
         levels=stack.levels.tolist(),
         pitch=_short(stack.pitch),
         axes=[[_short(x) for x in axis] for axis in stack.axes.tolist()],
-        p0=_short(stack.maps[0].scale_pressure),
         spans_p=PRESSURE_SPANS,
         spans_h=HEIGHT_SPANS,
         pieces=PIECES.tolist(),

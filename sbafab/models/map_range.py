@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ MOST_ERROR = 0.03
 """Share by which a map may miss."""
 FLAT = 1e-3
 """Height in mm that stands for 0."""
-PRESSURE_CHECKS, HEIGHT_CHECKS = 43, 29
+PRESSURE_CHECKS, HEIGHT_CHECKS = 37, 25
 """Balloons computed by pressure and by height."""
 
 
@@ -47,6 +48,7 @@ class MapRange:
         return np.asarray(self.within[cells[0], cells[1]])
 
 
+@lru_cache(maxsize=64)
 def map_range(made: BalloonMap) -> MapRange:
     """Return where a map is within MOST_ERROR of balloons between plates, as far as checked.
 

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError, UnreachableError
-from sbafab.models.balloon_map import P0
 from sbafab.models.derivatives import derivatives, hessian, tip_motion
 from sbafab.models.least_energy import is_positive_definite, step_limit
 from sbafab.models.stack_loads import (
@@ -39,6 +38,8 @@ if TYPE_CHECKING:
     from sbafab.models.stack_loads import GapPlaces, Load
     from sbafab.models.stack_poses import Pose, PosedStack
 
+P0 = 0.1
+"""Pressure in kPa below which pressures are counted evenly, above in their logarithm."""
 NEAR = 1e-4
 """Distance in mm from the place at which the tip has reached it."""
 STEPS, LAST_STEP = 25, 2e-3

@@ -20,7 +20,7 @@ from sbafab.models.least_energy import NoEquilibrium, equilibrium
 from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
 
@@ -48,10 +48,16 @@ LATEST = 0.02
 """Film strain up to which films fall in step, if ever."""
 ALIKE = 0.9
 """Cosine of the angle between waves that belong to one branch."""
-TAUT = 1.4
-"""Height over the free one at which waves are pulled straight."""
-NUDGE = 1e-3
-"""Relative step of the finite differences by pressure."""
+JUMP_PARTS = 3
+"""Parts of the way between rungs of unlike branches at which balloons with waves are computed."""
+RUNG_PARTS = 32
+"""Parts of the way from rung to rung at which balloons with waves are interpolated."""
+LADDER_STEPS, LADDER_TOP = 16, 1.25
+"""Heights at which smooth balloons are compared with those with waves; the square root of the
+highest, over the highest free balloon.
+"""
+SAME_HEIGHT = 1e-9
+"""Difference of heights in mm that counts as none."""
 HALVINGS = 3
 """Times that a step between rungs is halved where it finds no equilibrium."""
 
@@ -76,98 +82,180 @@ def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
     if not resolves_waves(balloon) or not len(rows):
         return shapes
     resolved_balloons = rippled(balloon, shapes.pressure[rows])
-    grown = np.abs(resolved_balloons.outside - resolved_balloons.edge) > LEVEL * balloon.ring
+    grown = _grown(balloon, resolved_balloons.edge, resolved_balloons.outside)
     parts = [part.copy() for part in shapes]
     for part, resolved_part in zip(parts, resolved_balloons.shapes, strict=True):
         part[rows[grown]] = resolved_part[grown]
     return Shapes(*parts)
 
 
+def _grown(balloon: Balloon, edge: Array, outside: Array) -> NDArray[np.bool_]:
+    """Return True where there are waves: at the rim's outside, or in step at the pocket's edge, by
+    which a rim may stay level.
+    """
+    waves: NDArray[np.bool_] = np.maximum(np.abs(edge), np.abs(outside)) > LEVEL * balloon.ring
+    return waves
+
+
 def compressed_shapes(
     balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False
 ) -> Shapes:
-    """Return balloons between plates at heights (mm), by ``inflate`` with a correction for waves.
+    """Return balloons between plates at heights (mm), by ``inflate``; where waves are in step with
+    the rim, by the least energy of all states known.
 
-    Where waves are in step with the rim a balloon rises freely by a share more. Between plates it
-    is taken for one that is lower, W(p, h) = W'(p, h - e(p) f(h / h1)), with force and volume its
-    slopes: e is the excess of the free height h1 over that of ``inflate``, and f grows from 0
-    where it is pressed flat to 1 where it stands freely, and is 0 again where it is pulled to
-    TAUT times that: plates press waves flat, and a pull draws them straight. Shapes r and z are the
-    lower one's.
+    A balloon of least energy has no more than any of its states: those of ``inflate`` at all
+    heights, and the free ones with waves of all pressures, each with the work of its air. Its
+    potential W(p, h) is concave in p, as the least of functions E - p V, and convex in h where it
+    is stable. So the convex envelope of these states in h stands for it: it has the free heights
+    and volumes of balloons with waves, and volumes that rise with pressure. Waves between plates
+    are not computed. Shapes r and z are those of ``inflate``.
     """
     p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
-    share, rate = height_ratio(balloon, p)
-    if not (rate.any() or (share != 1).any()):
-        return inflate(balloon, p, h, tied=tied)
-    free_height, slope = _free_heights(balloon, p)
-    stands, stands_rate = share * free_height, rate * free_height + share * slope
-    more, more_rate = stands - free_height, stands_rate - slope
-    place = h / stands
-    faded, fading = _fade(place)
-    lower = more * faded
-    by_height = 1 - more * fading / stands
-    by_pressure = more * fading * place * stands_rate / stands - more_rate * faded
-    shapes = inflate(balloon, p, h - lower, tied=tied)
-    more_air = shapes.force * by_pressure
-    return shapes._replace(
-        height=shapes.height + lower,
-        force=shapes.force * by_height,
-        volume=shapes.volume + more_air,
-        energy=shapes.energy + shapes.pressure * more_air,
-    )
+    p, h = np.atleast_1d(p), np.atleast_1d(h)
+    shapes = inflate(balloon, p, h, tied=tied)
+    waves = wave_states(balloon)
+    if not len(waves.height):
+        return shapes
+    ladder = np.linspace(0, LADDER_TOP, LADDER_STEPS + 1)[1:] ** 2 * waves.height.max()
+    pressures, row = np.unique(p, return_inverse=True)
+    grid = [part.ravel() for part in np.meshgrid(pressures, ladder, indexing="ij")]
+    rungs = inflate(balloon, grid[0], grid[1], tied=True)
+    force, volume, energy = (part.copy() for part in (shapes.force, shapes.volume, shapes.energy))
+    for number, pressure_of in enumerate(pressures):
+        here = np.flatnonzero(row == number)
+        part = slice(number * len(ladder), (number + 1) * len(ladder))
+        smooth = FilmStates(h[here], shapes.energy[here], shapes.volume[here])
+        more = FilmStates(ladder, rungs.energy[part], rungs.volume[part])
+        states = FilmStates(
+            *(np.concatenate(each) for each in zip(smooth, more, waves, strict=True))
+        )
+        low, high, share = _between(states, float(pressure_of), len(here))
+        mixed = np.flatnonzero(low != high)
+        low, high, share = low[mixed], high[mixed], share[mixed]
+        potential = states.energy - pressure_of * states.volume
+        rise = states.height[high] - states.height[low]
+        at = here[mixed]
+        force[at] = -(potential[high] - potential[low]) / rise
+        volume[at] = states.volume[low] + share * (states.volume[high] - states.volume[low])
+        energy[at] = states.energy[low] + share * (states.energy[high] - states.energy[low])
+    return shapes._replace(force=force, volume=volume, energy=energy)
 
 
-def _free_heights(balloon: Balloon, p: Array) -> tuple[Array, Array]:
-    """Return free heights in mm by ``inflate``, and their rate by pressure; 1 where p is 0."""
-    pressures = np.unique(p[p > 0])
-    each = inflate(
-        balloon, np.concatenate([pressures * (1 - NUDGE), pressures, pressures * (1 + NUDGE)])
-    ).height
-    low, height, high = each.reshape(3, -1)
-    height = np.append(height, 1.0)
-    slope = np.append((high - low) / (2 * NUDGE * pressures), 0.0)
-    at = np.where(p > 0, np.searchsorted(pressures, p), len(pressures))
-    return height[at], slope[at]
-
-
-def _fade(place: Array) -> tuple[Array, Array]:
-    """Return the share of the waves' rise at heights over the free one, and its slope."""
-    up = np.clip(place, 0.0, 1.0)
-    off = np.clip((place - 1) / (TAUT - 1), 0.0, 1.0)
-    value = up**2 * (3 - 2 * up) - off**2 * (3 - 2 * off)
-    return value, 6 * up * (1 - up) - 6 * off * (1 - off) / (TAUT - 1)
-
-
-class HeightRatio(NamedTuple):
-    """A ratio of heights, and its rate by pressure in 1/kPa."""
-
-    share: Array
-    rate: Array
-
-
-def height_ratio(balloon: Balloon, pressure: Array) -> HeightRatio:
-    """Return free heights at pressures (kPa) over those of ``inflate``: 1 where waves are not in
-    step with the rim. Between rungs a cubic of the pressure's logarithm.
+def least_free_states(balloon: Balloon, pressure: Array) -> FilmStates:
+    """Return the free balloons at pressures (kPa, above 0) of least energy of all states known:
+    those at which ``compressed_shapes`` carries no force.
     """
-    first, rungs = _first_pressure(balloon), round(math.log(END / START) / math.log(STEP))
-    at = np.log(np.maximum(pressure, first) / first) / math.log(STEP)
-    inside = (at > 0) & (at < rungs)
-    if not resolves_waves(balloon) or not inside.any():
-        return HeightRatio(np.ones_like(pressure), np.zeros_like(pressure))
-    waves = usual_waves(balloon)
-    x = np.array([_rung(balloon, waves, k).x for k in range(rungs)])
-    high = inflate(balloon, first * STEP ** np.arange(rungs)).height
-    ratio = 2 * x[:, PLACES * balloon.neck_edge + Z] / high
-    ratio = np.append(np.where([_ripples(balloon, state) for state in x], ratio, 1.0), 1.0)
-    ratio[0] = 1.0
-    slopes = np.gradient(ratio)
-    slopes[[0, -1]] = 0.0
-    k = np.clip(at.astype(np.int_), 0, rungs - 1)
-    u = np.clip(at - k, 0.0, 1.0)
-    a, b, rise = ratio[k], slopes[k], ratio[k + 1] - ratio[k]
-    c, d = 3 * rise - 2 * b - slopes[k + 1], b + slopes[k + 1] - 2 * rise
-    rate = (b + u * (2 * c + 3 * u * d)) * inside / (np.maximum(pressure, first) * math.log(STEP))
-    return HeightRatio(a + u * (b + u * (c + u * d)), rate)
+    smooth, waves = inflate(balloon, pressure), wave_states(balloon)
+    states = FilmStates(smooth.height.copy(), smooth.energy.copy(), smooth.volume.copy())
+    if not len(waves.height):
+        return states
+    for number, p in enumerate(pressure):
+        potential = waves.energy - p * waves.volume
+        best = int(potential.argmin())
+        if potential[best] < states.energy[number] - p * states.volume[number]:
+            for part, values in zip(states, waves, strict=True):
+                part[number] = values[best]
+    return states
+
+
+class FilmStates(NamedTuple):
+    """States of a balloon: heights in mm, energies of the films in uJ, volumes in ul."""
+
+    height: Array
+    energy: Array
+    volume: Array
+
+
+def _between(
+    states: FilmStates, pressure: float, count: int
+) -> tuple[NDArray[np.int_], NDArray[np.int_], Array]:
+    """Return the neighbours on the convex envelope of E - p V between which each of the first
+    ``count`` states lies, and its share of the way; both are the state itself where it is on it.
+    """
+    potential = states.energy - pressure * states.volume
+    order = np.lexsort((potential, states.height))
+    hull: list[int] = []
+    for k in order.tolist():
+        x, y = states.height[k], potential[k]
+        if hull and x - states.height[hull[-1]] < SAME_HEIGHT:
+            continue
+        while len(hull) > 1:
+            a, b = hull[-2:]
+            rise = (potential[b] - potential[a]) * (x - states.height[a])
+            if rise < (y - potential[a]) * (states.height[b] - states.height[a]):
+                break
+            hull.pop()
+        hull.append(k)
+    corners = np.array(hull)
+    places = states.height[corners]
+    after = np.clip(np.searchsorted(places, states.height[:count]), 1, len(corners) - 1)
+    low, high = corners[after - 1], corners[after]
+    share = (states.height[:count] - places[after - 1]) / (places[after] - places[after - 1])
+    alone = np.isin(np.arange(count), corners)
+    low, high = (np.where(alone, np.arange(count), each) for each in (low, high))
+    return low, high, np.clip(np.where(alone, 0.0, share), 0.0, 1.0)
+
+
+@lru_cache(maxsize=64)
+def wave_states(balloon: Balloon) -> FilmStates:
+    """Return free balloons with waves in step with the rim at pressures all over their range; none
+    where there are no such waves.
+
+    Between rungs of one branch they are interpolated; where another branch begins some are
+    computed.
+    """
+    none = FilmStates(np.zeros(0), np.zeros(0), np.zeros(0))
+    if not resolves_waves(balloon):
+        return none
+    waves, first = usual_waves(balloon), _first_pressure(balloon)
+    count = round(math.log(END / START) / math.log(STEP))
+    x = np.stack([_rung(balloon, waves, k).x for k in range(count)], 1)
+    edge = x[PLACES * balloon.edge + UP]
+    grown = _grown(balloon, edge, edge + balloon.ring * _tilt(balloon, x))
+    if not grown.any():
+        return none
+    of, at = _waving(balloon, waves), np.arange(float(count))
+    total = Waves(of, first * STEP**at, _normals(of, x)).total(x, np.arange(count))
+    rungs = FilmStates(2 * x[PLACES * balloon.neck_edge + Z], 2 * total.stored, 2 * total.volume)
+    ends = np.flatnonzero(grown[:-1] | grown[1:])
+    is_one = np.array([_are_one_branch(of, x[:, k], x[:, k + 1]) for k in ends])
+    parts = [FilmStates(*(each[grown] for each in rungs))]
+    between = np.arange(1, RUNG_PARTS) / RUNG_PARTS
+    for k in ends[is_one].tolist():
+        parts.append(_interpolated(rungs, first * STEP**at, k, between))
+    jumps = ends[~is_one]
+    if len(jumps):
+        # Another branch begins between these rungs.
+        places = (jumps[:, None] + np.arange(1, JUMP_PARTS) / JUMP_PARTS).ravel()
+        shapes = rippled(balloon, first * STEP**places).shapes
+        parts.append(FilmStates(shapes.height, shapes.energy, shapes.volume))
+    return FilmStates(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def _interpolated(rungs: FilmStates, pressures: Array, k: int, shares: Array) -> FilmStates:
+    """Return states between rungs k and k + 1 of one branch: the height and the volume as
+    polynomials of the pressure's logarithm, the energy as a cubic with slopes p dV/dp.
+    """
+    near = slice(max(k - 1, 0), k + 3)
+    x, at = np.log(pressures[near] / pressures[k]) / math.log(STEP), shares
+    height = _polynomial(x, rungs.height[near], at)
+    volume = _polynomial(x, rungs.volume[near], at)
+    ends = np.array([0.0, 1.0])
+    nudge = 1e-4
+    slopes = (_polynomial(x, rungs.volume[near], ends + nudge) - rungs.volume[k : k + 2]) / nudge
+    a, b = pressures[k : k + 2] * slopes
+    rise = rungs.energy[k + 1] - rungs.energy[k]
+    energy = rungs.energy[k] + at * (a + at * (3 * rise - 2 * a - b + at * (a + b - 2 * rise)))
+    return FilmStates(height, energy, volume)
+
+
+def _polynomial(x: Array, values: Array, at: Array) -> Array:
+    """Return the polynomial through values at ``x`` at other places (Lagrange)."""
+    total = np.zeros_like(at)
+    for i, value in enumerate(values):
+        rest = np.delete(x, i)
+        total += value * np.prod((at[:, None] - rest) / (x[i] - rest), axis=1)
+    return total
 
 
 def resolves_waves(balloon: Balloon) -> bool:

@@ -23,6 +23,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import BalloonMap
+from sbafab.models.map_range import map_range
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
 from sbafab.models.stack_loads import (
@@ -265,6 +266,16 @@ class PosedStack:
             self.each(springs), self.pitch, load, start, near is not None
         )
         return self.pose_at(pressures, springs, freedoms, None, push / 1000, stable)
+
+    def within(self, pose: Pose) -> bool:
+        """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
+        plates, as far as ``map_range`` checked.
+        """
+        pressures = np.asarray(pose.pressures)
+        return all(
+            bool(map_range(self.maps[kind]).holds(pressures, gaps).all())
+            for kind, gaps in zip(self.levels, pose.gaps, strict=True)
+        )
 
     def start_freedoms(self, pressures: Sequence[float]) -> Array:
         """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the

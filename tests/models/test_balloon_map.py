@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
-    P0,
     PIECES_IN_ALL,
     PRESSURE_SPANS,
     BalloonMap,
@@ -23,7 +23,7 @@ from sbafab.models.balloon_map import (
     horner,
 )
 from sbafab.models.map_range import map_range
-from sbafab.models.rippled import compressed_shapes, free_shapes, height_ratio
+from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
 from tests.quick import few
 
 SIZES = {
@@ -37,8 +37,10 @@ SIZES["unlike films"] = replace(
 )
 FREE = {"d = 3": 0.006, "d = 5": 0.006, "d = 8": 0.014, "d = 12": 0.023, "unlike films": 0.01}
 """How near free heights are, as shares."""
-NEAR = {"d = 12": 0.035}
-"""How near forces and volumes are, as shares, where not within 0.02."""
+NEAR = {"d = 8": 0.04, "d = 12": 0.05}
+"""How near forces and volumes are, as shares, where not within 0.02: of balloons with waves, which
+a smooth map rounds off where they are pulled straight.
+"""
 QUOTED = [
     Balloon(19.37 / 2, neck=1.27, bore=0.52, thickness=0.0565),
     Balloon(6.0, neck=1.27, bore=0.52),
@@ -68,14 +70,15 @@ def test_forces_are_within_two_percent(
     """Of force and of pressure times pocket, at places drawn from 0.06 to 100 kPa; so volumes."""
     draw = np.random.default_rng(7)
     p = 0.06 * (100 / 0.06) ** draw.random(200)
-    free = inflate(made.balloon, p).height * height_ratio(made.balloon, p).share
+    free = least_free_states(made.balloon, p).height
     h = free * draw.uniform(least, most, len(p))
     inside = (h < 0.98 * made.most_height) & (h > 0.02)
     p, h = p[inside], h[inside]
     found = compressed_shapes(made.balloon, p, h, tied=True)
     full = p * math.pi * made.balloon.pocket**2 + np.abs(found.force)
     near = NEAR.get(name, 0.02)
-    assert (np.abs(made.force(p, h) - found.force) < near * full).all()
+    pulled = 2 if name in NEAR and most > 1 else 1
+    assert (np.abs(made.force(p, h) - found.force) < pulled * near * full).all()
     assert made.volume(p, h) == pytest.approx(found.volume, rel=near)
 
 
@@ -108,7 +111,8 @@ def mylar(radius: float) -> float:
 def never_falls(made: BalloonMap) -> None:
     """Both slopes of a map, 17 by 17 places in each of its pieces, its ends and the flat too."""
     x = np.linspace(0, 1, 16 * PRESSURE_SPANS + 1)
-    p = np.minimum(P0 * np.sinh(x * math.asinh(made.most_pressure / P0)), made.most_pressure)
+    scale = made.scale_pressure
+    p = np.minimum(scale * np.sinh(x * math.asinh(made.most_pressure / scale)), made.most_pressure)
     y = np.linspace(0, HEIGHT_SPANS, 16 * HEIGHT_SPANS + 1)
     y = np.broadcast_to(y, (len(p), len(y)))
     rows = PIECES_IN_ALL * np.arange(len(p))[:, None]
@@ -130,6 +134,12 @@ def judged(balloon: Balloon, most: float = 110.0) -> None:
     assert (np.diff(volume, axis=0) > 0).all()
     assert (np.diff(force, axis=1) < 0).all()
     never_falls(made)
+    # At any pressure no more than balloons computed there at any height, and above, hold.
+    some = np.geomspace(0.1, most, 5)
+    grid = [each.ravel() for each in np.meshgrid(some, h[1:-1:3], indexing="ij")]
+    held = compressed_shapes(balloon, *grid, tied=True).volume.reshape(5, -1).max(1)
+    for row, largest in zip(some[:-1], held[1:], strict=True):
+        assert (made.volume(row, h) < 1.02 * largest).all()
     # Taut films whose neck, pocket and rim stay: none stretches up to a tenth of its length.
     gentle = p[:, 0] * balloon.pocket < 0.02 * balloon.membrane_stiffness
     assert (volume[gentle] < 1.1**3 * mylar(balloon.pocket + 0.1)).all()
@@ -165,6 +175,17 @@ def test_so_they_do_of_random_balloons() -> None:
     assert judged_balloons >= COUNT - 1
 
 
+@pytest.mark.parametrize("neck", few((0.75, 1.0), 1))
+def test_a_thick_film_on_a_small_pocket_has_a_map_to_the_highest_pressure(neck: float) -> None:
+    """It rises by less than the least height that others are computed at."""
+    thick = Balloon(1.5, neck=neck, bore=neck / 2.4, thickness=0.2)
+    made = balloon_map(thick, 110.0)
+    p = np.geomspace(0.1, 110.0, 12)
+    free = inflate(thick, p).height
+    assert free[0] < 0.01
+    assert made.free_height(p) == pytest.approx(free, rel=0.03)
+
+
 def test_a_map_ends_where_its_pressure_does() -> None:
     with pytest.raises(DesignError, match="give 0 to 110 kPa"):
         balloon_map(SIZES["d = 5"], 110.0).volume(111.0, 1.0)
@@ -188,3 +209,14 @@ def test_a_range_tells_where_a_map_is_within_three_percent(diameter: float, film
     assert force.max() < 0.032
     missed = np.abs(made.volume(p, h) - exact.volume) / (exact.volume + 0.01 * area)
     assert missed.max() < 0.032
+
+
+def test_a_pose_tells_whether_maps_hold_for_it() -> None:
+    three = sbafab.stack("3dof-15mm")
+    pose = three.pose((10.0, 5.0, 8.0))
+    assert three.within(pose)
+    # Far higher than balloons without pressure stand.
+    pulled = replace(pose, pressures=(0.0, 0.0, 0.0), gaps=np.full((15, 3), 1.8))
+    covered = map_range(three.maps[0])
+    assert three.within(pulled) == bool(covered.holds(0.0, 1.8))
+    assert three.within(replace(pulled, gaps=np.full((15, 3), 0.6)))
