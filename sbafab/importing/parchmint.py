@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +22,7 @@ from sbafab.geometry.edges import Line, Point
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, disc, rectangle, union
 from sbafab.importing.records import Imported, file_name, key_name, named, read_text
+from sbafab.laminate.netlist import NO_MASK, VIA, Spot, parchmint_labels, parchmint_nets
 
 MM = 0.001
 """mm to a unit of the file."""
@@ -34,20 +35,11 @@ MOST_BYTES = 20_000_000
 FARTHEST = 2_000_000.0
 """No coordinate may be larger, um."""
 UNPLACED = (-1, -1)
-PORT, VIA = "PORT", "VIA"
+PORT = "PORT"
 ROUND = {PORT: "portRadius", VIA: "radius", "VALVE3D": "valveRadius"}
 """Components that are discs, and the parameter that is their radius."""
 PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
 """Components whose outline is all that matters; of others the inside is not drawn."""
-NO_MASK = "INTEGRATION"
-"""Type of layers that hold electrodes and the like, and no channels."""
-
-
-class Spot(NamedTuple):
-    """A component or connection on a layer, by ids: what joins others there."""
-
-    layer: str
-    id: str
 
 
 @dataclass(frozen=True)
@@ -72,11 +64,9 @@ class Component:
 
 @dataclass(frozen=True)
 class Connection:
-    """A channel on one layer: its terminals' components, routes of points and width, um."""
+    """A channel on one layer: routes of points and width, um."""
 
-    id: str
     layer: str
-    components: tuple[str, ...]
     routes: tuple[tuple[Point, ...], ...]
     width: float
 
@@ -90,7 +80,9 @@ class Circuit:
     titles: Mapping[str, str]
     components: Mapping[str, Component]
     connections: tuple[Connection, ...]
-    remarks: tuple[str, ...] = field(default=())
+    labels: Mapping[Spot, str]
+    nets: Mapping[str, tuple[str, ...]]
+    remarks: tuple[str, ...]
 
 
 def import_parchmint(path: Path) -> Imported:
@@ -182,7 +174,8 @@ def read_circuit(document: Any, stem: str) -> Circuit:
             components[component.id] = component
     routes = _routed_features(root)
     connections = [
-        _connection(row, titles, components, routes) for row in root.need("connections").items()
+        _connection(row, titles, components, routes, remarks)
+        for row in root.need("connections").items()
     ]
     name = root.get("name")
     return Circuit(
@@ -191,6 +184,8 @@ def read_circuit(document: Any, stem: str) -> Circuit:
         titles,
         components,
         tuple(connections),
+        parchmint_labels(document),
+        parchmint_nets(document),
         tuple(remarks),
     )
 
@@ -313,6 +308,7 @@ def _connection(
     titles: Mapping[str, str],
     components: Mapping[str, Component],
     routed: Mapping[str, list[tuple[Point, Point, float]]],
+    remarks: list[str],
 ) -> Connection:
     name, layer = row.need("id").text, row.need("layer").text
     here = f"connection {name} ({row.place})"
@@ -323,12 +319,18 @@ def _connection(
     strange = next((component for component in joined if component not in components), None)
     if strange is not None:
         raise DesignError(f"{here} names a component {shown(strange)} that is not there")
+    for component in joined:
+        if layer not in components[component].layers:
+            remarks.append(
+                f"{here}: ends at {component}, which is not on layer {titles[layer]}; nothing is "
+                "joined there"
+            )
     if name in routed:
         segments = routed[name]
         widths = {width for _, _, width in segments}
         if len(widths) > 1:
             raise DesignError(f"{here} has segments of several widths; give it one")
-        return Connection(name, layer, joined, tuple((a, b) for a, b, _ in segments), widths.pop())
+        return Connection(layer, tuple((a, b) for a, b, _ in segments), widths.pop())
     paths = row.get("paths")
     routes = []
     for path in paths.items() if paths is not None else ():
@@ -343,7 +345,7 @@ def _connection(
     width = params and (params.get("channelWidth") or params.get("width"))
     if not width or width.number <= 0:
         raise DesignError(f"{here} has no width (params.channelWidth); add it, in um")
-    return Connection(name, layer, joined, tuple(routes), width.number)
+    return Connection(layer, tuple(routes), width.number)
 
 
 # The laminate of a circuit.
@@ -361,15 +363,17 @@ class _Frame(NamedTuple):
 
 def _design(circuit: Circuit) -> Imported:
     frame = _Frame(_middle(circuit))
-    numbers = {layer: 2 * i + 2 for i, layer in enumerate(circuit.layers)}
-    top = 2 * len(circuit.layers) + 1
-    masks = {layer: _mask(circuit, layer, frame) for layer in circuit.layers}
-    empty = next((layer for layer, mask in masks.items() if mask.is_empty), None)
-    if empty is not None:
-        raise DesignError(f"layer {circuit.titles[empty]} holds nothing; delete it")
+    remarks = list(circuit.remarks)
+    drawn = {layer: _mask(circuit, layer, frame) for layer in circuit.layers}
+    masks = {layer: mask for layer, mask in drawn.items() if not mask.is_empty}
+    empty = [f"layer {circuit.titles[layer]}" for layer in drawn if layer not in masks]
+    remarks += named("holds nothing; it is not imported", empty)
+    if not masks:
+        raise DesignError("no layer holds anything; there is nothing to import")
+    numbers = {layer: 2 * i + 2 for i, layer in enumerate(masks)}
+    top = 2 * len(masks) + 1
     low_x, low_y, high_x, high_y = _box(masks.values())
     plain = rectangle((low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN))
-    remarks = list(circuit.remarks)
     holes, ports = _ports(circuit, frame, numbers, top, remarks)
     films = {n: plain - union(holes.get(n, ())) for n in range(1, top + 1, 2)}
 
@@ -378,7 +382,7 @@ def _design(circuit: Circuit) -> Imported:
     names: dict[Region, str] = {}
     layers = []
     for number in range(1, top + 1):
-        layer = circuit.layers[number // 2 - 1] if number % 2 == 0 else None
+        layer = [*masks][number // 2 - 1] if number % 2 == 0 else None
         region = films[number] if layer is None else masks[layer]
         title = "film" if layer is None else circuit.titles[layer]
         if region not in names:
@@ -396,7 +400,7 @@ def _design(circuit: Circuit) -> Imported:
         "layers": layers,
         "ports": ports,
         "shapes": shapes,
-        "nets": _nets(circuit),
+        "nets": {name: [*members] for name, members in circuit.nets.items()},
     }
     remarks.append("films: a ParchMint file names none, so layers are of tpe and ptfe as in layup")
     return Imported(tables, drawings, tuple(remarks))
@@ -473,7 +477,7 @@ def _ports(
     """Holes by the film's number, and the ports: holes of tubes, and a place a component."""
     holes: dict[int, list[Region]] = {}
     rows = []
-    for (layer, name), label in _labels(circuit).items():
+    for (layer, name), label in circuit.labels.items():
         component, number = circuit.components[name], numbers[layer]
         at = frame.point(component.centre)
         row: dict[str, Any] = {"name": label, "layers": [number - 1, number + 1], "at": [*at]}
@@ -489,7 +493,7 @@ def _ports(
                 )
         rows.append(row)
     for component in circuit.components.values():
-        between = sorted(numbers[layer] for layer in component.layers)
+        between = sorted(numbers[layer] for layer in component.layers if layer in numbers)
         if component.entity == VIA and component.radius is not None and len(between) > 1:
             for number in range(between[0] + 1, between[-1], 2):
                 hole = disc(frame.point(component.centre), _hole(component.radius))
@@ -500,52 +504,3 @@ def _ports(
 def _hole(radius: float) -> float:
     """Radius in mm of a hole that leaves one overhang of its mask's disc, where there is room."""
     return max(radius * MM - OVERHANG, min(LEAST_HOLE, radius * MM / 2))
-
-
-def _spots(circuit: Circuit) -> Iterator[Spot]:
-    for component in circuit.components.values():
-        for layer in component.layers:
-            if max(component.span) > 0:
-                yield Spot(layer, component.id)
-
-
-def _labels(circuit: Circuit) -> dict[Spot, str]:
-    """The name of every component's place on a layer: its id, with the layer where it is on two."""
-    labels: dict[Spot, str] = {}
-    taken: set[str] = set()
-    for spot in _spots(circuit):
-        several = len(circuit.components[spot.id].layers) > 1
-        text = f"{spot.id}-{circuit.titles[spot.layer]}" if several else spot.id
-        stem = name = file_name(text, "port")
-        number = 1
-        while name in taken:
-            number += 1
-            name = f"{stem[:60]}-{number}"
-        taken.add(name)
-        labels[spot] = name
-    return labels
-
-
-def _nets(circuit: Circuit) -> dict[str, list[str]]:
-    """What connections join, component by component and layer by layer; vias join layers."""
-    labels = _labels(circuit)
-    home: dict[Spot, Spot] = {}
-
-    def root(spot: Spot) -> Spot:
-        while home.get(spot, spot) != spot:
-            spot = home[spot]
-        return spot
-
-    for connection in circuit.connections:
-        first, *others = (Spot(connection.layer, name) for name in connection.components)
-        for other in others:
-            home[root(other)] = root(first)
-    for component in circuit.components.values():
-        if component.entity == VIA:
-            first, *others = (Spot(layer, component.id) for layer in component.layers)
-            for other in others:
-                home[root(other)] = root(first)
-    groups: dict[Spot, list[str]] = {}
-    for spot, label in labels.items():
-        groups.setdefault(root(spot), []).append(label)
-    return {f"net{i}": members for i, members in enumerate(groups.values(), start=1)}

@@ -171,44 +171,52 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Return the nets of a ParchMint document, as ``sbafab import`` names them.
 
     A component is a port by its id on every layer, with the layer's name where it is on several.
-    Connections join the components at their ends, on their layer; a VIA joins its layers.
+    Connections join the components at their ends, on their layer; a VIA joins its layers. What lies
+    on no such layer is not joined there.
     """
-    titles = {
-        row["id"]: row.get("name") or row["id"]
-        for row in document.get("layers", ())
-        if str(row.get("type", "")).upper() != NO_MASK
-    }
-    labels: dict[_Spot, str] = {}
-    near: dict[_Spot, _Spot] = {}
+    labels = dict(parchmint_labels(document))
+    near: dict[Spot, Spot] = {}
     for row in document.get("components", ()):
-        spots = [(layer, row["id"]) for layer in row["layers"] if layer in titles]
-        for spot in spots if row.get("x-span", 1) or row.get("y-span", 1) else ():
-            text = f"{row['id']}-{titles[spot[0]]}" if len(spots) > 1 else row["id"]
-            labels[spot] = _free_name(text, labels.values())
         if str(row.get("entity", "")).upper() == VIA:
-            _join(near, spots)
+            _join(near, [spot for layer in row["layers"] if (spot := (layer, row["id"])) in labels])
     for row in document["connections"]:
         ends = [row["source"], *row["sinks"]]
         spots = [(row.get("layer", ""), end["component"]) for end in ends]
         for spot in spots if not document.get("components") else ():
             labels.setdefault(spot, _free_name(spot[1], labels.values()))
-        _join(near, spots)
-    groups: dict[_Spot, list[str]] = {}
+        _join(near, [spot for spot in spots if spot in labels])
+    groups: dict[Spot, list[str]] = {}
     for spot, label in labels.items():
         groups.setdefault(_root(near, spot), []).append(label)
     return {f"net{i}": tuple(members) for i, members in enumerate(groups.values(), start=1)}
 
 
-_Spot = tuple[str, str]
+def parchmint_labels(document: Mapping[str, Any]) -> dict[Spot, str]:
+    """Return the name of the port that every component is on each of its layers."""
+    titles = {
+        row["id"]: row.get("name") or row["id"]
+        for row in document.get("layers", ())
+        if str(row.get("type", "")).upper() != NO_MASK
+    }
+    labels: dict[Spot, str] = {}
+    for row in document.get("components", ()):
+        spots = [(layer, row["id"]) for layer in row["layers"] if layer in titles]
+        for spot in spots if row.get("x-span", 1) or row.get("y-span", 1) else ():
+            text = f"{row['id']}-{titles[spot[0]]}" if len(spots) > 1 else row["id"]
+            labels[spot] = _free_name(text, labels.values())
+    return labels
+
+
+Spot = tuple[str, str]
 """A component on a layer: the ids of layer and component."""
 
 
-def _join(near: dict[_Spot, _Spot], spots: Sequence[_Spot]) -> None:
+def _join(near: dict[Spot, Spot], spots: Sequence[Spot]) -> None:
     for spot in spots[1:]:
         near[_root(near, spot)] = _root(near, spots[0])
 
 
-def _root(near: Mapping[_Spot, _Spot], spot: _Spot) -> _Spot:
+def _root(near: Mapping[Spot, Spot], spot: Spot) -> Spot:
     while near.get(spot, spot) != spot:
         spot = near[spot]
     return spot

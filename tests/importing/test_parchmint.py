@@ -6,6 +6,7 @@ import copy
 import json
 import math
 import os
+import re
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,9 @@ from typing import Any
 
 import pytest
 import shapely
+from click.testing import CliRunner
 
+from sbafab.cli import app
 from sbafab.errors import SbafabError
 from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.write import Written, write_imported
@@ -117,6 +120,44 @@ def test_the_nets_of_a_circuit_match_its_channels(tmp_path: Path) -> None:
         frozenset(("in2", "tank")),
     }
     assert connectivity(laminate, Limits()).faults == ()
+
+
+def test_an_end_on_a_layer_without_the_component_joins_nothing(tmp_path: Path) -> None:
+    document = circuit()
+    document["connections"].append(
+        channel("d", "c", ["valve", "tank"], [[21500, 21500], [21500, 26000]])
+    )
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    remarks = import_parchmint(path).remarks
+    assert any("ends at tank, which is not on layer control" in remark for remark in remarks)
+    (net,) = (net for net in written(document, tmp_path).laminate.nets if "valve" in net.ports)
+    assert "tank" not in net.ports
+
+
+def test_the_netlist_of_the_file_matches_the_design(importing: Importing, tmp_path: Path) -> None:
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(circuit()), encoding="utf-8")
+    assert importing(path).exit_code == 0
+    command = ["check", "two-channels.toml", "--nets", str(path), "--set", "rules.yield_builds=100"]
+    said = CliRunner().invoke(app, command).output
+    assert re.search("netlist +pass +0 differences", said), said
+    # The same circuit with its first channel moved to the other tank is another netlist.
+    document = circuit()
+    document["connections"][0]["sinks"][0]["component"] = "tank"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    said = CliRunner().invoke(app, command).output
+    assert re.search("netlist +fail", said), said
+
+
+def test_a_layer_that_holds_nothing_is_named(importing: Importing, tmp_path: Path) -> None:
+    document = circuit()
+    document["layers"].append({"id": "e", "name": "empty", "type": "CONTROL", "group": "1"})
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    said = json.loads(importing(path, "--json").stdout)
+    assert said["layers"] == 5
+    assert "layer empty: holds nothing; it is not imported" in said["remarks"]
 
 
 def rewired(document: dict[str, Any], points: list[list[int]]) -> dict[str, Any]:
