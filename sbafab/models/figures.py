@@ -453,10 +453,11 @@ def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
         yield "force", next(item for item in blocked if at in item.name)
     for begins in PULLS:
         pulls = [item for item in to_design_with if item.name.startswith(begins)]
-        at = f"at {max(prediction.asked.pressures_kpa, default=0):g} kPa"
+        at = f" {max(prediction.asked.pressures_kpa, default=0):g} kPa"
         at_highest = [item for item in pulls if at in item.name]
         # Where the film does not stand the highest pressure, at the most it stands.
-        yield from (("force", item) for item in (at_highest or pulls)[:1])
+        for item in (at_highest or pulls)[:1]:
+            yield "moment" if item.unit == "N mm" else "force", item
 
 
 def _first(figures: list[Figure], begins: str) -> list[Figure]:

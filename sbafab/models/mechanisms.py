@@ -27,10 +27,14 @@ SHARES = (0.1, 0.2, 0.3)
 """Contractions at which a pull is given."""
 MOST_STRETCH = 0.05
 """Strain of the film up to which it is taken not to stretch; ours."""
+MOST_TURN = 0.1
+"""rad by which pressure may bend a plate that is taken for stiff; ours."""
 RECTANGULAR = 0.9
 """Least share of its bounding box that a pocket fills for models of straight seams; ours."""
 ATMOSPHERE = 101.325
 """kPa, the largest vacuum."""
+UNLIKE = 0.05
+"""Share by which pockets of one chamber may differ in area, for the mouths of strips; ours."""
 SEPARATE = 1e-3
 """mm between places that count as different."""
 
@@ -70,6 +74,7 @@ class FilledChamber:
     """
 
     mechanism: Mechanism
+    laminate: Laminate
     chamber: Chamber
     pockets: Sequence[MeasuredPocket]
     pressures: Sequence[float]
@@ -98,31 +103,37 @@ def _pocket(
     laminate: Laminate, centre: Point, back: float, direction: float
 ) -> MeasuredPocket | None:
     for interface in laminate.interfaces:
-        if interface.unbonded.contains(centre):
-            cores = [p for p in grow(interface.unbonded, -back).pieces if p.contains(centre)]
+        # A via or bore in the pocket is part of it.
+        void = Region(interface.unbonded.outers)
+        if void.contains(centre):
+            cores = [piece for piece in grow(void, -back).pieces if piece.contains(centre)]
             if cores:
                 region = grow(cores[0], back)
-                lying = region.turned(-direction)
+                lying, (x, y) = region.turned(-direction), unit(-direction)
+                middle = centre[0] * x - centre[1] * y, centre[0] * y + centre[1] * x
                 low_x, low_y, high_x, high_y = lying.bounds
                 share = region.area / ((high_x - low_x) * (high_y - low_y))
-                sizes = _chord(lying, 0), _chord(lying, 1)
-                return MeasuredPocket(region, interface, *sizes, share)
+                length = _chord(lying, middle, 0, _chord(lying, middle, 1) / 4)
+                width = _chord(lying, middle, 1, length / 4)
+                return MeasuredPocket(region, interface, length, width, share)
     return None
 
 
-def _chord(region: Region, axis: int) -> float:
-    """Return the median length of three chords along x (``axis`` 0) or y, past mouths of strips."""
-    low, high = region.bounds[:2], region.bounds[2:]
-    across = 1 - axis
-    lengths = []
-    for share in (0.25, 0.5, 0.75):
-        at = low[across] + share * (high[across] - low[across])
-        start, end = (low[0] - 1.0, at), (high[0] + 1.0, at)
-        if axis:
-            start, end = (at, low[1] - 1.0), (at, high[1] + 1.0)
-        box = (region & strip(start, end, SEPARATE)).bounds
-        lengths.append(box[2 + axis] - box[axis])
-    return sorted(lengths)[1]
+def _chord(region: Region, centre: Point, axis: int, step: float = 0.0) -> float:
+    """Return the chord of a region along x (``axis`` 0) or y through its centre.
+
+    With a step the median of that and of those as far off on both sides: past mouths of strips.
+    """
+    return sorted(_span(region, centre, axis, off) for off in (-step, 0.0, step))[1]
+
+
+def _span(region: Region, centre: Point, axis: int, off: float) -> float:
+    low, high = region.bounds[axis] - 1.0, region.bounds[2 + axis] + 1.0
+    at = centre[1 - axis] + off
+    start, end = ((low, at), (high, at)) if axis == 0 else ((at, low), (at, high))
+    pieces = (region & strip(start, end, SEPARATE)).pieces
+    spans = [(piece.bounds[axis], piece.bounds[2 + axis]) for piece in pieces]
+    return sum(b - a for a, b in spans if a <= centre[axis] <= b)
 
 
 def mechanism_figures(
@@ -138,11 +149,11 @@ def mechanism_figures(
                 f"what chamber {chamber.name} does", "it has no pocket wider than a strip"
             )
             continue
-        if len({(round(p.length, 6), round(p.width, 6)) for p in pockets}) > 1:
+        if max(p.area for p in pockets) > (1 + UNLIKE) * min(p.area for p in pockets):
             reason = "its pockets are of different sizes, and the model is of equal ones"
             yield LeftOut(f"what chamber {chamber.name} does", reason)
             continue
-        filled = FilledChamber(mechanism, chamber, pockets, request.pressures_kpa, of)
+        filled = FilledChamber(mechanism, laminate, chamber, pockets, request.pressures_kpa, of)
         yield from FIGURES[mechanism.kind](filled)
 
 
@@ -154,26 +165,50 @@ def _not_straight(pocket: MeasuredPocket, name: str, of: str) -> LeftOut:
     )
 
 
-def _most_pressure(stiffness: float | None, tension_at_1_kpa: float) -> float:
-    """Return the pressure in kPa at which the film is stretched by ``MOST_STRETCH``."""
-    return math.inf if stiffness is None else MOST_STRETCH * stiffness / tension_at_1_kpa
+class Limit(NamedTuple):
+    """Pressure in kPa up to which a model holds, what happens beyond, and what would raise it."""
+
+    most: float
+    beyond: str
+    remedy: str
 
 
-def _up_to_stretch(
+def _stretch(stiffness: float | None, tension_at_1_kpa: float) -> Limit:
+    """Return the pressure at which the film is stretched by ``MOST_STRETCH``."""
+    return Limit(
+        math.inf if stiffness is None else MOST_STRETCH * stiffness / tension_at_1_kpa,
+        f"the film would stretch by more than {100 * MOST_STRETCH:g} %",
+        "a film of more modulus x thickness",
+    )
+
+
+def _plate_bend(laminate: Laminate, length: float) -> Limit:
+    """Return the pressure at which the plates' ends turn by ``MOST_TURN``: p a^3 / 6 D."""
+    films = [layer.film for layer in laminate.tpe_layers]
+    stiffest = max((f.elastic[0] * f.thickness**3 / 12 for f in films if f.elastic), default=0.0)
+    return Limit(
+        1000 * MOST_TURN * 6 * stiffest / (length / 2) ** 3,
+        f"the plates themselves would bend by more than {math.degrees(MOST_TURN):.0f} deg",
+        "a thicker layer under them",
+    )
+
+
+def _while_it_holds(
     name: Callable[[float], str],
-    most: float,
+    limit: Limit,
     pressures: Sequence[float],
     figure: Callable[[float], Figure],
 ) -> Iterator[Figure | LeftOut]:
-    """Yield a figure at each pressure that the film stands, and at the most it stands otherwise."""
+    """Yield a figure at each pressure up to the limit, and at the limit if that is below all."""
+    most = limit.most
     for pressure in pressures:
         if pressure <= most:
             yield figure(pressure)
         else:
             yield LeftOut(
                 name(pressure),
-                f"the film would stretch by more than {100 * MOST_STRETCH:g} %: the model holds to "
-                f"{most:.3g} kPa, and further for a film of more modulus x thickness",
+                f"{limit.beyond}: the model holds to {most:.3g} kPa, and further with "
+                f"{limit.remedy}",
             )
     if pressures and most < min(pressures):
         yield figure(float(f"{most * 0.999:.3g}"))
@@ -205,7 +240,7 @@ def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     yield Figure("stroke", f"free contraction{of}, share", 100 * most, "%", model)
     for share in SHARES:
         angle = float(pouch.half_angle(share))
-        limit = _most_pressure(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
+        limit = _stretch(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
 
         def name(pressure: float, share: float = share) -> str:
             return f"pull{of} at {pressure:g} kPa, {100 * share:g} % shorter"
@@ -214,7 +249,7 @@ def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
             value = beside * float(pouch.pull(pressure, share, length, width))
             return Figure("force", name(pressure, share), value, "N", model)
 
-        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+        yield from _while_it_holds(name, limit, filled.pressures, figure)
     content = len(filled.pockets) * float(pouch.volume(most, length, width))
     yield Figure("actuation", f"volume at free contraction{of}", content, "ul", model)
 
@@ -239,7 +274,8 @@ def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     joints = f", {count} hinges" if count > 1 else ""
     yield Figure("bending", f"free bend{of}{joints}", count * each, "deg", model)
     angle = float(pouch.half_angle(1 - math.cos(pouch.free_bend() / 4)))
-    limit = _most_pressure(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
+    limit = _stretch(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
+    limit = min(limit, _plate_bend(filled.laminate, length))
     for share, at in ((0.0, "straight"), (0.5, "half bent")):
 
         def name(pressure: float, at: str = at) -> str:
@@ -250,7 +286,7 @@ def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
             value = float(pouch.moment(pressure, bend, length, width))
             return Figure("force", name(pressure, at), value, "N mm", model)
 
-        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+        yield from _while_it_holds(name, limit, filled.pressures, figure)
 
 
 def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
@@ -272,7 +308,7 @@ def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         f"other; {_stretch_note(pocket.film_stiffness)}; {NOT_CALIBRATED}",
     )
     yield Figure("size", f"inflated diameter of a beam{of}", across, "mm", model)
-    limit = _most_pressure(pocket.film_stiffness, inflated_beam.hoop_tension(1.0, width))
+    limit = _stretch(pocket.film_stiffness, inflated_beam.hoop_tension(1.0, width))
     loads = (
         ("load that wrinkles", inflated_beam.wrinkling_moment),
         ("load that collapses", inflated_beam.collapse_moment),
@@ -289,7 +325,7 @@ def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         ) -> Figure:
             return Figure("force", name(pressure, words), law(pressure, width) / length, "N", model)
 
-        yield from _up_to_stretch(name, limit, filled.pressures, figure)
+        yield from _while_it_holds(name, limit, filled.pressures, figure)
 
 
 def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
@@ -308,8 +344,9 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     model = Model(
         jamming.MODEL,
         "Narang, Vlassak and Howe, Adv. Funct. Mater. 28 (2018) 1707136",
-        f"{count} sheets of {thick:g} mm as one beam {width:.4g} mm wide until they slip, friction "
-        f"{filled.mechanism.friction:g} as given; the bag's films not counted; {NOT_CALIBRATED}",
+        f"{count} sheets of {thick:g} mm as one cantilever {length:.4g} x {width:.4g} mm until "
+        f"they slip, friction {filled.mechanism.friction:g} as given; the bag's films not "
+        f"counted; {NOT_CALIBRATED}",
     )
     ratio = float(count**2)
     yield Figure("stiffness", f"jammed over loose stiffness{of}", ratio, "", model)
@@ -324,7 +361,7 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
             value = law(modulus, width, thick, count)
             yield Figure("stiffness", f"bending stiffness{of}, {words}", value, "N mm2", model)
     for pressure in filled.pressures:
-        name = f"load at the end that slips{of}, {length:.4g} mm out, vacuum of {pressure:g} kPa"
+        name = f"load that slips{of} at a vacuum of {pressure:g} kPa"
         if pressure > ATMOSPHERE:
             yield LeftOut(name, f"no vacuum is larger than {ATMOSPHERE:.0f} kPa")
             continue

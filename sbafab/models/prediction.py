@@ -569,7 +569,7 @@ def _geometric_figures(
     if mechanism is not None:
         yield from mechanism_figures(mechanism, actuator.laminate, request)
         for quantity in mechanisms.LEFT_OUT[mechanism.kind]:
-            yield LeftOut(quantity, f"no closed form of a {mechanism.kind} gives it")
+            yield LeftOut(quantity, f"the model of its mechanism, {mechanism.kind}, gives none")
         return
     if not actuator.kinematics:
         force = "force once the plates part" if pushed else "force"
