@@ -25,6 +25,8 @@ LONGEST = 1e5
 """s of simulated time."""
 MOST_PRESSURE = 1000.0
 """kPa: nearly three times what bursts the paper's actuators."""
+LARGEST_VACUUM = 101.325
+"""kPa below the air outside, which no vacuum exceeds."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,11 @@ def users(field_name: str) -> list[str]:
 
 
 def chamber_pressures(
-    names: Sequence[str], request: SimulationRequest, default: float, most: float = MOST_PRESSURE
+    names: Sequence[str],
+    request: SimulationRequest,
+    default: float,
+    most: float = MOST_PRESSURE,
+    least: float = 0.0,
 ) -> dict[str, float]:
     """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 
@@ -106,8 +112,10 @@ def chamber_pressures(
     )
     pressures = {name: request.chambers.get(name, in_all) for name in names}
     for name, value in pressures.items():
-        if not (math.isfinite(value) and 0 <= value <= most):
-            raise DesignError(f"pressure of {name} = {value:g} kPa must be from 0 to {most:g} kPa")
+        if not (math.isfinite(value) and least <= value <= most):
+            raise DesignError(
+                f"pressure of {name} = {value:g} kPa must be from {least:g} to {most:g} kPa"
+            )
     if not any(pressures.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
     return pressures

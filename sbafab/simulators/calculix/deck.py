@@ -17,7 +17,11 @@ from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.mesh import Mesh
 from sbafab.meshing.formats.inp import write_inp
-from sbafab.simulators.simulator import SimulationRequest, chamber_pressures
+from sbafab.simulators.simulator import (
+    LARGEST_VACUUM,
+    SimulationRequest,
+    chamber_pressures,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,6 +63,7 @@ class DeckSettings:
     imperfection: float = 0.010
     film: Elastic = TPE
     others: Mapping[str, Elastic] = field(default_factory=dict)
+    is_free: bool = False
 
     def times(self) -> list[float]:
         """When results are written, in s, and the start."""
@@ -72,8 +77,12 @@ class DeckSettings:
 
     @property
     def largest(self) -> float:
-        """The highest of the pressures in kPa."""
-        return max(self.pressures.values())
+        """The pressure in kPa that is farthest from 0."""
+        return max(self.pressures.values(), key=abs)
+
+    @property
+    def has_vacuum(self) -> bool:
+        return min(self.pressures.values()) < 0
 
 
 def deck_settings(
@@ -81,10 +90,13 @@ def deck_settings(
 ) -> DeckSettings:
     """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
-    pressures = chamber_pressures(names, request or SimulationRequest(), PAPER_PRESSURE)
+    pressures = chamber_pressures(
+        names, request or SimulationRequest(), PAPER_PRESSURE, least=-LARGEST_VACUUM
+    )
     films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
     film = films.pop("TPE", TPE)
-    return DeckSettings(pressures, procedure, film=film, others=films)
+    is_stack = any(interface.kind == "separator" for interface in laminate.interfaces)
+    return DeckSettings(pressures, procedure, film=film, others=films, is_free=not is_stack)
 
 
 def _elastic(film: Film) -> Elastic:
@@ -135,13 +147,15 @@ def is_lone_balloon(mesh: Mesh) -> bool:
     return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
 
 
-def supports(mesh: Mesh) -> Iterator[str]:
+def supports(mesh: Mesh, is_free: bool = False) -> Iterator[str]:
     """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
-    paper's model: a few nodes of the ring hold what a rigid body could do, and nothing else.
+    paper's model: a few nodes of the ring hold what a rigid body could do, and nothing else; so do
+    they where the deck ``is_free``.
     """
-    if is_lone_balloon(mesh):
+    is_free = is_free or is_lone_balloon(mesh)
+    if is_free:
         fixed = list(_fixed_freedoms(mesh))
         nodes = sorted({node for node, _ in fixed})
         yield "*NSET, NSET=held\n" + "".join(f"{node}\n" for node in nodes)
@@ -149,7 +163,7 @@ def supports(mesh: Mesh) -> Iterator[str]:
     else:
         yield f"*NSET, NSET=held\n{BASE}\n*BOUNDARY\n{BASE}, 1, 3\n"
     for name in _planes(mesh):
-        yield from _on_plane(mesh, name)
+        yield from _on_plane(mesh, name, is_free)
 
 
 def _planes(mesh: Mesh) -> list[str]:
@@ -176,14 +190,14 @@ def _fixed_freedoms(mesh: Mesh) -> Iterator[tuple[int, int]]:
     yield from in_plane
 
 
-def _on_plane(mesh: Mesh, name: str) -> Iterator[str]:
+def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
     """The nodes of one symmetry plane stay on it."""
     nodes = mesh.node_sets[name]
     normal = _normal(mesh.points[nodes, :2])
     if min(abs(normal)) < FLAT:
         yield f"*BOUNDARY\n{name}, {1 if abs(normal[0]) > FLAT else 2}\n"
         return
-    fixed = np.empty(0, dtype=np.int64) if is_lone_balloon(mesh) else mesh.node_sets[BASE]
+    fixed = np.empty(0, dtype=np.int64) if is_free else mesh.node_sets[BASE]
     on_axis = nodes[np.hypot(*mesh.points[nodes, :2].T) < FLAT]
     for node in np.setdiff1d(on_axis, fixed):
         yield f"*BOUNDARY\n{node + 1}, 1, 2\n"
@@ -258,7 +272,7 @@ def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
     yield f"*INCLUDE, INPUT={MESH_FILE}\n"
     yield from _cavity_faces(mesh)
     yield from _sections(mesh, settings)
-    yield from supports(mesh)
+    yield from supports(mesh, settings.is_free)
     for name in settings.pressures:
         yield f"*AMPLITUDE, NAME=ramp_{name}\n"
         yield "".join(f"{time:.9g}, {settings.share(time):.9g}\n" for time in settings.times())

@@ -369,9 +369,9 @@ def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> N
 
 
 def history_svg(title: str, states: Sequence[State]) -> str:
-    """Three panels beside each other; x is the highest of the chambers' pressures."""
+    """Three panels beside each other; x is the chambers' pressure that is farthest from 0."""
     last = states[-1]
-    fullest = max(last.pressures, key=lambda name: last.pressures[name])
+    fullest = max(last.pressures, key=lambda name: abs(last.pressures[name]))
     x = [state.pressures[fullest] for state in states]
     is_even = len(set(last.pressures.values())) == 1
     x_label = "pressure, kPa" if is_even else f"pressure in {fullest}, kPa"

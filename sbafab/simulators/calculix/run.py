@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -174,7 +174,7 @@ def _stopped(ending: Ending, states: Sequence[State], settings: DeckSettings) ->
     last = states[-1]
     return (
         f"ccx stopped at {_place(ending.time, settings)}: {ending.stopped}; results up to "
-        f"{max(last.pressures.values()):.3g} kPa are kept; {_advice(ending, settings)}"
+        f"{max(last.pressures.values(), key=abs):.3g} kPa are kept; {_advice(ending, settings)}"
     )
 
 
@@ -262,6 +262,9 @@ def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSetti
         wrapped=False,
     )
     settings = deck_settings(laminate, request, cast(Procedure, request.procedure or "dynamic"))
+    if settings.has_vacuum:
+        # Films that lie on each other have no room to be drawn together.
+        mesh = replace(mesh, gaps=True)
     for name, meshed in images(laminate, mesh.symmetry).items():
         if settings.pressures[name] != settings.pressures[meshed]:
             raise DesignError(
