@@ -133,6 +133,8 @@ def read_sta(path: Path) -> list[float]:
 # History of a run: stroke, air and wall stress against pressure.
 
 
+SAME_PLACE = 1e-6
+"""mm"""
 NEAR = 0.5
 """mm from an axis within which a node of the tip stands for it."""
 
@@ -199,6 +201,23 @@ def history(
             )
         )
     return states
+
+
+def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
+    """Return True if films that face each other across a chamber have passed through each other.
+
+    ``mesh`` keeps the gaps between films; decks have no contact. Films of open chambers that lie on
+    each other from the start are not looked at.
+    """
+    nodes = np.unique(_walls(mesh, chamber))
+    x, y, z = mesh.points[nodes].T
+    order = np.lexsort((z, np.round(y, 6), np.round(x, 6)))
+    ranked = nodes[order]
+    start = mesh.points[ranked]
+    facing = (np.abs(np.diff(start[:, :2], axis=0)) < SAME_PLACE).all(axis=1)
+    facing &= np.diff(start[:, 2]) > SAME_PLACE
+    apart = np.diff(start[:, 2] + frame.displacement[ranked, 2])
+    return bool((apart[facing] < 0).any())
 
 
 def _work(before: State, pressures: Mapping[str, float], volumes: Mapping[str, float]) -> float:

@@ -27,6 +27,7 @@ from sbafab.simulators.calculix.results import (
     Frame,
     State,
     deformed_png,
+    films_meet,
     history,
     history_csv,
     history_svg,
@@ -151,11 +152,33 @@ def simulate(
             f"ccx stopped at {_place(ending.time, settings)}, before the first result: "
             f"{ending.stopped}; {_advice(ending, settings)}"
         )
+    met = _first_contact(run_mesh, settings, frames)
+    frames = frames[:met]
+    if not frames:
+        raise OutputError(
+            f"the films meet before the first result, at less than {settings.largest:g} kPa, and "
+            "the deck has no contact; ask for less vacuum"
+        )
     states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
     _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
     stopped = None if ending.stopped is None else _stopped(ending, states, settings)
+    if met is not None:
+        reached = min(states[-1].pressures.values())
+        stopped = (
+            f"the films meet beyond {reached:.3g} kPa, where the deck, which has no contact and no "
+            "loose sheets, no longer holds; results up to there are kept"
+        )
     return History(tuple(states), stopped)
+
+
+def _first_contact(mesh: Mesh, settings: DeckSettings, frames: Sequence[Frame]) -> int | None:
+    """Return the index of the first frame in which a vacuum has films pass through each other."""
+    drawn_in = [name for name, pressure in settings.pressures.items() if pressure < 0]
+    for number, frame in enumerate(frames):
+        if any(films_meet(mesh, name, frame) for name in drawn_in):
+            return number
+    return None
 
 
 def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
