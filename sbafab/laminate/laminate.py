@@ -460,7 +460,9 @@ class Interface:
 
     @property
     def gap(self) -> float:
-        """Height in mm between the two layers: the thickness of the masks."""
+        """Height in mm between the two layers: the thickness of the masks, or as they are laid."""
+        if not self.masks:
+            return round(self.above.z - self.z, 9)
         return sum(mask.film.thickness for mask in self.masks)
 
     @property

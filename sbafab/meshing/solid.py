@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, facets
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region, rectangle
+from sbafab.geometry.region import Region, rectangle, strip, union
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.meshing.surface import Surface, open_edges
 
@@ -267,16 +268,52 @@ def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 # The flat solid: TPE films and the bonds that join them.
 
 
+MASKLESS_GAP = 0.02
+"""mm that a gap with seams and no mask is open in solids and meshes: films would else be one body.
+"""
+FOLD_WIDTH = 0.5
+"""mm along a fold within which the two halves are one body in solids and meshes."""
+
+
+def parted(laminate: Laminate) -> Laminate:
+    """Return the laminate with ``MASKLESS_GAP`` in each gap that has a chamber and no mask."""
+    opened = {
+        interface.above.index
+        for interface in laminate.interfaces
+        if interface.kind == "chamber" and not interface.masks and not interface.gap
+    }
+    layers, lift = [], 0.0
+    for layer in laminate.layers:
+        lift += MASKLESS_GAP if layer.index in opened else 0.0
+        layers.append(replace(layer, z=round(layer.z + lift, 9)) if lift else layer)
+    return replace(laminate, layers=tuple(layers)) if opened else laminate
+
+
+def folded_strips(laminate: Laminate, interface: Interface) -> Region:
+    """Return the strips along the folds of an interface, where film goes on to the other half."""
+    layers = interface.below.index, interface.above.index
+    folds = [fold for fold in laminate.folds if (fold.lower, fold.upper) == layers]
+    strips = [strip(*fold.line, 2 * FOLD_WIDTH) for fold in folds]
+    return interface.contact & union(strips) if strips else Region()
+
+
+def body_bond(laminate: Laminate, interface: Interface) -> Region:
+    """Return where the films of an interface are one body: bonds, and strips along folds."""
+    strips = folded_strips(laminate, interface)
+    return interface.bond if strips.is_empty else interface.bond | strips
+
+
 def solid_slabs(laminate: Laminate) -> list[Slab]:
     """Every TPE layer, and every bond as the mask's thickness filled with TPE, bottom to top."""
+    laminate = parted(laminate)
     slabs = [
         Slab(layer.profile, layer.z, layer.z + layer.film.thickness)
         for layer in laminate.tpe_layers
     ]
     slabs += [
-        Slab(interface.bond, interface.z, interface.z + interface.gap)
+        Slab(body_bond(laminate, interface), interface.z, interface.z + interface.gap)
         for interface in laminate.interfaces
-        if interface.masks and not interface.bond.is_empty
+        if interface.gap and not interface.bond.is_empty
     ]
     return sorted(slabs, key=lambda slab: slab.bottom)
 
@@ -299,12 +336,14 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     Raises OutputError where the chamber has no pocket, or a film between two of its pockets
     closes a channel.
     """
+    laminate = parted(laminate)
     axes = [bore.centre for bore in laminate.bores if bore.chamber == chamber.name]
+    levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     pockets = [
         Slab(Region(tuple(contours)), interface.z, interface.z + interface.gap)
-        for interface in laminate.interfaces
-        if interface.kind == "chamber"
-        and (contours := list(_pocket(interface, chamber.centres, axes)))
+        for balloon, interface in enumerate(levels, start=1)
+        if chamber.is_in(balloon)
+        and (contours := list(_pocket(laminate, interface, chamber.centres, axes)))
     ]
     if not pockets:
         x, y = chamber.centres[0]
@@ -333,10 +372,12 @@ def cavity(
 
 
 def _pocket(
-    interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
+    laminate: Laminate, interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
 ) -> Iterator[Contour]:
     """The unbonded pieces round the centres, open where a channel runs through them."""
-    for piece in interface.unbonded.pieces:
+    strips = folded_strips(laminate, interface)
+    void = interface.unbonded if strips.is_empty else interface.unbonded - strips
+    for piece in void.pieces:
         (outer,) = piece.outers
         if any(outer.winding(centre) != 0 for centre in centres):
             yield outer

@@ -103,8 +103,10 @@ def _pocket(
     laminate: Laminate, centre: Point, back: float, direction: float
 ) -> MeasuredPocket | None:
     for interface in laminate.interfaces:
-        # A via or bore in the pocket is part of it.
-        void = Region(interface.unbonded.outers)
+        # A via or bore at the centre is part of the pocket.
+        void = Region(
+            tuple(c for c in interface.unbonded.contours if not (c.is_hole and c.winding(centre)))
+        )
         if void.contains(centre):
             cores = [piece for piece in grow(void, -back).pieces if piece.contains(centre)]
             if cores:

@@ -14,7 +14,7 @@ from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.region import Region, disc, polygon
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
 from sbafab.meshing.conforming.plane import Plane, triangulation
-from sbafab.meshing.solid import cavity_slabs
+from sbafab.meshing.solid import body_bond, cavity_slabs, parted
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -266,6 +266,7 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     Raises DesignError where h does not suit the laminate or the symmetry is not the design's,
     OutputError where bonds touch in one point.
     """
+    laminate = parted(laminate)
     _check_size(laminate, settings)
     part = sector(laminate, settings.symmetry)
     clipped: dict[Region, Region] = {}
@@ -379,7 +380,7 @@ def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
 def _bond(laminate: Laminate, interface: Interface) -> Region:
     """Return the bond without snipped-off ears: between balloons, the neck rings alone."""
     if interface.kind != "separator":
-        return interface.bond
+        return body_bond(laminate, interface)
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
     necks = [
         piece

@@ -1,0 +1,106 @@
+"""Decks of the drawn templates: supports, a vacuum's sign, and runs of the real ccx."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.scripts.drawn_runs import DECKS, run_deck
+from sbafab.actuators import build, load_design
+from sbafab.errors import DesignError
+from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.simulators.calculix.deck import deck_settings, started, write_deck
+from sbafab.simulators.calculix.results import Frame, films_meet, read_frd
+from sbafab.simulators.calculix.run import deck_mesh
+from sbafab.simulators.simulator import SimulationRequest
+
+pytest.importorskip("netgen")
+needs_ccx = pytest.mark.skipif(shutil.which("ccx") is None, reason="ccx is not installed")
+
+
+def test_a_vacuum_is_a_negative_load_on_the_same_faces(tmp_path: Path) -> None:
+    laminate = build(load_design("vacuum"))
+    mesh = deck_mesh(laminate, MeshSettings(h=4, gaps=True, symmetry="half"))
+    loads = {}
+    for pressure in (5.0, -5.0):
+        settings = deck_settings(laminate, SimulationRequest(pressure), "static")
+        write_deck(mesh, settings, tmp_path)
+        text = (tmp_path / "actuator.inp").read_text("ascii")
+        loads[pressure] = re.findall(r"(faces_stack_\d, P\d), (\S+)", text)
+    assert [face for face, _ in loads[5.0]] == [face for face, _ in loads[-5.0]] != []
+    assert {float(value) for _, value in loads[5.0]} == {0.005}
+    assert {float(value) for _, value in loads[-5.0]} == {-0.005}
+
+
+def test_no_vacuum_is_larger_than_the_air_outside() -> None:
+    laminate = build(load_design("vacuum"))
+    with pytest.raises(DesignError, match=r"must be from -101\.325 to 1000 kPa"):
+        deck_settings(laminate, SimulationRequest(-102.0))
+
+
+def test_films_that_pass_through_each_other_are_seen() -> None:
+    """The gap of eight sheets of 0.05 mm is 0.4 mm; the upper film sinks by more or less."""
+    laminate = build(load_design("vacuum"))
+    mesh = deck_mesh(laminate, MeshSettings(h=4, gaps=True, symmetry="half"))
+    x, y, z = np.abs(mesh.points).T
+    upper = (z > 0.038 + 0.4 - 1e-6) & (x < 39.9) & (y < 9.9)
+    for sink, meets in ((0.399, False), (0.401, True)):
+        moved = np.zeros_like(mesh.points)
+        moved[upper, 2] = -sink
+        assert films_meet(mesh, "stack", Frame(1.0, moved, np.zeros((len(moved), 6)))) is meets
+
+
+@pytest.mark.parametrize(("template", "free"), [("finger", True), ("1dof-5mm", False)])
+def test_only_a_stack_stands_on_its_base(template: str, free: bool, tmp_path: Path) -> None:
+    laminate = build(load_design(template))
+    settings = deck_settings(laminate)
+    assert settings.is_free is free
+    mesh = deck_mesh(laminate, MeshSettings(h=0.7 if template == "1dof-5mm" else 3.0))
+    write_deck(mesh, settings, tmp_path)
+    text = (tmp_path / "actuator.inp").read_text("ascii")
+    assert ("base, 1, 3" in text) is not free
+    if free:
+        # As many as a rigid body has freedoms.
+        boundary = text.split("*BOUNDARY\n")[1].split("*")[0]
+        assert len(boundary.splitlines()) == 6
+
+
+@pytest.mark.long
+@needs_ccx
+@pytest.mark.parametrize("template", DECKS)
+def test_the_deck_of_every_drawn_template_runs(template: str, tmp_path: Path) -> None:
+    history = run_deck(template, tmp_path)
+    first, last = history.states[0], history.states[-1]
+    if DECKS[template].pressure < 0:
+        assert history.stopped is not None
+        assert "the films meet beyond" in history.stopped
+        assert last.stroke < 0
+        assert all(last.volumes[name] < first.volumes[name] for name in last.volumes)
+        return
+    assert history.stopped is None
+    assert last.stroke > 0.01
+    assert all(last.volumes[name] > first.volumes[name] + 0.1 for name in last.volumes)
+    assert last.stress > 0
+
+
+@pytest.mark.long
+@needs_ccx
+def test_the_finger_bends_away_from_the_layer_that_does_not_stretch(tmp_path: Path) -> None:
+    run_deck("finger", tmp_path)
+    case = DECKS["finger"]
+    laminate = build(load_design("finger"))
+    mesh = deck_mesh(laminate, MeshSettings(h=case.h, symmetry=case.symmetry))
+    settings = replace(deck_settings(laminate, SimulationRequest(case.pressure)), outputs=1)
+    run_mesh = started(mesh, settings)
+    rise = read_frd(tmp_path / "actuator.frd", len(run_mesh.points))[-1].displacement[:, 2]
+    x = run_mesh.points[:, 0]
+    lower = run_mesh.points[:, 2] < 0.2
+    ends = (np.abs(x) > 27) & (np.abs(x) < 29) & lower
+    middle = (np.abs(x) > 8) & (np.abs(x) < 10) & lower
+    # The pouches lie on the upper side, which becomes the hollow one.
+    assert rise[ends].mean() > rise[middle].mean()
