@@ -104,7 +104,9 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
                 lightest = min(lightest, *(piece.area for piece in pieces))
     weight = ""
     if film.density is not None:
-        weight = f", the lightest of {lightest * film.thickness * film.density / 1000:.2g} mg"
+        milligrams = lightest * film.thickness * film.density / 1000
+        shown = f"{milligrams:.2g}" if milligrams < 99.5 else f"{milligrams:.0f}"
+        weight = f", the lightest of {shown} mg"
     thin = units.millimetres(film.thickness)
     how = HOLDING[hold_down(works[0], film)]
     sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
