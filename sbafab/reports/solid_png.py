@@ -14,6 +14,7 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Edge, Line, Point
 from sbafab.geometry.region import Region, polygon
 from sbafab.laminate.laminate import Laminate
+from sbafab.meshing.solid import body_bond, parted
 from sbafab.reports.canvas import Canvas, Tone, keyhole
 
 ELEVATION = math.radians(36.0)
@@ -80,6 +81,7 @@ class Shape(NamedTuple):
 
 def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> bytes:
     """The TPE solid, cut open at one chamber, as PNG; height exaggerated as its caption says."""
+    laminate = parted(laminate)
     cut = cutaway(laminate)
     factor = _factor(laminate)
     camera = _camera(laminate, cut, factor, width * SUPERSAMPLE, height * SUPERSAMPLE)
@@ -140,9 +142,10 @@ def _prisms(laminate: Laminate) -> Iterator[Prism]:
         if interface is None or not interface.gap:
             yield Prism(layer.pattern, layer.profile, Region(), layer.z, thickness, False)
             continue
-        name = " ".join(interface.pattern)
-        yield Prism(name, layer.profile, interface.unbonded, layer.z, thickness, False)
-        yield Prism(f"bond {name}", interface.bond, Region(), interface.z, interface.gap, True)
+        name, bond = " ".join(interface.pattern), body_bond(laminate, interface)
+        void = interface.unbonded if bond is interface.bond else interface.contact - bond
+        yield Prism(name, layer.profile, void, layer.z, thickness, False)
+        yield Prism(f"bond {name}", bond, Region(), interface.z, interface.gap, True)
 
 
 def _shape(prism: Prism, cut: RemovedSector, camera: Camera) -> Shape:
