@@ -67,13 +67,15 @@ def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:
     return net_map(laminate, found)
 
 
-def check_folder(folder: str | Path) -> Findings:
+def check_folder(folder: str | Path, nets: str | Path | None = None) -> Findings:
     """Check the cut files of an output folder as they lie on disk with the rule deck.
 
     Also whether the folder is what its ``design.toml`` makes (findings ``manifest-claims``,
-    ``as-designed``, ``file-integrity``). Raises OutputError where none can be read there.
+    ``as-designed``, ``file-integrity``), and with ``nets``, a file, whether its layers join what
+    that netlist lists (``netlist``). Raises OutputError where none can be read there, DesignError
+    for a netlist that cannot be read.
     """
     # Reading a folder back takes longer to load than the rules.
     from sbafab.runs.check_folder import check_folder as read_and_check
 
-    return Findings(read_and_check(Path(folder)))
+    return Findings(read_and_check(Path(folder), None if nets is None else Path(nets)))

@@ -115,10 +115,12 @@ def _plan(
 ) -> Sequence[str]:
     gap = laminate.interfaces[number - 1]
     areas = [area for area in shown.areas if area.interface == number]
+    # A void of two nets is filled in the one's colour and outlined in the other's.
+    edges = [shown.colours[area.nets[1]] if area.nets[1:] else "none" for area in areas]
     drawn = [
-        f'<path d="{area.path}" fill="{area.colour}" fill-rule="evenodd">'
-        f"<title>{escape(' and '.join(area.nets) or 'no net')}</title></path>"
-        for area in areas
+        f'<path d="{area.path}" fill="{area.colour}" fill-rule="evenodd" stroke="{edge}" '
+        f'stroke-width="0.4"><title>{escape(" and ".join(area.nets) or "no net")}</title></path>'
+        for area, edge in zip(areas, edges, strict=True)
     ]
     title = f"interface {number}: layers {gap.below.index} and {gap.above.index}"
     return [
