@@ -23,6 +23,8 @@ from sbafab.laminate.laminate import Chamber, Inlet, Laminate, Layer
 
 PITCH = 4.0
 MARGIN = 3.0
+POCKET = 1.6
+"""Radius of a pocket, mm."""
 OVERHANG = 0.5
 PIXEL = 0.1
 
@@ -49,6 +51,8 @@ class Routes:
     """Ports through the top film."""
     mouths: list[str] = field(default_factory=list)
     """Ports that are an inlet through the left edge."""
+    pockets: list[str] = field(default_factory=list)
+    """Ports that are a round pocket, wider than its channel."""
     more: list[tuple[int, Region]] = field(default_factory=list)
     """Added to the mask of an interface."""
     less: list[tuple[int, Region]] = field(default_factory=list)
@@ -123,6 +127,8 @@ def add_net(routes: Routes, name: str, random: Random) -> None:
             # An inlet has no interface of its own, so that each has its place along the edge.
             routes.mouths.append(port)
             taken.add(place[2])
+        elif random.random() < 0.3:
+            routes.pockets.append(port)
     routes.nets[name] = names
 
 
@@ -223,6 +229,8 @@ def mask_of(routes: Routes, level: int) -> Region:
             continue
         if name in routes.tubes:
             shapes.append(disc(xy(place), routes.pad / 2))
+        if name in routes.pockets:
+            shapes.append(disc(xy(place), POCKET))
         if name in routes.mouths:
             end = (-MARGIN - OVERHANG, xy(place)[1])
             shapes.append(strip(end, xy(place), routes.width))
