@@ -446,6 +446,10 @@ class DrawnDesign(Design):
         return frozenset(seam.layers for seam in self.seams or ())
 
     @property
+    def turned_layers(self) -> frozenset[int]:
+        return frozenset(number for number, row in enumerate(self.layers, start=1) if row.turned)
+
+    @property
     def stated_folds(self) -> tuple[Fold, ...]:
         return tuple(Fold(*fold.layers, fold.line) for fold in self.folds or ())
 
@@ -716,11 +720,11 @@ def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
     if not any(turned.values()):
         return stack
     folded = {index for fold in design.stated_folds for index in (fold.lower, fold.upper)}
-    patterns: dict[tuple[str, Region, int], str] = {}
+    patterns: dict[tuple[str, Region, int, bool], str] = {}
     placed = []
     for layer in stack:
         own = layer.index if layer.index in folded else 0
-        shape = layer.film.material, layer.profile, own
+        shape = layer.film.material, layer.profile, own, turned[layer.index]
         pattern = patterns.setdefault(shape, f"P{len(patterns) + 1:02d}")
         placed.append(replace(layer, turned=turned[layer.index], pattern=pattern))
     return tuple(placed)

@@ -184,9 +184,9 @@ def film_of(design: Design, role: Role, index: int = 0) -> Film:
 
 def used_films(design: Design) -> dict[str, Film]:
     """Return the films that a design names, by material, TPE first. Raises DesignError."""
-    stock = design.films.stock
-    films = [film_of(design, role) for role in ROLES]
-    films += [stock[name] for name in design.layer_films.values() if name in stock]
+    listed_roles = enumerate(design.layer_roles, start=1)
+    films = [film_of(design, role, index) for index, role in listed_roles if role in ROLES]
+    films = films or [film_of(design, role) for role in ROLES]
     named = {film.material: film for film in films}
     return {material: named[material] for material in in_order(named)}
 

@@ -51,8 +51,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.folding import fold_roots, halves
-from sbafab.laminate.joints import Fold
+from sbafab.laminate.folding import halves
 from sbafab.laminate.laminate import Laminate, SheetPanel
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
@@ -234,7 +233,7 @@ def read_folder(
     layers_expected = expected.layers(count) if expected is not None else [None] * count
     files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
     problems += file_errors
-    files = _folded(files, () if expected is None else expected.laminate.folds)
+    files = _as_laid(files, expected)
     seams, file_errors = read_seams(folder, claims, expected)
     problems += file_errors
     panel, files, file_errors = read_panel(folder, claims, files, expected)
@@ -271,23 +270,26 @@ def read_folder(
     )
 
 
-def _folded(files: Sequence[LayerFile], folds: Sequence[Fold]) -> list[LayerFile]:
-    """Return the files with each layer of a folded film as its half of the part that is cut."""
-    roots = fold_roots(folds)
-    if not roots:
+def _as_laid(files: Sequence[LayerFile], expected: ExpectedLaminate | None) -> list[LayerFile]:
+    """Return the files with each layer as it lies: turned over, or its half of a folded film.
+
+    What the design's own layers are cut from is that already.
+    """
+    if expected is None or len(files) != len(expected.laminate.layers):
         return [*files]
-    by_root: dict[int, dict[int, Region]] = {}
-    folded = []
+    laminate = expected.laminate
+    roots = {fold.lower for fold in laminate.folds}
+    laid = []
     for file in files:
-        root = roots.get(file.position, file.position)
         part = file.part
-        if part is None or part.is_expected or root not in {fold.lower for fold in folds}:
-            folded.append(file)
-            continue
-        if root not in by_root:
-            by_root[root] = halves(root, folds, part.region)
-        folded.append(replace(file, part=replace(part, region=by_root[root][file.position])))
-    return folded
+        if part is not None and not part.is_expected:
+            root = laminate.cut_with(laminate.layer(file.position))
+            region = part.region.mirrored() if laminate.layer(root).turned else part.region
+            if root in roots:
+                region = halves(root, laminate.folds, region)[file.position]
+            part = replace(part, region=region)
+        laid.append(replace(file, part=part))
+    return laid
 
 
 def _cut_parts(files: Sequence[LayerFile]) -> list[LayerFile]:

@@ -86,7 +86,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
 
 def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, ...]:
     """Return the layers of readable files in order; equal profiles share a pattern."""
-    patterns: dict[tuple[str, str, int], str] = {}
+    patterns: dict[tuple[str, str, int, bool], str] = {}
     layers = []
     z = 0.0
     folded = {index for fold in design.stated_folds for index in (fold.lower, fold.upper)}
@@ -96,7 +96,8 @@ def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, .
         if file.part is not None:
             # Folded layers are cut as one part, so that none is of another layer's pattern.
             number = file.position if file.position in folded else 0
-            shape = (claim.material, file.part.region.key, number)
+            turned = file.position in design.turned_layers
+            shape = (claim.material, file.part.region.key, number, turned)
             layers.append(
                 Layer(
                     index=file.position,

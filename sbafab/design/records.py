@@ -156,6 +156,11 @@ class Design(Section):
         return frozenset()
 
     @property
+    def turned_layers(self) -> frozenset[int]:
+        """Layers, by index, that lie upper face down."""
+        return frozenset()
+
+    @property
     def stated_folds(self) -> tuple[Fold, ...]:
         """Films folded into two layers."""
         return ()

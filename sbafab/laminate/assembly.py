@@ -179,6 +179,12 @@ def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
     )
 
 
+def pressed_layers(laminate: Laminate) -> list[Layer]:
+    """Return the layers that lie in the press in some step."""
+    pressed = {index for step in assembly(laminate) for index in step.layers}
+    return [layer for layer in laminate.layers if layer.index in pressed]
+
+
 def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:
     """Return True if a layer, or an earlier stack, is placed by hand, without a pin that holds it.
 

@@ -354,13 +354,15 @@ class Laminate:
         """Return the region in a layer's cut file: its profile, or its registered sheet.
 
         A mask sheet is laid face down, so it is cut turned over. Layers of a folded film are cut
-        as one flat part, that of the lowest of them.
+        as one flat part, that of the lowest of them. All films are cut upper face up, so that what
+        is turned as it is laid is drawn turned over, too.
         """
         if self.panel is None:
             root = self.cut_with(layer)
-            if not any(fold.lower == root for fold in self.folds):
-                return layer.profile
-            return flat_part(root, self.folds, [layer.profile for layer in self.layers])
+            flat = layer.profile
+            if any(fold.lower == root for fold in self.folds):
+                flat = flat_part(root, self.folds, [layer.profile for layer in self.layers])
+            return flat.mirrored() if self.layer(root).turned else flat
         sheet = self.panel.sheets[layer.index - 1]
         return sheet.mirrored() if layer.is_mask else sheet
 

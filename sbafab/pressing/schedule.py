@@ -20,6 +20,7 @@ from sbafab.laminate.assembly import (
     distinct_layers,
     is_laid_by_hand,
     laying,
+    pressed_layers,
     stack_count,
 )
 from sbafab.laminate.base_plate import PlateMachine
@@ -127,7 +128,7 @@ def minutes_of_another_temperature(
 
 def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
     """Return the structural films of a laminate for which no minutes are stated."""
-    return unstated((layer.film for layer in laminate.layers), press.minutes_for)
+    return unstated((layer.film for layer in pressed_layers(laminate)), press.minutes_for)
 
 
 # The steps: layers pressed together, in their order (paper Sec. 2).
@@ -604,11 +605,10 @@ PRESSURES_TRIED = (70.0, 200.0)
 
 
 def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
-    parts = assembly(laminate)
-    pressed = {index for part in parts for index in part.layers}
+    parts, pressed = assembly(laminate), pressed_layers(laminate)
     if not pressed:
         return
-    for film in dict.fromkeys(laminate.layer(index).film for index in sorted(pressed)):
+    for film in dict.fromkeys(layer.film for layer in pressed):
         melts = not film.is_mask and film.softens_above is not None
         if melts and press.temperature_c <= (film.softens_above or 0.0):
             raise DesignError(
@@ -740,7 +740,7 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
     """Yield warnings of films without stated minutes or melting point."""
     if words := unstated_minutes(films_without_minutes(laminate, press), press):
         yield words
-    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+    for film in dict.fromkeys(layer.film for layer in pressed_layers(laminate)):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:
             yield (
                 f"no melting point of {film.product} is known, so nobody has checked that "

@@ -6,6 +6,7 @@ film.
 
 from __future__ import annotations
 
+from sbafab.laminate.assembly import pressed_layers
 from sbafab.laminate.films import unstated
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
@@ -82,7 +83,7 @@ RULE = Rule(
 
 def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:
     """A warning for films without stated press minutes."""
-    films = unstated((layer.film for layer in laminate.layers), stated)
+    films = unstated((layer.film for layer in pressed_layers(laminate)), stated)
     if not films:
         return []
     names = " and ".join(film.said for film in films)

@@ -44,3 +44,28 @@ def test_a_folded_folder_is_as_designed_and_a_moved_half_is_found(tmp_path: Path
     bond = next(finding for finding in built.measured if finding.rule == "bond-width")
     assert bond.measured == pytest.approx(0.7, abs=1e-6)
     assert bond.verdict == "fail"
+
+
+def test_a_turned_layer_is_cut_turned_over_and_read_back_as_it_lies(tmp_path: Path) -> None:
+    data = folded(name="turned")
+    del data["folds"]
+    data["layers"][2]["turned"] = True
+    path = tmp_path / "turned.toml"
+    path.write_text(tomli_w.dumps(data), encoding="utf-8")
+    rules = ["sealing", "tube-fit", "mask-overhang"]
+    folder = generate(path, out=tmp_path / "out", rules={"waive": rules}).folder
+    cap = folder / "layers" / "003_TPE_cap.dxf"
+    document = ezdxf.readfile(cap)
+    (outline,) = [e for e in document.modelspace() if e.dxf.layer == "CUT_OUTER"]
+    xs = [x for x, *_ in outline.get_points("xy")]
+    # It lies from -20 to 21.
+    assert (min(xs), max(xs)) == (-21, 20)
+    assert not [finding for finding in check_folder(folder) if finding.verdict == "fail"]
+    points = [
+        (x + 0.25 if x < -20.9 else x, y, *rest) for x, y, *rest in outline.get_points("xyseb")
+    ]
+    outline.set_points(points, format="xyseb")
+    document.saveas(cap)
+    built = read_back(folder).designs[0]
+    assert built.laminate is not None
+    assert built.laminate.layers[2].profile.bounds[2] == pytest.approx(20.75, abs=1e-6)

@@ -154,6 +154,9 @@ def open_stack(folder: Path, design: Path) -> Stack:
     asked = tomllib.loads(design.read_text(encoding="utf-8"))
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     regions = [read(folder / layer["file"]).region for layer in manifest["layers"]]
+    for number, row in enumerate(asked["layers"]):
+        if row.get("turned"):
+            regions[number] = affinity.scale(regions[number], -1.0, 1.0, origin=(0, 0))
     centre = Point(asked["chambers"][0]["centres"][0])
     for fold in asked.get("folds", []):
         lower, upper = fold["layers"]

@@ -174,6 +174,8 @@ def _plan_basis(work: Work) -> str:
             "No plan: nobody stated the minutes in the press for this film (press.minutes_for). "
             "Generate again once they are known."
         )
+    if not work.schedule.steps:
+        return "No plan: nothing is pressed, and nobody stated how fast the seams are made."
     by_hand, hours = work.schedule.hands_minutes, work.design.order.shift_hours
     platen = _platen(work)
     holds = most_together(work.laminate, platen)

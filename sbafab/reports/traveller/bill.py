@@ -139,8 +139,9 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
     folded = [
         layer for layer in work.laminate.layers if work.laminate.cut_with(layer) == first.index
     ]
-    profile = work.laminate.first_cut(first) if len(folded) > 1 else first.profile
-    shape = flat_shape(first.pattern) if len(folded) > 1 else first.pattern
+    is_flat = len(folded) > 1 or first.turned
+    profile = work.laminate.first_cut(first) if is_flat else first.profile
+    shape = flat_shape(first.pattern) if is_flat else first.pattern
     layers = (*layers, *(layer for layer in folded if layer is not first))
     name = work.design.name
     holding = [

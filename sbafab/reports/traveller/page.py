@@ -113,7 +113,7 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def _turned(laminate: Laminate) -> str:
-    """Return the layers that are cut upper face down, by number."""
+    """Return the layers that are cut turned over, by number; none is so by a fold alone."""
     roots = {laminate.cut_with(layer) for layer in laminate.layers if layer.turned}
     return layer_numbers([index for index in sorted(roots) if laminate.layer(index).turned])
 

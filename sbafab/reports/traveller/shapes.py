@@ -44,12 +44,13 @@ def pattern_id(pattern: str) -> str:
 def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
     for pattern, layers in laminate.patterns.items():
         yield pattern_id(pattern), layers[0].profile
-        if any(fold.lower == layers[0].index for fold in laminate.folds):
+        is_folded = any(fold.lower == layers[0].index for fold in laminate.folds)
+        if is_folded or layers[0].turned:
             yield pattern_id(flat_shape(pattern)), laminate.first_cut(layers[0])
 
 
 def flat_shape(pattern: str) -> str:
-    """Return what the flat part of a folded film is called among the shapes."""
+    """Return what a part that is cut folded out or turned over is called among the shapes."""
     return f"{pattern}-flat"
 
 
