@@ -81,6 +81,10 @@ def import_laminate(path: Path) -> Imported:
     remarks: list[str] = []
     films, names = _film_tables(laminate, remarks)
     stock = Films.model_validate(films).stock
+    for film in dict.fromkeys(layer.film for layer in laminate.layers):
+        if stock[names[film.material]].shade != film.shade:
+            # Films that no layer is cut from count for the colours of the others.
+            remarks.append(f"film {film.material}: has another colour in pictures")
     tables: dict[str, Any] = {"name": file_name(laminate.name), "family": "drawn", "kit": "paper"}
     if films:
         tables["films"] = films
@@ -300,6 +304,7 @@ def _film_table(name: str, film: Film) -> dict[str, Any]:
         keys["temperature_limit"] = film.limit
     elif film.is_mask:
         keys |= {"kind": film.kind, "temperature_limit": film.limit, "warning": film.warning}
+        keys |= {"modulus": modulus, "poisson": poisson}
     else:
         keys |= {"melting_point": film.softens_above, "modulus": modulus, "poisson": poisson}
         if name != "tpe":

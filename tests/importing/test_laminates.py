@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 
 from sbafab.actuators import build, load_design
+from sbafab.design.files import template_names
 from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError, OutputError
 from sbafab.importing.laminates import import_folder, import_laminate
@@ -29,15 +30,15 @@ from tests.properties.test_designs import share
 from tests.quick import few
 
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+SMALLER = ("1dof-5mm", "3dof-15mm")
+"""Templates that are taken with fewer balloons."""
+ASSEMBLIES = ("aperture", "brace", "standing")
 DESIGNS: dict[str, tuple[str, list[str]]] = {
     "1dof-5mm": ("1dof-5mm", ["stack.balloons=3"]),
     "3dof-15mm": ("3dof-15mm", ["stack.balloons=2"]),
-    "pouch": ("pouch", []),
-    "1dof-10mm": ("1dof-10mm", []),
-    "radial-15mm": ("radial-15mm", []),
+    **{name: (name, []) for name in template_names() if name not in (*SMALLER, *ASSEMBLIES)},
     "radial manifold": ("radial-15mm", ["inlet.manifold=true", "stack.balloons=2"]),
     "radial ears": ("radial-15mm", ["registration.method=ears", "sheet.overlap=2"]),
-    "lobed ears": ("3dof-15mm", ["registration.method=ears", "stack.balloons=3"]),
     "ears stay in": (
         "1dof-5mm",
         ["registration.method=ears", "registration.full_bond_pins=in"],
@@ -47,6 +48,7 @@ DESIGNS: dict[str, tuple[str, list[str]]] = {
     "thick film": (str(GALLERY / "thick-film.toml"), []),
     "drawn outline": (str(GALLERY / "oval.toml"), []),
     "pinned": (str(GALLERY / "pinned-15mm.toml"), []),
+    "lobed ears": ("3dof-15mm", ["registration.method=ears", "stack.balloons=2"]),
 }
 FEW = Limits(yield_builds=50)
 
@@ -66,7 +68,7 @@ def imported(folder: Path, file: Path) -> Written:
     return write_imported(import_folder(folder), file, folder.name)
 
 
-@pytest.mark.parametrize("name", few(DESIGNS, 3))
+@pytest.mark.parametrize("name", few(DESIGNS, 2))
 def test_a_folder_comes_back_with_the_same_bytes(name: str, tmp_path: Path) -> None:
     laminate, folder = folder_of(*DESIGNS[name], tmp_path / "out")
     written = imported(folder, tmp_path / "again.toml")
@@ -95,8 +97,15 @@ def read_back(laminate: Laminate, folder: Path) -> Written:
     path = folder / FILE
     path.write_text(laminate_json(laminate), encoding="utf-8")
     written = write_imported(import_laminate(path), folder / "again.toml", FILE)
-    assert replace(written.laminate, family=laminate.family, name=laminate.name) == laminate
+    again = replace(written.laminate, family=laminate.family, name=laminate.name)
+    assert uncoloured(again) == uncoloured(laminate)
     return written
+
+
+def uncoloured(laminate: Laminate) -> Laminate:
+    """The laminate without the colours of its films, which films that it has none of count for."""
+    layers = (replace(layer, film=replace(layer.film, shade=0)) for layer in laminate.layers)
+    return replace(laminate, layers=tuple(layers))
 
 
 @pytest.mark.parametrize("name", few(DESIGNS, 3))
