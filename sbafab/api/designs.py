@@ -101,7 +101,7 @@ def resolved(design: Design | Assembly) -> dict[str, Any]:
 def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     """Return the laminate of a design: its layers bottom to top, lengths in mm, the axis at (0, 0).
 
-    In a notebook it shows itself as a picture. Raises DesignError. The lay-up is the paper's
+    Notebooks display it as a picture. Raises DesignError. The lay-up is the paper's
     (Sec. 2).
     """
     return actuators.build(load(source, *changes, **tables))

@@ -96,7 +96,7 @@ def _print(fitted: Fit) -> None:
         click.echo(f"{unknown.title:<34}{value:>10}   {interval:<16}  {prior}")
     click.echo("")
     for sentence in calibration.sentences:
-        click.echo(f"Not told apart: {sentence}")
+        click.echo(f"Not distinguished by the evidence: {sentence}")
     missed = ", ".join(
         f"{group} {100 * spread:.0f} %" for group, spread in calibration.discrepancy.items()
     )

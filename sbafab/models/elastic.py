@@ -268,7 +268,9 @@ def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOu
             yield Figure("bending", name, pose.bend, "deg", model)
             yield from _clearances(name.replace("bend at ", "", 1), request, stack, pose)
             aside = float(np.hypot(*pose.tip[:2]))
-            yield Figure("bending", name.replace("bend", "tip aside", 1), aside, "mm", model)
+            yield Figure(
+                "bending", name.replace("bend", "lateral tip displacement", 1), aside, "mm", model
+            )
 
 
 def _clearances(

@@ -250,7 +250,7 @@ def _further_counterparts() -> Iterator[Counterpart]:
         (r"\d+ chambers", "2 chambers", 100, 106.1),
     ):
         yield Counterpart(
-            rf"(bend|tip aside) at \S+ kPa in {some}, the others empty", STACK,
+            rf"(bend|lateral tip displacement) at \S+ kPa in {some}, the others empty", STACK,
             LARGEST_BEND, bend, THREE_DOF, value, f"at {kpa} kPa in {chambers}", three,
             f"bend at {kpa} kPa in {chambers}, the others empty", True,
         )  # fmt: skip

@@ -431,7 +431,10 @@ def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
         "height, inflated": (f"free height {at}", BALLOON),
         "push at 75 % of its stroke": (f"blocked force {at}, at 75 % of full stroke", ELASTIC),
         "bend by one chamber": (f"bend {at} in one chamber, the others empty", ELASTIC),
-        "reach of the tip aside": (f"tip aside {at} in one chamber, the others empty", ELASTIC),
+        "maximum lateral tip displacement": (
+            f"lateral tip displacement {at} in one chamber, the others empty",
+            ELASTIC,
+        ),
     }
     # A sag is a load over a stiffness.
     return figures.get(name, (f"lateral tip stiffness {at}, pressure held", ELASTIC))
@@ -452,7 +455,7 @@ def _figures_of_arm(
         single = arm_stack.pose((pressure, *(0.0,) * (arm_stack.chambers - 1)))
         yield AssemblyFigure(name, "bend by one chamber", single.bend, "deg", ELASTIC)
         aside = float(np.hypot(*single.tip[:2]))
-        yield AssemblyFigure(name, "reach of the tip aside", aside, "mm", ELASTIC)
+        yield AssemblyFigure(name, "maximum lateral tip displacement", aside, "mm", ELASTIC)
     if weight > 0:
         hung = arm_stack.pose(every, tip_load=(weight, 0.0, 0.0), near=free)
         sag = float(np.linalg.norm(hung.tip - free.tip))

@@ -139,7 +139,8 @@ def test_without_numpy_all_but_registration_is_measured_and_nothing_is_cut(memor
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     lines = [line.split(" ", 3) for line in done.stdout.splitlines()]
     rules = [rule for path, kind, rule, _ in lines if (path, kind) == ("/api/live", "rule")]
-    assert rules == [rule for rule, _ in api.checking(api.loads(SMALL))][:-2]
+    counted = ("registration-worst-case", "registration-yield")
+    assert rules == [rule for rule, _ in api.checking(api.loads(SMALL)) if rule not in counted]
     assert [kind for path, kind, *_ in lines if path == "/api/live"][-3:] == [
         "unmeasured",
         "nets",
