@@ -45,7 +45,7 @@ DECKS: Mapping[str, DeckCase] = {
     "finger": DeckCase(1.0, "half", 3.0),
     "folded": DeckCase(0.01, "half", 2.0),
     "gripper": DeckCase(1.0, "full", 3.0),
-    "pouch": DeckCase(0.001, "half", 1.0),
+    "pouch": DeckCase(0.0002, "half", 1.0),
     "truss": DeckCase(0.1, "half", 3.0),
     # Sheets are not meshed: the films meet at this vacuum, which is next to none.
     "vacuum": DeckCase(-0.0001, "half", 4.0, 8),

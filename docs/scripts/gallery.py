@@ -12,7 +12,8 @@ from sbafab.assemblies.records import Assembly
 from sbafab.design.files import template_names, templates_folder
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.models.figures import Figure, Prediction
+from sbafab.models.figures import LEFT_OUT, Figure, Prediction
+from sbafab.models.mechanisms import NOT_CALIBRATED
 from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.solid_png import solid_png
 from sbafab.rules.finding import counted
@@ -123,6 +124,10 @@ def numbers_of(prediction: Prediction) -> Iterator[tuple[str, str, str]]:
     """Yield the three numbers of an actuator, each with its interval or the model's known error."""
     known = _to_design_with(prediction)
     called = {name: (words, digits) for name, words, digits in FIGURES}
+    for line in prediction.verdict:
+        value, _, words = line.figure.partition(", ")
+        if line.quantity != LEFT_OUT and NOT_CALIBRATED in line.note:
+            yield words, value, ""
     for choices in NUMBERS:
         figure = next((known[name] for name in choices if name in known), None)
         if figure is None:

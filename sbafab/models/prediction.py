@@ -623,6 +623,9 @@ def _relations(
 def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
     factor = request.factors.press_factor
+    if not (actuator.kinematics or actuator.has_the_papers_film):
+        # Measured on the paper's film; a sheet that stays solid does not flow.
+        factor = 1.0
     pressed = NOMINAL.times("press factor", factor)
     for name, value in sizes(actuator.design, actuator.laminate, factor).items():
         shown = name.replace("_", " ")
