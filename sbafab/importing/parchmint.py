@@ -44,10 +44,7 @@ PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
 
 @dataclass(frozen=True)
 class Component:
-    """A component: upper left corner, width and height, um; ``radius`` of those that are discs.
-
-    ``ports`` are offsets of its terminals by label, from the corner.
-    """
+    """A component: upper left corner, width and height, um; ``radius`` of those that are discs."""
 
     id: str
     entity: str
@@ -55,7 +52,6 @@ class Component:
     corner: Point
     span: Point
     radius: float | None
-    ports: Mapping[str, Point]
 
     @property
     def centre(self) -> Point:
@@ -87,8 +83,9 @@ class Circuit:
 
 def import_parchmint(path: Path) -> Imported:
     """Return the design of a placed and routed circuit. Raises DesignError with the place."""
+    text = read_text(path, MOST_BYTES)
     try:
-        document = json.loads(read_text(path, MOST_BYTES))
+        document = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise DesignError(f"{path} is no JSON: {error}; save it again") from None
     try:
@@ -110,7 +107,7 @@ class JsonPlace(NamedTuple):
     def get(self, key: str) -> JsonPlace | None:
         """Return the value of a key of an object, None if it is not there or null."""
         if not isinstance(self.value, dict):
-            raise DesignError(f"{self.place} is no object; export the circuit again")
+            raise DesignError(f"{self.place or 'the file'} is no object; export the circuit again")
         value = self.value.get(key)
         return None if value is None else JsonPlace(value, f"{self.place}.{key}".lstrip("."))
 
@@ -128,9 +125,9 @@ class JsonPlace(NamedTuple):
 
     @property
     def text(self) -> str:
-        if not isinstance(self.value, str | int):
+        if not isinstance(self.value, str):
             raise DesignError(f"{self.place} is {shown(self.value)}, which is no text")
-        return str(self.value)
+        return self.value
 
     @property
     def number(self) -> float:
@@ -209,8 +206,8 @@ def _kind(row: JsonPlace) -> str:
 
 def _group(row: JsonPlace) -> int:
     group = row.get("group")
-    text = group.text if group is not None else "0"
-    return int(text) if text.isdecimal() else 0
+    text = "0" if group is None else str(group.value)
+    return int(text) if text.isdecimal() and len(text) < 10 else 0
 
 
 def _title(row: JsonPlace) -> str:
@@ -267,7 +264,7 @@ def _component(
             f"{here}: drawn as its box of {span[0]:g} x {span[1]:g} um at x {corner[0]:g}, "
             f"y {corner[1]:g}; what is inside is not drawn"
         )
-    return Component(name, entity, on_masks, corner, span, _radius(row, entity), _terminals(row))
+    return Component(name, entity, on_masks, corner, span, _radius(row, entity))
 
 
 def _place(
@@ -293,14 +290,6 @@ def _radius(row: JsonPlace, entity: str) -> float | None:
     params = row.get("params")
     radius = params.get(ROUND[entity]) if params is not None and entity in ROUND else None
     return radius.number if radius is not None else None
-
-
-def _terminals(row: JsonPlace) -> dict[str, Point]:
-    ports = row.get("ports")
-    return {
-        port.need("label").text: (port.need("x").number, port.need("y").number)
-        for port in (ports.items() if ports is not None else ())
-    }
 
 
 def _connection(

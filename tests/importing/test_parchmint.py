@@ -216,6 +216,7 @@ def at(*keys: str | int) -> Callable[[dict[str, Any], object], None]:
 
 REFUSED: dict[str, tuple[Callable[[dict[str, Any], Any], None], object, str]] = {
     "no layers": (at("layers"), None, "the file has no layers"),
+    "number": (at("components", 0, "id"), 7, "components[0].id is 7, which is no text"),
     "no list": (at("components"), {}, "components is no list"),
     "unplaced": (
         at("components", 1, "params", "position"),
