@@ -25,7 +25,7 @@ EDGE = 30
 
 def main() -> None:
     """Writes the pictures that are named, or all."""
-    wanted = sys.argv[1:] or ["gallery", "docs", "assembly", "phone"]
+    wanted = sys.argv[1:] or ["gallery", "docs", "draw", "assembly", "phone"]
     with tempfile.TemporaryDirectory() as scratch, browser() as chromium:
         folder = Path(scratch)
         (folder / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
@@ -34,6 +34,8 @@ def main() -> None:
                 _gallery(Watched(chromium, link, device_scale_factor=2), folder)
             if "docs" in wanted:
                 _docs(Watched(chromium, link))
+            if "draw" in wanted:
+                _draw(Watched(chromium, link))
             if "assembly" in wanted:
                 _assembly(Watched(chromium, link))
             if "phone" in wanted:
@@ -100,6 +102,30 @@ def _docs(seen: Watched) -> None:
     page.get_by_label("Cut order").fill("150")
     page.wait_for_timeout(600)
     _keep(seen, "make")
+    seen.close()
+
+
+def _draw(seen: Watched) -> None:
+    """A pocket with one side bent, and the next point under way to the grid."""
+    seen.ready()
+    seen.page.evaluate("text => studio.open(text)", api.template("pouch"))
+    seen.until("studio.laminate?.name === 'pouch'")
+    seen.page.click("#tab-draw")
+    seen.page.locator("[data-handle=corner-1]").click()
+    seen.page.locator("#view-draw .surface").press("a")
+    seen.until("studio.text.includes('path =')")
+    seen.ready()
+    seen.page.locator("#view-draw").get_by_role("button", name="Fit", exact=True).click()
+    corner = seen.page.locator("[data-handle=corner-3]").bounding_box()
+    assert corner is not None
+    x, y = corner["x"] + corner["width"] / 2, corner["y"] + corner["height"] / 2
+    seen.page.mouse.move(x, y)
+    seen.page.mouse.down()
+    seen.page.mouse.move(x - 25, y + 33, steps=5)
+    seen.page.wait_for_timeout(400)
+    seen.ready()
+    _keep(seen, "draw")
+    seen.page.mouse.up()
     seen.close()
 
 

@@ -42,13 +42,15 @@ export class Draw {
     studio.on("design", () => this.load());
     studio.on("shapes", (named) => this.heard(named));
     studio.on("opened", () => { this.eye.touched = false; Object.assign(this, { name: null, shapes: null, shape: null, corner: null, sketching: null, mark: null }); this.fresh.close(); });
-    studio.on("laminate", () => { if (studio.laminate) this.eye.bounds(studio.laminate.bounds, [34, 30, 76, 30]); });
+    studio.on("laminate", () => { if (studio.laminate) this.eye.bounds(studio.laminate.bounds, this.margin); });
     studio.on("laminate checked failed theme pick", () => this.draw());
     studio.on("design failed laminate", () => this.warn());
   }
   get present() { const { values } = this.studio; return Boolean(values?.shapes && values?.layers); }
-  show() { this.load(); this.eye.touched ? this.draw() : this.eye.fit(); }
+  show() { this.load(); this.eye.margin = this.margin; this.eye.touched ? this.draw() : this.eye.fit(); }
   hide() { this.sketching = null; }
+  // The plan stands clear of the tools, which take two rows on a phone.
+  get margin() { return [34, 30, 40 + $(".tools", this.element).offsetHeight, 30]; }
 
   // The file's shapes, unless the hand is quicker than the answers.
   load() {
@@ -395,7 +397,7 @@ export class Draw {
       // Beside the edge, to its right: outside where points go round counter-clockwise.
       const u = -(y1 - y0) / l, v = (x1 - x0) / l;
       this.spots.push([ax + u * 12, ay + v * 16 + 4]);
-      const words = edgeWords(all[i]), beside = u > 0.4 && ax + 20 + 7 * words.length > this.eye.width ? -1 : 1;
+      const words = edgeWords(all[i]), room = 20 + 7 * words.length, beside = (u > 0.4 && ax + room > this.eye.width) || (u < -0.4 && ax < room) ? -1 : 1;
       return text(words, ax + beside * u * 12, ay + v * 16 + 4, beside * u > 0.4 ? "start" : beside * u < -0.4 ? "end" : "middle");
     });
   }
