@@ -62,7 +62,9 @@ export class Draw {
     this.shape = this.shapes[this.name];
     if (this.corner !== null && this.corner >= corners(this.shape ?? {}).length) this.corner = null;
     this.options();
-    this.fill();
+    // What is half typed stays.
+    const typed = document.activeElement;
+    if (!this.side.contains(typed) || typed.tagName !== "INPUT" || typed.value === typed.defaultValue) this.fill();
     this.draw();
   }
   heard(named) {
@@ -288,6 +290,7 @@ export class Draw {
     const take = () => {
       const typed = Number(input.value.replace(",", "."));
       if (input.value.trim() === "" || !Number.isFinite(typed) || typed <= least) { input.value = plain(value, digits); return; }
+      input.defaultValue = input.value;
       if (typed !== Number(plain(value, digits))) send(typed);
     };
     input.addEventListener("change", take);

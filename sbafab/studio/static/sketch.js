@@ -174,10 +174,10 @@ export function snapped([x, y], { reach, points = [], lines = [], guides = [], g
   const along = guides.map((guide) => { const t = (x - guide.x) * guide.u + (y - guide.y) * guide.v, p = [guide.x + t * guide.u, guide.y + t * guide.v]; return { guide, p, words: guide.words, away: Math.hypot(p[0] - x, p[1] - y) }; }).filter(({ away }) => away <= reach / 2);
   const meeting = closest(along.flatMap((one, i) => along.slice(i + 1).flatMap((other) => meet(one.guide, other.guide))).map(({ p, words }) => ({ p, words, away: Math.hypot(p[0] - x, p[1] - y) })), reach);
   if (meeting) return meeting;
-  const edge = closest(lines.map(({ edge, words }) => { const [px, py] = nearestOn(edge, x, y); return { p: [px, py], words, away: Math.hypot(px - x, py - y) }; }), reach);
-  if (edge) return edge;
-  const guide = closest(along, reach);
+  const edge = closest(lines.map(({ edge, words }) => { const [px, py] = nearestOn(edge, x, y); return { edge, p: [px, py], words, away: Math.hypot(px - x, py - y) }; }), reach);
   const step = (value) => (grid ? Math.round(value / grid) * grid : value);
+  if (edge) return { ...edge, p: alongEdge(edge.edge, edge.p, step) };
+  const guide = closest(along, reach);
   if (guide) {
     // Along the guide the grid still counts, where the guide follows it.
     const { u, v } = guide.guide;
@@ -186,6 +186,12 @@ export function snapped([x, y], { reach, points = [], lines = [], guides = [], g
     return guide;
   }
   return { p: [step(x), step(y)], words: grid ? `grid of ${plain(grid)} mm` : "" };
+}
+// Along an edge that follows the grid, the grid still counts.
+function alongEdge({ x0, y0, x1, y1, b }, [x, y], step) {
+  const within = (value, a, c) => Math.min(Math.max(a, c), Math.max(Math.min(a, c), value));
+  if (b || (x0 !== x1 && y0 !== y1)) return [x, y];
+  return x0 === x1 ? [x, within(step(y), y0, y1)] : [within(step(x), x0, x1), y];
 }
 const closest = (list, reach) => list.filter(({ away }) => away <= reach).sort((a, b) => a.away - b.away)[0];
 function meet(a, b) {

@@ -93,7 +93,8 @@ export class Studio {
   // A step of the history, once the hand rests; a drag, which holds it, is one step.
   settle() {
     clearTimeout(this.settling);
-    if (!this.holding) this.settling = setTimeout(() => this.commit(), SETTLE);
+    // What is not in the text yet belongs to the same step.
+    if (!this.holding) this.settling = setTimeout(() => (this.pending.size ? this.settle() : this.commit()), SETTLE);
     this.keep();
   }
   commit() {
@@ -111,6 +112,9 @@ export class Studio {
     this.place += by;
     this.text = next;
     this.pending.clear();
+    // An answer to what is undone would bring it back.
+    this.flight?.abort.abort();
+    this.flight = null;
     this.emit("text", "history");
     this.emit("history");
     this.changed();
