@@ -1,10 +1,10 @@
-"""Writes docs/measured/validation.csv, calibrated.csv and sensitivity.csv:
+"""Writes docs/measured/validation.csv, calibrated.csv, sensitivity.csv and candidates.csv:
 python -m docs.scripts.validate
 """
 
 from __future__ import annotations
 
-from docs.scripts import measured, sensitivity
+from docs.scripts import candidates, measured, sensitivity
 from docs.scripts.tables import FOLDER, Table, markdown_rows
 from sbafab.reproduction import calibrated
 from sbafab.reproduction.calibrated import TITLE
@@ -26,8 +26,9 @@ def validation() -> tuple[Table, Table]:
 
 
 if __name__ == "__main__":
-    names = ("validation", "calibrated", "sensitivity")
-    for name, table in zip(names, (*validation(), sensitivity.table()), strict=True):
+    names = ("validation", "calibrated", "sensitivity", "candidates")
+    tables = (*validation(), sensitivity.table(), candidates.table())
+    for name, table in zip(names, tables, strict=True):
         path = PATH.with_name(f"{name}.csv")
         path.write_text(table.csv, encoding="utf-8", newline="\n")
     measured.main()

@@ -6,7 +6,7 @@ import math
 from functools import cache
 from typing import TYPE_CHECKING
 
-from sbafab.calibration.fit import GROUP_OF, delay_of, film_of, relative_errors
+from sbafab.calibration.fit import GROUP_OF, film_of, relative_errors, term_of
 from sbafab.calibration.model_values import ModelValue, NoModel, model_values
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import SHARE, deviations
@@ -49,7 +49,7 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
         answer = model_values(curve, factors)
         return {} if isinstance(answer, NoModel) else answer.series
 
-    delay = delay_of(curve) if curve.quantity == "time_s" else ""
+    term = term_of(curve)
     errors = relative_errors(curve).tolist()
 
     def interval(phrase: str, point: int) -> Ends:
@@ -59,7 +59,7 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
                 raise UnreachedError
             return reached
 
-        return widened(*uncertainty.interval_of(group, value, delay=delay), errors[point])
+        return widened(*uncertainty.interval_of(group, value, term=term), errors[point])
 
     def union(point: int) -> Ends | None:
         phrases = [

@@ -5,7 +5,7 @@ whose points are then predicted.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from sbafab.calibration.posterior import (
     SampledCurve,
     correlations,
     sampled,
+    set_up_probabilities,
 )
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
@@ -56,13 +57,24 @@ class HeldOutPoint:
 
 
 @dataclass(frozen=True)
+class OpenSetUp:
+    """What a curve's source leaves open: each ``phrase`` that was assumed, with its probability by
+    the fit, from equal ones before.
+    """
+
+    curve: str
+    probabilities: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
 class Fit:
-    """A calibration, its held-out points, and the curves that were not fitted, each with its
-    reason.
+    """A calibration, its held-out points, the set-ups that sources leave open, and the curves that
+    were not fitted, each with its reason.
     """
 
     calibration: ModelCalibration
     points: tuple[HeldOutPoint, ...]
+    open_set_ups: tuple[OpenSetUp, ...]
     left_out: tuple[tuple[str, str], ...]
 
 
@@ -76,6 +88,7 @@ GROUP_OF = {
     "energy_mj": "work",
     "time_s": "time",
     "modulus_kpa": "stiffness",
+    "loss_share": "loss",
 }
 """Quantities that calibration is fitted to, and the groups of their discrepancies."""
 
@@ -130,8 +143,22 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
     return Fit(
         _calibration(name, about, films[0], sources, posterior, points),
         tuple(points),
+        tuple(open_set_ups(usable, curves, posterior)),
         tuple(left_out),
     )
+
+
+def open_set_ups(
+    measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], posterior: Posterior
+) -> Iterator[OpenSetUp]:
+    """Yield the set-ups of each curve whose source leaves some open."""
+    for source, curve in zip(measured, curves, strict=True):
+        answer = model_values(source, factors_at(MIDDLES))
+        if isinstance(answer, NoModel) or len(answer.series) < 2:
+            continue
+        shares = set_up_probabilities(curve, posterior)
+        pairs = zip(answer.series, shares.tolist(), strict=True)
+        yield OpenSetUp(source.id, tuple(pairs))
 
 
 def film_of(curve: MeasuredCurve) -> str:
@@ -142,6 +169,7 @@ def film_of(curve: MeasuredCurve) -> str:
 def sampled_curve(curve: MeasuredCurve, surface: ValueSurface) -> SampledCurve:
     """Return a curve as the posterior takes it."""
     fields = [unknown.field for unknown in UNKNOWNS]
+    term = term_of(curve)
     return SampledCurve(
         curve.id,
         curve.group or curve.id,
@@ -149,13 +177,17 @@ def sampled_curve(curve: MeasuredCurve, surface: ValueSurface) -> SampledCurve:
         surface,
         np.log(curve.y),
         relative_errors(curve),
-        fields.index(delay_of(curve)) if curve.quantity == "time_s" else -1,
+        fields.index(term) if term else -1,
     )
 
 
-def delay_of(curve: MeasuredCurve) -> str:
-    """Return the field of the delay in a curve of times."""
-    return "water_delay" if curve.setup.fluid == "water" else "air_delay"
+def term_of(curve: MeasuredCurve) -> str:
+    """Return the field of the unknown that a curve's values have as a term: the delay of times, or
+    the share itself that a cycle loses; "" without one.
+    """
+    if curve.quantity == "time_s":
+        return "water_delay" if curve.setup.fluid == "water" else "air_delay"
+    return "loss_share" if curve.quantity == "loss_share" else ""
 
 
 def relative_errors(curve: MeasuredCurve) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.models.unknowns import UNKNOWNS
 
+if TYPE_CHECKING:
+    from sbafab.models.film_elements import Array
+
 ModelValue = float | None
 """A value of a model; None where the model has no such state."""
 SAMPLES = 16
@@ -43,8 +46,6 @@ OPEN_PRESSURES = (10.0, 30.0, 100.0)
 (Sec. 4.5) to that of its forces (Sec. 4.3)."""
 LEAST_RATIO = UNKNOWNS[0].least
 """Modulus ratio for which maps are made; those of stiffer films reach further."""
-STEPS = 40
-"""Steps of time in which air fills an actuator."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,6 @@ def model_values(
 
 
 WITHOUT_MODEL = {
-    "loss_mj": "no model: the film loses no energy in any of them",
     "geometric_kpa": "no model: the elastic ones stretch at every pressure",
     "success_share": "no model: leaks and over-melting are not in any of them",
     "build_time_h": "no model: the schedule's minutes are the paper's",
@@ -229,12 +229,18 @@ def _forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel
         return states
     series = {}
     for phrase, strokes in states.items():
-        values = []
-        for stroke, pressure in zip(strokes, _pressures(curve), strict=True):
-            one_chamber = float(elastic.blocked_force(of.stack, pressure, stroke))
-            values.append(_pushing(of, curve) * one_chamber)
-        series[phrase] = tuple(values)
+        series[phrase] = tuple(
+            None if stroke is None else _blocked_force(of, curve, pressure, stroke)
+            for stroke, pressure in zip(strokes, _pressures(curve), strict=True)
+        )
     return ModelValues(of.name, series)
+
+
+def _blocked_force(
+    of: ModelledActuator, curve: MeasuredCurve, pressure: float, stroke: float
+) -> float:
+    """Return N on a level plate at a stroke in mm."""
+    return _pushing(of, curve) * float(elastic.blocked_force(of.stack, pressure, stroke))
 
 
 def _pushing(of: ModelledActuator, curve: MeasuredCurve) -> int:
@@ -253,7 +259,7 @@ def _pressures(curve: MeasuredCurve) -> tuple[float, ...]:
 
 def _blocked_states(
     of: ModelledActuator, curve: MeasuredCurve
-) -> dict[str, tuple[float, ...]] | NoModel:
+) -> dict[str, tuple[ModelValue, ...]] | NoModel:
     """Return the strokes in mm at which a force was measured, by assumption on the full stroke."""
     count = len(curve.y)
     if curve.x_name == "stroke_mm":
@@ -267,15 +273,33 @@ def _blocked_states(
     return NoModel("the set-up names no height at which the tip is held")
 
 
-def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
+def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[ModelValue, ...]]:
+    """Return the strokes in mm at shares of the full one, by assumption on that: a free stroke at
+    OPEN_PRESSURES, or one of those that the paper gives; None where it does not rise freely.
+    """
     if not any(shares):
         return {"": shares}
-    full = of.stack.pose((paper.FULL_KPA,) * of.stack.chambers).height - of.stack.flat_height
-    states = {f"full stroke at {paper.FULL_KPA:g} kPa": tuple(share * full for share in shares)}
+    full: dict[str, ModelValue] = {
+        f"full stroke at {pressure:g} kPa": _free_stroke(of.stack, pressure)
+        for pressure in OPEN_PRESSURES
+    }
     if of.actuator.knows_full:
-        strokes = tuple(elastic.stroke_at(of.actuator, share) for share in shares)
-        states["full height as in Sec. 4.6"] = strokes
-    return states
+        full["full height as in Sec. 4.6"] = elastic.stroke_at(of.actuator, 1.0)
+        longer = paper.LONGEST_STROKE.value / paper.FULL_HEIGHT.value
+        full["full stroke as in Sec. 4.2"] = longer * of.actuator.full_height
+    return {
+        phrase: tuple(
+            0.0 if share == 0 else None if stroke is None else share * stroke for share in shares
+        )
+        for phrase, stroke in full.items()
+    }
+
+
+def _free_stroke(whole: Stack, pressure: float) -> ModelValue:
+    try:
+        return whole.pose((pressure,) * whole.chambers).height - whole.flat_height
+    except DesignError:
+        return None
 
 
 def _bent_forces(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
@@ -408,19 +432,25 @@ def _balloon_strokes(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues 
     return ModelValues(model, series)
 
 
-@lru_cache(maxsize=256)
 def _strokes_by_volume(balloon: Balloon, volumes: tuple[float, ...]) -> tuple[ModelValue, ...]:
     """Return mm of a free balloon by ul in it, to 0.2 %; None where MOST_FREE_KPA hold less."""
     top = FIRST_KPA
     while top < MOST_FREE_KPA and _free_volume(balloon, top) < max(volumes):
         top = min(2 * top, MOST_FREE_KPA)
-    shapes = free_shapes(balloon, np.geomspace(LEAST_FREE_KPA, top, SAMPLES))
-    held, heights = np.append(0.0, shapes.volume), np.append(0.0, shapes.height)
+    held, heights = _filling(balloon, top)
     return tuple(
         None if volume > held[-1] else float(np.interp(volume, held, heights)) for volume in volumes
     )
 
 
+@lru_cache(maxsize=256)
+def _filling(balloon: Balloon, top: float) -> tuple[Array, Array]:
+    """Return ul in a free balloon and its height in mm as it fills to a pressure in kPa."""
+    shapes = free_shapes(balloon, np.geomspace(LEAST_FREE_KPA, top, SAMPLES))
+    return np.append(0.0, shapes.volume), np.append(0.0, shapes.height)
+
+
+@lru_cache(maxsize=256)
 def _free_volume(balloon: Balloon, pressure: float) -> float:
     return float(free_shapes(balloon, pressure).volume[0])
 
@@ -446,6 +476,23 @@ def _stored(balloon: Balloon, pressure: float) -> float:
     if float(stretch(balloon, shape)[0]) > MOST_STRETCH:
         raise DesignError(f"at {pressure:g} kPa its films would stretch too far")
     return float(shape.energy[0])
+
+
+def _losses(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
+    """Return work lost, as the calibration's share of the input work."""
+    work, share = _energies(of, curve), of.factors.loss_share
+    if isinstance(work, NoModel):
+        return work
+    return ModelValues(
+        work.model,
+        {"": tuple(None if each is None else share * each for each in work.series[""])},
+    )
+
+
+def _loss_shares(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues:
+    """Return the calibration's share of the input work that is lost; 0 without a calibration."""
+    model = elastic.calibrated(elastic.ELASTIC, of.factors).name
+    return ModelValues(model, {"": (of.factors.loss_share,) * len(curve.y)})
 
 
 def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
@@ -478,7 +525,7 @@ def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
         f"{of.name} in time",
         {
             phrase: tuple(
-                _time_with_air(of.stack, flow, until, Line(AIR, length, bore)) + delay
+                elastic.air_time(of.stack, flow, until, Line(AIR, length, bore)) + delay
                 if is_air
                 else elastic.time_to_fill(of.stack, flow, until, length)[0] + delay
                 for until in curve.x
@@ -486,12 +533,6 @@ def _times(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
             for phrase, length in tubes.items()
         },
     )
-
-
-def _time_with_air(whole: Stack, flow: float, until: float, line: Line) -> float:
-    """Return the seconds of air until the chambers have a pressure, in STEPS steps or so."""
-    taken_in = float(whole.pose((until,) * whole.chambers).volumes.sum())
-    return elastic.air_time(whole, flow, until, line, taken_in / (flow * 1000 / 60) / STEPS)
 
 
 def _time_to_bend(
@@ -546,6 +587,8 @@ ANSWERS: dict[str, Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoM
     "bend_deg": _bends,
     "flat_height_mm": _sizes("deflated height"),
     "energy_mj": _energies,
+    "loss_mj": _losses,
+    "loss_share": _loss_shares,
     "time_s": _times,
     "modulus_kpa": _moduli,
     "burst_kpa": _bursts,

@@ -41,7 +41,7 @@ SEED = 20220085
 class SampledCurve(NamedTuple):
     """A curve as the posterior takes it: its surface, logarithms of the measured values and their
     standard errors, (points,), the test that it comes from, the number of its quantity's group in
-    GROUPS, and the column of its delay in UNKNOWNS (-1: none).
+    GROUPS, and the column in UNKNOWNS of the unknown that its values have as a term (-1: none).
     """
 
     id: str
@@ -50,18 +50,18 @@ class SampledCurve(NamedTuple):
     surface: ValueSurface
     measured: Array
     errors: Array
-    delay: int
+    term: int
 
     def logarithms(self, samples: Array) -> Array:
         """Return logarithms of the models' values (n, open set-ups, points)."""
-        return self.delayed(self.surface.at(samples), samples)
+        return self.with_term(self.surface.at(samples), samples)
 
-    def delayed(self, values: Array, samples: Array) -> Array:
-        """Return logarithms with the delay of pump or valve in them."""
-        if self.delay < 0:
+    def with_term(self, values: Array, samples: Array) -> Array:
+        """Return logarithms with the term in them, such as the delay of pump or valve."""
+        if self.term < 0:
             return values
-        delays = np.exp(samples[:, self.delay])[:, None, None]
-        return np.asarray(np.log(np.exp(values) + delays))
+        terms = np.exp(samples[:, self.term])[:, None, None]
+        return np.asarray(np.log(np.exp(values) + terms))
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,16 @@ class Posterior:
         chosen = values[np.arange(count), generator.integers(setups, size=count)]
         missed = discrepancies(np.exp(self.scales[:, curve.group]), points, generator)
         return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
+
+
+def set_up_probabilities(curve: SampledCurve, posterior: Posterior) -> Array:
+    """Return the probability of each set-up that a curve's source leaves open, by the fit to it:
+    (set-ups,).
+    """
+    residuals = curve.measured - curve.logarithms(posterior.samples)
+    logs = _set_up_densities(residuals, curve.errors, posterior.scales[:, curve.group])
+    weights = np.exp(logs - logs.max(-1, keepdims=True))
+    return np.asarray((weights / weights.sum(-1, keepdims=True)).mean(0))
 
 
 def discrepancies(scales: Array, points: int, generator: np.random.Generator) -> Array:
@@ -143,14 +153,21 @@ class Likelihood:
         for curve, shape in zip(self.curves, self.shapes, strict=True):
             end = start + math.prod(shape)
             block = values[:, start:end].reshape(-1, *shape)
-            residuals = curve.measured - curve.delayed(block, coordinates)
+            residuals = curve.measured - curve.with_term(block, coordinates)
             total = total + _curve_likelihood(residuals, curve.errors, scales[:, curve.group])
             start = end
         return total
 
 
 def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Array:
-    """Return the log density of residuals (n, set-ups, points), set-ups averaged.
+    """Return the log density of residuals (n, set-ups, points), set-ups averaged."""
+    logs = _set_up_densities(residuals, errors, log_scales)
+    most = logs.max(-1)
+    return np.asarray(most + np.log(np.exp(logs - most[:, None]).mean(-1)))
+
+
+def _set_up_densities(residuals: Array, errors: Array, log_scales: Array) -> Array:
+    """Return the log density of residuals (n, set-ups, points) by set-up (n, set-ups).
 
     A normal whose covariance is the discrepancy's plus the measurement's.
     """
@@ -159,11 +176,8 @@ def _curve_likelihood(residuals: Array, errors: Array, log_scales: Array) -> Arr
     matrices = np.exp(2 * log_scales)[:, None, None] * shape + np.diag(errors**2)
     roots = np.linalg.cholesky(matrices)
     scaled = np.linalg.solve(roots[:, None], residuals[..., None])[..., 0]
-    squares = (scaled**2).sum(-1)
-    logs = -0.5 * squares
-    most = logs.max(-1)
-    mean = most + np.log(np.exp(logs - most[:, None]).mean(-1))
-    return np.asarray(mean - np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(-1))
+    halves = np.log(np.diagonal(roots, axis1=1, axis2=2)).sum(-1)
+    return np.asarray(-0.5 * (scaled**2).sum(-1) - halves[:, None])
 
 
 def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS) -> Posterior:

@@ -105,6 +105,9 @@ def _print(fitted: Fit) -> None:
         click.echo("\nleft out                     measured      predicted   90 % interval")
         for point in fitted.points:
             click.echo(_line(point))
+    for set_ups in fitted.open_set_ups:
+        shares = ", ".join(f"{name} {100 * share:.0f} %" for name, share in set_ups.probabilities)
+        click.echo(f"Left open by {set_ups.curve}: {shares}")
     for curve, reason in fitted.left_out:
         click.echo(f"Not fitted: {curve}: {reason}")
 
@@ -124,5 +127,9 @@ def _as_json(fitted: Fit, path: Path) -> dict[str, Any]:
         "file": str(path),
         "calibration": fitted.calibration.as_dict(),
         "held_out": [{**asdict(point), "inside": point.is_inside} for point in fitted.points],
+        "left_open": [
+            {"curve": each.curve, "probabilities": dict(each.probabilities)}
+            for each in fitted.open_set_ups
+        ],
         "not_fitted": [{"curve": curve, "reason": reason} for curve, reason in fitted.left_out],
     }

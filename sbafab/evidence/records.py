@@ -43,6 +43,9 @@ QUANTITIES = {
     "bend_deg": CurveQuantity("deg", "bend", ("pressure_kpa", "volume_ul", NO_AXIS)),
     "energy_mj": CurveQuantity("mJ", "pneumatic input work", ("pressure_kpa",)),
     "loss_mj": CurveQuantity("mJ", "work lost in a cycle", ("pressure_kpa",)),
+    "loss_share": CurveQuantity(
+        "", "share of the input work lost in a cycle", ("pressure_kpa", NO_AXIS)
+    ),
     "time_s": CurveQuantity("s", "time", ("pressure_kpa", "bend_deg")),
     "modulus_kpa": CurveQuantity("kPa", "modulus in bending", ("pressure_kpa", NO_AXIS)),
     "burst_kpa": CurveQuantity("kPa", "burst pressure", (NO_AXIS,)),

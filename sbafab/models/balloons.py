@@ -48,13 +48,13 @@ def balloons_of(
     neck = bore + design.bond.width if len(radii) > 1 else 0.0
     least, smallest = max(LEAST_RATIO * neck, LEAST_RADIUS), min(radii)
     if smallest < least:
-        has = f"a pocket loss of {loss:g} mm leaves {smallest:.4g}"
+        has = f"a pocket loss of {loss:.3g} mm leaves {smallest:.4g}"
         if not loss:
             has = f"this one has {smallest:.4g}"
         of = f", {LEAST_RATIO:g} times the neck's {neck:.4g}" if least > LEAST_RADIUS else ""
         raise DesignError(
             f"the elastic balloon's pocket must be at least {least:.4g} mm in radius{of}, and "
-            f"{has}; {'give less loss' if loss else 'make the chamber wider'}"
+            f"{has}; make the chamber wider{' or give less loss' if loss else ''}"
         )
     ring = design.bond.width + loss
     balloons = []

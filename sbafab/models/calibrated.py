@@ -32,10 +32,14 @@ NONE: Literal["none"] = "none"
 """The name of no calibration: the films as drawn and bought, and no intervals."""
 FILE = "calibration.toml"
 """A calibration's copy in the output folder of a design."""
-GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness")
+GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness", "loss")
 """Groups of quantities, each with a discrepancy of its own."""
 SHARE = 0.9
 """Probability that an interval holds the measured value."""
+FIRST_UNKNOWNS = 5
+"""Unknowns of files that older versions wrote; the others have their priors."""
+UNKNOWN_LOSS = 0.15
+"""Discrepancy of the group "loss" in such files: the middle of its prior."""
 DESIGN_UNKNOWNS = 3
 """The first of UNKNOWNS, which change an actuator; the others change its supply."""
 
@@ -227,13 +231,14 @@ def _check_keys(tables: Mapping[str, Any]) -> None:
 def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
     _check_keys(tables)
     fields = [unknown.field for unknown in UNKNOWNS]
-    if tables["unknowns"] != fields:
+    if tables["unknowns"] not in (fields, fields[:FIRST_UNKNOWNS]):
         raise DesignError(f"unknowns must be {listed(fields)}, in this order")
-    count = len(fields)
+    count = len(tables["unknowns"])
     mean = _numbers(tables["mean"], "mean", (count,))
     covariance = _numbers(tables["covariance"], "covariance", (count, count))
     if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0:
         raise DesignError("covariance must be symmetric and positive definite")
+    mean, covariance = _with_priors(mean, covariance)
     for unknown, coordinate in zip(UNKNOWNS, mean, strict=True):
         low, high = unknown.coordinate(unknown.least or 1e-9), unknown.coordinate(unknown.most)
         if not low - 1e-9 <= coordinate <= high + 1e-9:
@@ -241,7 +246,8 @@ def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
                 f"mean of {unknown.field} must be from {low:.3g} to {high:.3g}"
                 + (" (a logarithm)" if unknown.is_log else "")
             )
-    spreads = {group: tables["discrepancy"].get(group) for group in GROUPS}
+    given = {"loss": UNKNOWN_LOSS, **tables["discrepancy"]}
+    spreads: dict[str, Any] = {group: given.get(group) for group in GROUPS}
     for group, value in spreads.items():
         if not isinstance(value, int | float) or not 0 <= value <= 10:
             raise DesignError(f'discrepancy."{group}" must be a number from 0 to 10')
@@ -261,6 +267,15 @@ def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
         inside,
         tuple(map(str, tables["sentences"])),
     )
+
+
+def _with_priors(mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Return mean and covariance of all unknowns; those that a file lacks have their priors."""
+    for unknown in UNKNOWNS[len(mean) :]:
+        mean = np.append(mean, unknown.coordinate(unknown.middle))
+        covariance = np.pad(covariance, (0, 1))
+        covariance[-1, -1] = unknown.spread**2
+    return mean, covariance
 
 
 def _numbers(values: object, key: str, shape: tuple[int, ...]) -> Array:

@@ -50,8 +50,8 @@ ELASTIC = Model(
 
 CALIBRATED_TRUST = (
     "modulus, pockets, pressed thickness and delays as the calibration has them; what would be "
-    "measured lies in the interval with 90 %. Plates are rigid, carry no shear and no column "
-    "buckles; films lose no energy"
+    "measured lies in the interval with 90 %. Plates are rigid and carry no shear; poses and "
+    "forces are those of films that lose no energy"
 )
 
 
@@ -99,6 +99,8 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
         yield Figure("stroke", f"volume a balloon {at}", volume, "ul", model)
         work = rise.energy * actuator.form.stacks / 1000
         yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
+    if request.factors.loss_share:
+        yield Figure("actuation", paper.LOST_WORK, 100 * request.factors.loss_share, "%", model)
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
@@ -188,6 +190,13 @@ CHAMBERS_SHUT = Model(
 )
 
 
+BUCKLES = (
+    "that of a straight column, which is unstable here and buckles: it may push harder, or give "
+    "way to a tenth or less"
+)
+"""What is said of the force of a column that would buckle (docs/measured/candidates.csv)."""
+
+
 def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
     """Return the stack of an actuator with round pockets, or why not; None for others."""
     if not actuator.radii:
@@ -231,7 +240,6 @@ def stroke_at(actuator: Actuator, share: float) -> float:
 def _forces(
     actuator: Actuator, request: PredictionRequest, stack: Stack
 ) -> Iterator[Figure | LeftOut]:
-    model = calibrated(FORCE, request.factors)
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
@@ -241,7 +249,19 @@ def _forces(
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error))
                 continue
+            model = calibrated(FORCE, request.factors)
+            if not _stands(stack, pressure, stroke_at(actuator, share)):
+                model = replace(model, trust=f"{BUCKLES}; {model.trust}")
             yield Figure("force", name, actuator.form.pushing * value, "N", model)
+
+
+def _stands(stack: Stack, pressure: float, stroke: float) -> bool:
+    """Return False if a column that a level plate holds at a stroke is unstable while straight."""
+    try:
+        plate = stack.flat_height + stroke
+        return stack.pose(_pressures(stack, stack.chambers, pressure), plate=plate).stable
+    except DesignError:
+        return True
 
 
 def _pressures(
@@ -347,20 +367,17 @@ def time_to_fill(
     return float((pose.volumes - empty.volumes).mean()) / flow, pose
 
 
-def air_time(
-    whole: Stack, flow_ml_min: float, until: float, line: Line, step: float = 0.002
-) -> float:
-    """Return the seconds of air at a flow, shared by all chambers, until they have a pressure in
-    kPa, by steps of so many s.
+def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> float:
+    """Return the seconds of air at a steady flow of the pump, shared by all chambers, until they
+    have a pressure in kPa: the air that they and their lines take in, over the flow.
     """
-    moving = whole.motion(line=line)
+    held = line.dead_volume + line.tube_volume
+    empty, full = (
+        line.content(float(whole.pose((p,) * whole.chambers).volumes.mean()) + held, p)
+        for p in (0.0, until)
+    )
     flow = flow_ml_min * 1000 / 60 / whole.chambers
-    before = 0.0
-    while moving.pressures[0] < until:
-        before = moving.pressures[0]
-        moving.step(step, flows=(flow,) * whole.chambers)
-    over = (moving.pressures[0] - until) / (moving.pressures[0] - before)
-    return moving.time - step * over
+    return line.delay + (full - empty) / flow
 
 
 def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:

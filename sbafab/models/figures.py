@@ -219,7 +219,8 @@ class Factors:
     measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
     by how many mm the press leaves pockets smaller in radius than drawn, ``modulus_mpa``, the
     film's modulus where it is not the one of the design, and ``modulus_ratio``, the modulus of the
-    pressed film over that. ``water_delay`` and ``air_delay`` in s are the lag of pump and valve.
+    pressed film over that. ``water_delay`` and ``air_delay`` in s are the lag of pump and valve,
+    ``loss_share`` the share of the input work that inflating and deflating lose; 0 is not known.
     """
 
     press_factor: float = 1.0
@@ -229,6 +230,7 @@ class Factors:
     modulus_ratio: float = 1.0
     water_delay: float = 0.0
     air_delay: float = 0.0
+    loss_share: float = 0.0
     calibration: str = ""
     """Name of the calibration that the others come from, unless it is the user's own values."""
 
@@ -347,6 +349,7 @@ class Prediction:
                 "modulus_ratio": _rounded(self.asked.factors.modulus_ratio),
                 "water_delay": _rounded(self.asked.factors.water_delay),
                 "air_delay": _rounded(self.asked.factors.air_delay),
+                "loss_share": _rounded(self.asked.factors.loss_share),
                 "calibration": self.asked.factors.calibration,
                 "overrides": {
                     field: value

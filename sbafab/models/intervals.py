@@ -9,20 +9,23 @@ from typing import TYPE_CHECKING
 
 from sbafab.models.calibrated import DESIGN_UNKNOWNS, SHARE, ModelCalibration, load_calibration
 from sbafab.models.figures import Factors, Figure, LeftOut
-from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, STACK
+from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, LOST_WORK, STACK
 from sbafab.models.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design
 
 Items = Sequence[Figure | LeftOut]
-MODULUS_RATIO = next(n for n, unknown in enumerate(UNKNOWNS) if unknown.field == "modulus_ratio")
+MODULUS_RATIO, LOSS = (
+    next(n for n, unknown in enumerate(UNKNOWNS) if unknown.field == field)
+    for field in ("modulus_ratio", "loss_share")
+)
 DELAYS = {"water": "water_delay", "air": "air_delay"}
 
 
 def calibration_of(design: Design) -> ModelCalibration | None:
-    """Return the calibration of a design; for another film than the evidence's its modulus ratio is
-    1, as uncertain as the prior has it. Raises DesignError where there is no such calibration.
+    """Return the calibration of a design, as it holds ``for_film``. Raises DesignError where there
+    is no such calibration.
     """
     calibration = load_calibration(design.models.calibration, design.folder)
     return None if calibration is None else for_film(calibration, design.films.tpe.product)
@@ -30,16 +33,18 @@ def calibration_of(design: Design) -> ModelCalibration | None:
 
 def for_film(calibration: ModelCalibration, product: str) -> ModelCalibration:
     """Return a calibration as it holds for a film; for another one than the evidence's the modulus
-    ratio is 1, as uncertain as the prior has it.
+    ratio is 1, as uncertain as the prior has it, and the share of work lost is the prior's.
     """
     if product == calibration.film:
         return calibration
     mean = list(calibration.mean)
     covariance = [list(row) for row in calibration.covariance]
     mean[MODULUS_RATIO] = 0.0
-    for other in range(len(mean)):
-        covariance[MODULUS_RATIO][other] = covariance[other][MODULUS_RATIO] = 0.0
-    covariance[MODULUS_RATIO][MODULUS_RATIO] = UNKNOWNS[MODULUS_RATIO].spread ** 2
+    mean[LOSS] = UNKNOWNS[LOSS].coordinate(UNKNOWNS[LOSS].middle)
+    for row in (MODULUS_RATIO, LOSS):
+        for other in range(len(mean)):
+            covariance[row][other] = covariance[other][row] = 0.0
+        covariance[row][row] = UNKNOWNS[row].spread ** 2
     return replace(
         calibration, mean=tuple(mean), covariance=tuple(tuple(row) for row in covariance)
     )
@@ -97,18 +102,19 @@ class Uncertainty:
         group: str,
         value_at: Callable[[Factors], float],
         share: float = SHARE,
-        delay: str = "",
+        term: str = "",
     ) -> tuple[float, tuple[float, float]]:
         """Return a value at the median, and the interval that holds what would be measured with a
-        probability of ``share``; ``value_at`` gives the value with other factors. A time that holds
-        a delay names the delay's field.
+        probability of ``share``; ``value_at`` gives the value with other factors. ``term`` is the
+        field of an unknown that the value is the sum of with others: the delay of a time.
         """
         value = value_at(self.factors)
         moved = [
             (change, value if change == 0 else value_at(factors))
             for change, factors in self.shifted()
         ]
-        return value, self._interval(group, value, moved, share=share, delay=delay)
+        terms = self._term_slopes(value, term)
+        return value, self._interval(group, value, moved, terms, share=share)
 
     def bounded(
         self, items: Items, evaluated: Callable[[Factors], Items]
@@ -135,12 +141,11 @@ class Uncertainty:
         present = [value for value in values if value is not None]
         if len(present) < len(values) or not all(map(math.isfinite, present)):
             return figure
-        fluid = next((name for name in DELAYS if name in figure.name), "")
         interval = self._interval(
             group,
             figure.value,
             [(change, value) for value, (change, _) in zip(present, moved, strict=True)],
-            delay=DELAYS[fluid] if fluid and figure.unit == "s" else "",
+            self._term_slopes(figure.value / (100 if figure.unit == "%" else 1), _term(figure)),
             may_be_negative=figure.name.startswith(CLEARANCES),
         )
         return replace(figure, interval=interval)
@@ -150,33 +155,42 @@ class Uncertainty:
         group: str,
         value: float,
         moved: Sequence[tuple[float, float]],
+        terms: Sequence[float],
         *,
         share: float = SHARE,
-        delay: str = "",
         may_be_negative: bool = False,
     ) -> tuple[float, float]:
         """Return the interval of a value, from changes of the design unknowns, each with the value
-        that it gives. A clearance, which may be negative, is linear in them.
+        that it gives, and the slopes by the others (``terms``). A clearance, which may be negative,
+        is linear in them.
         """
         is_log = not may_be_negative and _is_log(value, [each for _, each in moved])
         slopes = [_slope(value, each, change, is_log) for change, each in moved]
-        slopes += self._delay_slopes(value, delay)
+        slopes += terms
         low, high = self.calibration.interval(group, value, slopes, is_log, share)
         return (max(low, 0.0) if value >= 0 and not may_be_negative else low), high
 
-    def _delay_slopes(self, time: float, delay: str) -> list[float]:
-        """Return slopes of a time's logarithm by the logarithms of the delays, of which it holds
-        one; 0 without one, or where the user gave it.
+    def _term_slopes(self, value: float, term: str) -> list[float]:
+        """Return slopes of a value's logarithm by the logarithms of the unknowns that change no
+        design, of which it may have one as a term; 0 without one, or where the user gave it.
         """
         return [
-            self.calibration.values[unknown.field] / time
-            if unknown.field == delay and unknown.field not in self._given
+            self.calibration.values[unknown.field] / value
+            if unknown.field == term and unknown.field not in self._given
             else 0.0
             for unknown in UNKNOWNS[DESIGN_UNKNOWNS:]
         ]
 
 
 CLEARANCES = ("room between rims", "clearance between chambers")
+
+
+def _term(figure: Figure) -> str:
+    """Return the field of the unknown that a figure has as a term; "" without one."""
+    if figure.name == LOST_WORK:
+        return "loss_share"
+    fluid = next((name for name in DELAYS if name in figure.name), "")
+    return DELAYS[fluid] if fluid and figure.unit == "s" else ""
 
 
 def _slope(value: float, moved: float, change: float, is_log: bool) -> float:
@@ -215,6 +229,8 @@ def discrepancy_group(figure: Figure) -> str | None:
         return None
     if kind == FLAT_HEIGHT_OF_FILMS:
         return "flat height"
+    if figure.name == LOST_WORK:
+        return "loss"
     return GROUP_BY_UNIT.get(figure.unit, "motion")
 
 

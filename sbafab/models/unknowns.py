@@ -102,6 +102,17 @@ UNKNOWNS = (
         0.5,
         "assumed: pneumatic valves take 5 to 50 ms to open",
     ),
+    Unknown(
+        "loss_share",
+        "share of the input work lost in a cycle",
+        "",
+        True,
+        0.15,
+        0.7,
+        0.005,
+        0.9,
+        "assumed: a cycle of a thermoplastic elastomer loses a twentieth to a half of its work",
+    ),
 )
 """In the order of a calibration's mean and covariance."""
 

@@ -22,9 +22,10 @@ PAPER = "paper"
 TITLE = "Calibrated on the paper"
 COLUMNS = ("figure", "paper", "where", "calibrated", "90 % interval", "inside", "left open")
 NOT_ADOPTED = (
-    "Not adopted, because the paper's text gives too little to fit them: a film that stiffens with "
-    "stretch, a column that buckles or tilts under its load, hysteresis (4.2 of 45.3 mJ at 10 kPa) "
-    "and losses in valves beyond a delay."
+    "Tried and not adopted, for they do not explain the misses (docs/measured/candidates.csv): a "
+    "film that stiffens with stretch, a column that buckles or slides under its load, and a loss "
+    "of flow in the supply. Pockets of each actuator's own would: two actuators are too few to fit "
+    "their scatter."
 )
 
 

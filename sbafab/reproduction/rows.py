@@ -281,7 +281,7 @@ def energy() -> Iterator[Row]:
             exact(lost, "mJ", "Sec. 4.1"),
             None,
             NONE,
-            "hysteresis of the film is not modelled",
+            "without a calibration the film loses nothing",
         )
 
 

@@ -318,6 +318,7 @@ class _PredictionRequest(BaseModel):
     modulus_ratio: float = 1.0
     water_delay: float = 0.0
     air_delay: float = 0.0
+    loss_share: float = 0.0
     calibration: str = ""
     overrides: dict[str, float] = {}
 
@@ -338,6 +339,7 @@ def _factors(request: _PredictionRequest) -> Factors:
         request.modulus_ratio,
         request.water_delay,
         request.air_delay,
+        request.loss_share,
     )
 
 

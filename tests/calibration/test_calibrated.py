@@ -102,14 +102,14 @@ def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"mean": [1.0]}, "mean must be 5 finite numbers"),
-        ({"covariance": [[1.0] * 5] * 5}, "covariance must be symmetric and positive definite"),
+        ({"mean": [1.0]}, "mean must be 6 finite numbers"),
+        ({"covariance": [[1.0] * 6] * 6}, "covariance must be symmetric and positive definite"),
         ({"discrepancy": {"force": -1}}, 'discrepancy."force" must be a number from 0 to 10'),
         ({"unknowns": ["modulus_ratio"]}, "unknowns must be "),
         ({"held_out": {"points": 2, "inside": 3}}, "held_out must have points, and inside"),
         ({"schema": "sbafab/kit@1"}, "schema = 'sbafab/kit@1' must be"),
         ({"colour": "red"}, "'colour' is no key of a calibration"),
-        ({"mean": [9.0, 0.1, -0.6, -1.0, -3.0]}, "mean of modulus_ratio must be from"),
+        ({"mean": [9.0, 0.1, -0.6, -1.0, -3.0, -2.0]}, "mean of modulus_ratio must be from"),
     ],
 )
 def test_a_faulty_file_gets_one_sentence(
@@ -130,6 +130,22 @@ def test_a_file_is_read_as_it_was_written(paper: ModelCalibration, tmp_path: Pat
     assert read_calibration(path) == paper
     design = sbafab.load("1dof-5mm", models={"calibration": "lab.toml"}).placed(tmp_path)
     assert calibration_of(design) == paper
+
+
+def test_a_file_of_five_unknowns_has_the_prior_of_the_sixth(
+    paper: ModelCalibration, tmp_path: Path
+) -> None:
+    tables = paper.as_dict()
+    tables["unknowns"] = tables["unknowns"][:5]
+    tables["mean"] = tables["mean"][:5]
+    tables["covariance"] = [row[:5] for row in tables["covariance"][:5]]
+    del tables["discrepancy"]["loss"]
+    path = tmp_path / "lab.toml"
+    path.write_text(tomli_w.dumps(tables))
+    older = read_calibration(path)
+    assert older.values["loss_share"] == pytest.approx(UNKNOWNS[5].middle)
+    assert older.covariance[5] == (0, 0, 0, 0, 0, pytest.approx(UNKNOWNS[5].spread ** 2))
+    assert older.factors.modulus_ratio == paper.factors.modulus_ratio
 
 
 def test_a_name_that_is_none_says_what_there_is(tmp_path: Path) -> None:

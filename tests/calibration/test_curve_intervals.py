@@ -80,14 +80,23 @@ def test_a_time_counts_its_delay(paper: ModelCalibration) -> None:
     """A time of 1 s beside the delay: its logarithm changes by the delay's share."""
     delay = paper.values["water_delay"]
     uncertainty = Uncertainty(paper, {})
-    time, ends = uncertainty.interval_of("time", lambda f: 1 + f.water_delay, delay="water_delay")
+    time, ends = uncertainty.interval_of("time", lambda f: 1 + f.water_delay, term="water_delay")
     assert time == 1 + delay
     spread = (delay / time) ** 2 * paper.covariance[3][3] + paper.discrepancy["time"] ** 2
     assert math.log(ends[1] / time) == pytest.approx(DEVIATIONS * math.sqrt(spread))
     exact = Uncertainty(paper, {"water_delay": delay})
-    _, narrower = exact.interval_of("time", lambda f: 1 + f.water_delay, delay="water_delay")
+    _, narrower = exact.interval_of("time", lambda f: 1 + f.water_delay, term="water_delay")
     half = DEVIATIONS * paper.discrepancy["time"]
     assert math.log(narrower[1] / time) == pytest.approx(half)
+
+
+def test_a_share_is_a_term_alone(paper: ModelCalibration) -> None:
+    share, ends = Uncertainty(paper, {}).interval_of(
+        "loss", lambda f: f.loss_share, term="loss_share"
+    )
+    assert share == pytest.approx(paper.values["loss_share"])
+    spread = math.sqrt(paper.covariance[5][5] + paper.discrepancy["loss"] ** 2)
+    assert math.log(ends[1] / share) == pytest.approx(DEVIATIONS * spread)
 
 
 def test_a_value_that_vanishes_with_other_factors_may_be_nothing(paper: ModelCalibration) -> None:

@@ -59,12 +59,25 @@ OF_FIGURE_7A = {"stroke-10mm-air": (45.0, 0.13), "stroke-10mm-water": (86.0, 0.1
 
 def test_the_paper_has_every_figure_of_its_text() -> None:
     curves = {curve.id: curve for curve in load_evidence("paper").curves}
-    assert curves.keys() == PAPER.keys() | OF_FIGURE_7A.keys()
+    assert curves.keys() == PAPER.keys() | OF_FIGURE_7A.keys() | {"loss-share"}
     for name, (x, y, errors) in PAPER.items():
         assert (curves[name].x, curves[name].y) == (x, y), name
         if errors is not None:
             assert curves[name].errors == errors, name
             assert curves[name].error.kind == "standard deviation"
+
+
+def test_the_share_that_is_lost_is_loss_over_input() -> None:
+    """With the error of the last digits of both, taken as even over their range."""
+    curve = load_evidence("paper").curve("loss-share")
+    assert curve.x == (1, 10)
+    figures = ((0.055, 0.0005, 0.531, 0.0005), (4.2, 0.05, 45.3, 0.05))
+    for share, error, (lost, digit, taken, last) in zip(
+        curve.y, curve.errors, figures, strict=True
+    ):
+        assert share == pytest.approx(lost / taken, abs=5.1e-5)
+        relative = math.hypot(digit / lost, last / taken) / math.sqrt(3)
+        assert error == pytest.approx(share * relative, rel=0.06)
 
 
 @pytest.mark.parametrize("name", OF_FIGURE_7A)

@@ -13,9 +13,10 @@ import pytest
 import sbafab
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
-from sbafab.models import parabola, printed
+from sbafab.models import paper, parabola, printed
 from sbafab.models.balloon import inflate
 from sbafab.models.balloons import balloons_of
+from sbafab.models.calibrated import load_calibration
 from sbafab.models.drawn_pockets import FLAT_PLATES
 from sbafab.models.figures import Factors, Prediction
 from sbafab.models.kinematics import actuator, round_stack, slot_stack
@@ -484,3 +485,32 @@ def test_without_pressures_there_are_the_figures_that_need_none() -> None:
     prediction = sbafab.predict("1dof-5mm", pressures_kpa=[])
     assert prediction.value("full stroke") == 7.0
     assert not [figure for figure in prediction.figures if "kPa" in figure.name]
+
+
+def test_a_column_that_buckles_says_so_of_its_forces() -> None:
+    """Against the stack's stability below a level plate, which its tip sticks to."""
+    for balloons, stands in ((6, True), (15, False)):
+        design = sbafab.load("1dof-5mm", f"stack.balloons={balloons}")
+        (force,) = (
+            figure
+            for figure in sbafab.predict(design).figures
+            if figure.name == "blocked force at 100 kPa, at 75 % of full stroke"
+            and not figure.other
+        )
+        whole = sbafab.stack(design)
+        stroke = 0.75 * (17.5 * balloons / 15 - whole.flat_height)
+        pose = whole.pose((100.0,), plate=whole.flat_height + stroke)
+        assert pose.force == pytest.approx(force.value, rel=0.01)
+        assert (pose.stable, "buckles" in force.model.trust) == (stands, not stands)
+
+
+def test_the_share_of_work_that_is_lost_is_the_calibration_s(three: Prediction) -> None:
+    calibration = load_calibration("paper")
+    assert calibration is not None
+    calibrated = sbafab.predict("3dof-15mm", pressures_kpa=[10])
+    (lost,) = (figure for figure in calibrated.figures if figure.name == paper.LOST_WORK)
+    assert lost.value == pytest.approx(100 * calibration.values["loss_share"])
+    assert lost.interval is not None
+    spread = math.hypot(math.sqrt(calibration.covariance[5][5]), calibration.discrepancy["loss"])
+    assert math.log(lost.interval[1] / lost.value) == pytest.approx(1.6448536 * spread)
+    assert all(figure.name != paper.LOST_WORK for figure in three.figures)
