@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +17,7 @@ from sbafab.models.figures import PredictionRequest
 from sbafab.models.prediction import predict
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
+from sbafab.runs.run import RunRequest, generate
 from tests.quick import few
 
 FEW = Limits(yield_builds=50)
@@ -109,3 +111,10 @@ def test_the_vacuum_stack_slips_by_its_friction_and_jams_n_squared_times_as_stif
     prediction = predict(load_design("vacuum"), PredictionRequest((80.0,)))
     assert prediction.value("load that slips at a vacuum of 80 kPa") == pytest.approx(0.128)
     assert prediction.value("jammed over loose stiffness") == 64
+
+
+def test_the_traveller_says_which_face_of_a_coated_film_is_up(tmp_path: Path) -> None:
+    generate(RunRequest(load_design("finger"), tmp_path))
+    page = (tmp_path / "finger" / "traveller.html").read_text("utf-8")
+    assert "Its pe face is up, its pet face down" in page
+    assert "Lay the PET sheet with its coated side up" in page

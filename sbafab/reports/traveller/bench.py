@@ -110,8 +110,11 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
     thin = units.millimetres(film.thickness)
     how = HOLDING[hold_down(works[0], film)]
     sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
+    up = ""
+    if film.faces is not None and film.faces[0] != film.faces[1]:
+        up = f" Its {film.faces[0]} face is up, its {film.faces[1]} face down: mark the upper one."
     return Action(
-        f"{film.material}, {thin} thick: {how}{sticks} No tab holds a part: {count} come free"
+        f"{film.material}, {thin} thick: {how}{sticks}{up} No tab holds a part: {count} come free"
         f"{weight}. (Our proposal, not tried.)"
     )
 
