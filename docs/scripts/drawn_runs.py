@@ -1,5 +1,5 @@
 """Runs the decks of the drawn templates in CalculiX, coarse and at a low pressure, and keeps what came
-out: docs/measured/drawn.json.
+out: docs/measured/drawn_decks.json.
 
 python -m docs.scripts.drawn_runs takes about ten minutes; it needs ccx and the extra "mesh".
 """
@@ -23,7 +23,7 @@ from sbafab.simulators.calculix.run import History, simulate
 from sbafab.simulators.simulator import SimulationRequest
 
 COMMAND = "python -m docs.scripts.drawn_runs"
-NAME = "drawn"
+NAME = "drawn_decks"
 HOUR = 3600.0
 COLUMNS = ("template", "kPa", "part", "side, mm", "thicker by, mm", "air, ul", "stress, MPa")
 

@@ -354,6 +354,10 @@ class NamedNets(Section):
         return self.__pydantic_extra__ or {}
 
 
+FAMILY = "drawn"
+"""The family's name, for what writes design files of it."""
+
+
 class DrawnDesign(Design):
     """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
     and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
+from sbafab.actuators.drawn import FAMILY
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
@@ -79,7 +80,7 @@ def import_table(folder: Path) -> Imported:
     chambers = _chambers(folder / CHAMBERS) if (folder / CHAMBERS).is_file() else []
     tables: dict[str, Any] = {
         "name": file_name(folder.resolve().name),
-        "family": "drawn",
+        "family": FAMILY,
         "layers": layers,
         "chambers": chambers,
         "shapes": shapes,

@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sbafab.actuators.drawn import FAMILY
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.files import shown
 from sbafab.errors import DesignError
@@ -385,7 +386,7 @@ def _design(circuit: Circuit) -> Imported:
         layers.append(row)
     tables: dict[str, Any] = {
         "name": circuit.name,
-        "family": "drawn",
+        "family": FAMILY,
         "layers": layers,
         "ports": ports,
         "shapes": shapes,
