@@ -181,11 +181,13 @@ def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
 
 FIGURES = {
     "stroke_mm": ("full stroke", ""),
-    "force_n": ("blocked force at 100 kPa, flat", "virtual work on Eq. 4"),
+    "force_n": ("blocked force at 100 kPa, flat", ""),
     "height_mm": ("deflated height", ""),
     "mass_g": ("mass", ""),
 }
-"""The prediction's figure and model that a measured quantity is held against."""
+"""The prediction's figure that a measured quantity is held against, of the model to design with,
+and how the model's title begins, if not anyhow.
+"""
 TOLERANCES = {
     "offset_mm": "hand_placement",
     "turn_deg": "hand_turn",
@@ -256,7 +258,8 @@ def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[f
         figures["burst_kpa"] = (burst, model_text)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
-            if figure.name == name and figure.model.title.startswith(model):
+            is_other = figure.other or not figure.model.title.startswith(model)
+            if figure.name == name and not is_other:
                 figures[quantity] = (figure.value, figure.model.title)
                 break
     return figures
