@@ -12,7 +12,8 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.joint_chain import JOINTS, joint_values, urdf_text
 from sbafab.models.stack import Stack
-from sbafab.simulators.mujoco.mjcf import ACCURACY, chain_text, length_of
+from sbafab.simulators.mujoco.mjcf import ACCURACY, PressedChain, chain_text, length_of
+from tests.quick import few
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
@@ -91,6 +92,29 @@ def test_a_force_on_the_tip_moves_it_as_the_stack_s_compliance_says(
         state.xfrc_applied[-1, :3] = 1000 * small
         moved = settled(model, state) - rest
         assert moved == pytest.approx(at @ small, abs=3e-5)
+
+
+@pytest.mark.parametrize("count", few((1, 60), 1))
+def test_driven_by_balloons_it_settles_at_all_pressures(
+    stacks: dict[str, Stack], count: int
+) -> None:
+    """From the pose before, with chambers empty or full, bent and straight, far from the pressures
+    that the file was written for.
+    """
+    stack = stacks["lobed"]
+    model, state = loaded(stack, (10.0, 5.0, 0.0))
+    chain = PressedChain(model, stack)
+    numbers = np.random.default_rng(9)
+    drawn = np.clip(numbers.uniform(-10.0, 100.0, (count, 3)), 0.0, None)
+    for pressures in [(10.0, 0.0, 0.0), (7.0, 7.0, 0.5), (0.0, 0.0, 1.0), *drawn.tolist()]:
+        for _ in range(600):
+            chain.apply(state, pressures)
+            mujoco.mj_step(model, state)
+        mujoco.mj_kinematics(model, state)
+        assert not any(warning.number for warning in state.warning)
+        pose = stack.pose(pressures)
+        missed = np.linalg.norm(state.site("tip").xpos - pose.tip)
+        assert missed < ACCURACY * length_of(pose)
 
 
 def test_where_balloons_are_flat_there_are_no_controls(stacks: dict[str, Stack]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,8 +28,12 @@ if TYPE_CHECKING:
 
 ACCURACY = 0.02
 """Largest error of the tip's place, as a share of the stack's length."""
+LINEAR_SHARE = 0.9
+"""Share of that which the linear tip may take: the joints are exact to the third order only."""
 RANGES = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
 """kPa about the given pressures that are tried, largest first."""
+DRIVEN_SETTLING = 0.01
+"""s: time constant of the stiffest motion of a level driven by balloons."""
 DT, SETTLING = 0.002, 0.05
 """s: a step, and the time constant of each level, by dampers as of no actuator."""
 MASS = 1e-5
@@ -43,6 +47,8 @@ FREEDOMS: tuple[tuple[str, ...], ...] = (
 )
 """Joints that add up to each freedom of a level."""
 SPRINGS = ("rise", "tilt_x", "tilt_y")
+BY_JOINT, HALVES = np.array([1, 2, 0, 2, 1]), np.array([2.0, 2.0, 1.0, 2.0, 2.0])
+"""The freedom that each of JOINTS is a part of, and the number of its parts."""
 POSE = "pressed"
 
 
@@ -100,7 +106,7 @@ def _is_close(stack: Stack, pose: Pose, at: Linearised, pressures: Array) -> boo
         exact = stack.pose(tuple(pressures.tolist()), near=pose).tip
     except DesignError:
         return False
-    return float(np.linalg.norm(tip - exact)) <= ACCURACY * length_of(pose)
+    return float(np.linalg.norm(tip - exact)) <= LINEAR_SHARE * ACCURACY * length_of(pose)
 
 
 def length_of(pose: Pose) -> float:
@@ -224,3 +230,38 @@ Springs are the elastic stack's second derivatives at that pose, for small motio
 it; rims that meet or part are not in it. The length of tendon chamber<i> grows with its volume.
 A plate's mass is {mass}. Dampers settle each level in some {SETTLING:g} s,
 as no actuator does: states at rest alone mean something. Not in it: gravity, contact."""
+
+
+class PressedChain:
+    """A loaded model of ``chain_text`` driven by a stack's balloons at any pressures.
+
+    The springs of the file hold about one pose. Here they are taken out, and each step has the
+    forces of the stack's own springs, contacts included, at the joints' values: states at rest are
+    poses of the stack up to its highest pressure. Dampers follow the stiffness; soft motions settle
+    later than stiff ones, and a stack without pressure, whose films are slack, hardly at all.
+    """
+
+    def __init__(self, model: Any, stack: Stack) -> None:
+        """Take the springs out of ``model``, a mujoco.MjModel, and its actuators' gear."""
+        self.model, self.stack = model, stack
+        count = len(stack.levels)
+        names = [[f"level{level + 1}_{joint}" for joint in JOINTS] for level in range(count)]
+        joints = np.array([[model.joint(name).id for name in row] for row in names])
+        self.places, self.dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        for level in range(count):
+            for spring in SPRINGS:
+                tendon = model.tendon(f"level{level + 1}_{spring}").id
+                model.tendon_stiffness[tendon] = model.tendon_damping[tendon] = 0.0
+        model.actuator_gear[:] = 0.0
+
+    def apply(self, data: Any, pressures: Sequence[float]) -> None:
+        """Set the forces of the next step, ``qfrc_applied`` of a mujoco.MjData, at pressures in
+        kPa, one a chamber. Raises DesignError for pressures outside the stack's maps.
+        """
+        tilt_x, tilt_y, rise, tilt_y_upper, tilt_x_upper = data.qpos[self.places].T
+        at = np.stack([rise, tilt_x + tilt_x_upper, tilt_y + tilt_y_upper], axis=-1)
+        _, gradient, matrices = self.stack.each(self.stack.springs(pressures)).energy(at)
+        # Both halves of a tilt carry its moment, and move by half.
+        data.qfrc_applied[self.dofs] = -gradient[:, BY_JOINT]
+        stiff = np.einsum("lii->li", matrices)[:, BY_JOINT] * HALVES
+        self.model.dof_damping[self.dofs] = DRIVEN_SETTLING * np.maximum(stiff, 0.0)
