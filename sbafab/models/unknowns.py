@@ -104,7 +104,7 @@ UNKNOWNS = (
     ),
     Unknown(
         "loss_share",
-        "share of the input work lost in a cycle",
+        "share of work lost in a cycle",
         "",
         True,
         0.15,
