@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from docs.scripts.drawn_runs import DECKS, run_deck
+from docs.scripts.measured import record
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
@@ -68,6 +69,14 @@ def test_only_a_stack_stands_on_its_base(template: str, free: bool, tmp_path: Pa
         # As many as a rigid body has freedoms.
         boundary = text.split("*BOUNDARY\n")[1].split("*")[0]
         assert len(boundary.splitlines()) == 6
+
+
+def test_the_array_rose_as_two_clamped_plates() -> None:
+    """2 p a^4 / 64 D of 8 mm pouches, D of 0.2 mm at 300 MPa; strips at their sides give a little."""
+    rise = float(record("drawn").tables["decks"].cell("array", "thicker by, mm"))
+    stiffness = 300 * 0.2**3 / (12 * (1 - 0.3**2))
+    pressure = DECKS["array"].pressure / 1000
+    assert rise == pytest.approx(2 * pressure * 4**4 / (64 * stiffness), rel=0.12)
 
 
 @pytest.mark.long
