@@ -358,11 +358,13 @@ class Laminate:
         is turned as it is laid is drawn turned over, too.
         """
         if self.panel is None:
-            root = self.cut_with(layer)
-            flat = layer.profile
-            if any(fold.lower == root for fold in self.folds):
-                flat = flat_part(root, self.folds, [layer.profile for layer in self.layers])
-            return flat.mirrored() if self.layer(root).turned else flat
+            flat, lowest = layer.profile, layer
+            if self.folds:
+                root = self.cut_with(layer)
+                lowest = self.layer(root)
+                if any(fold.lower == root for fold in self.folds):
+                    flat = flat_part(root, self.folds, [layer.profile for layer in self.layers])
+            return flat.mirrored() if lowest.turned else flat
         sheet = self.panel.sheets[layer.index - 1]
         return sheet.mirrored() if layer.is_mask else sheet
 

@@ -24,6 +24,8 @@ WEAKER = [
     ("registration.pin_error=0.001", "pin_error 0.001 (paper 0.004)"),
     ("registration.hand_placement=0.05", "hand_placement 0.05 (default 0.08)"),
     ("registration.hand_turn=0.2", "hand_turn 0.2 (default 0.4)"),
+    ("rules.opening_pressure_kpa=150", "opening_pressure_kpa 150 (default 100)"),
+    ("rules.dead_end=5", "dead_end 5 (default 2)"),
 ]
 STRICTER = [
     "rules.bond_width=0.8",
@@ -31,6 +33,8 @@ STRICTER = [
     "rules.worst_bond_width=0.6",
     "rules.worst_mask_overhang=0.3",
     "rules.validated_balloons=10",
+    "rules.opening_pressure_kpa=50",
+    "rules.dead_end=1",
     "laser.least_feature=0.3",
     "registration.cutting_error=0.2",
     "registration.pin_error=0.01",
