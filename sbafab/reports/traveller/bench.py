@@ -25,7 +25,7 @@ from sbafab.rules.pin_fit import most_on_a_pin
 
 WIPE = (
     "Wipe bench and film with isopropanol and a lint-free cloth, let them dry. Gloves on; hold "
-    "film by its border: grease and dust keep TPE from bonding."
+    "film by its border: grease and dust keep films from bonding."
 )
 AIR = (
     "Air assist off, or as low as the machine's owner allows; exhaust drawn off below the bed "

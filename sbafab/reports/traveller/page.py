@@ -21,7 +21,7 @@ from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.formulas import sizes
-from sbafab.pressing.schedule import Schedule, joined_words
+from sbafab.pressing.schedule import Schedule, joined_words, layers_in_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.html_templates import environment
@@ -113,9 +113,10 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def _turned(laminate: Laminate) -> str:
-    """Return the layers that are cut turned over, by number; none is so by a fold alone."""
+    """Return the layers that are cut turned over, in words; none is so by a fold alone."""
     roots = {laminate.cut_with(layer) for layer in laminate.layers if layer.turned}
-    return layer_numbers([index for index in sorted(roots) if laminate.layer(index).turned])
+    turned = [index for index in sorted(roots) if laminate.layer(index).turned]
+    return layers_in_words(turned) if turned else ""
 
 
 def _force_notes(work: Work) -> tuple[str, ...]:
@@ -230,10 +231,14 @@ def sheet_rows(
 
 @dataclass(frozen=True)
 class LayUpRow:
-    """One row of the lay-up table; ``repeat`` stands beside the first row of a round."""
+    """One row of the lay-up table; ``repeat`` stands beside the first row of a round.
+
+    ``part`` names the part as it is sorted: a folded half is one with the lower half.
+    """
 
     numbers: str
     layer: Layer
+    part: str
     pieces: int
     pins: str
     repeat: str
@@ -246,10 +251,17 @@ def _lay_up(work: Work) -> list[LayUpRow]:
         index: joined_words([pin.name for pin in pins]) if pins else BY_HAND
         for index, pins in pins_when_added(work.laminate).items()
     }
-    return [row for turn in rounds(work.laminate.layers) for row in _round_rows(pins_of, turn)]
+    turns = rounds(work.laminate.layers)
+    return [row for turn in turns for row in _round_rows(work.laminate, pins_of, turn)]
 
 
-def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
+def _part(laminate: Laminate, layer: Layer) -> str:
+    """Return the pattern of the part that a layer is cut from, as it is sorted and counted."""
+    root = laminate.layer(laminate.cut_with(layer))
+    return root.pattern if root is layer else f"{root.pattern}, folded over"
+
+
+def _round_rows(laminate: Laminate, pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
     rows = []
     for place, layers in enumerate(turn.places):
         repeat = "once"
@@ -261,6 +273,7 @@ def _round_rows(pins_of: Mapping[int, str], turn: Round) -> list[LayUpRow]:
             LayUpRow(
                 layer_numbers([layer.index for layer in layers]),
                 layers[0],
+                _part(laminate, layers[0]),
                 len(layers[0].profile.pieces),
                 "; ".join(dict.fromkeys(pins_of[layer.index] for layer in layers)),
                 repeat,
