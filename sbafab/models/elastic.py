@@ -162,7 +162,7 @@ BEND = Model(
     "elastic stack",
     SOURCE,
     "rigid plates that tilt, balloons that push by the gap at their ring, rims that touch on the "
-    "inner side. The 3-DoF at 5 kPa has 87 deg with two chambers, 106 with one, where shells in "
+    "inner side. The 3-DoF at 5 kPa has 86 deg with two chambers, 105 with one, where shells in "
     "SOFA, whose rims do not touch, have 85 and 109; the paper's largest is 81 +- 6 at a pressure "
     "that it does not give",
 )

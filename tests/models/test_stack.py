@@ -249,7 +249,7 @@ def test_calibration_makes_pockets_smaller_or_films_stiffer() -> None:
     assert replace(drawn, pocket=2.5, ring=0.75) == stack(design).maps[0].balloon
     # 1.1 times the neck of 0.52 + 0.75.
     with pytest.raises(
-        DesignError, match=r"at least 1\.397 mm .* loss of 1\.2 mm leaves 1\.3; give"
+        DesignError, match=r"at least 1\.397 mm .* loss of 1\.2 mm leaves 1\.3; make"
     ):
         stack(design, factors=Factors(pocket_loss=1.2))
     narrow = sbafab.load("1dof-5mm", "chamber.diameter=2.6")

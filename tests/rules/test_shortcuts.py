@@ -258,7 +258,7 @@ def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
 ) -> None:
     laminate = good(*design)
     frame = rectangle((-50, -50), (50, 50))
-    gaps = [(one.unbonded, one.contact, frame) for one in laminate.interfaces]
+    gaps = [(one.unbonded, one.contact, frame, ()) for one in laminate.interfaces]
     gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
     found = [gap(*one) for one in gaps]
     monkeypatch.setattr(voids, "_follows", lambda *_: False)
@@ -366,7 +366,7 @@ def test_voids_that_touch_at_a_point_are_told_apart_along_one_circle() -> None:
     hole, frame = disc((0, 0), 2), disc((0, 0), 9)
     ring, film = disc((0, 0), 3) - hole, disc((0, 0), 5) - hole
     square = polygon([(2, 0), (0, 2), (-2, 0), (0, -2)])
-    gap = _gap(ring, film | square, frame)
+    gap = _gap(ring, film | square, frame, ())
     # Four segments of 4 (pi / 4 - 1 / 2) each, and what is round the film.
     segments = [number for number, void in enumerate(gap.missing) if void.area < 2]
     assert [gap.missing[n].area for n in segments] == [pytest.approx(math.pi - 2)] * 4
@@ -374,7 +374,7 @@ def test_voids_that_touch_at_a_point_are_told_apart_along_one_circle() -> None:
         (0, number) for number in segments
     ]
     wedges = union(polygon([(way * 2, 0), (way * 4, 1), (way * 4, -1)]) for way in (1, -1))
-    gap = _gap(ring - wedges, film, frame)
+    gap = _gap(ring - wedges, film, frame, ())
     assert len(gap.unbonded) == 2
     joined = {(pocket, gap.missing[void].area) for pocket, void, _ in gap.touching}
     assert sorted(joined) == [(0, pytest.approx(4 * math.pi)), (1, pytest.approx(4 * math.pi))]
