@@ -1,12 +1,8 @@
-"""Laminates of drawn layers: each layer's role and shape stand in the design file.
-
-Shapes have names, and are made of others by name: a layer takes one, and so may several layers.
-"""
+"""Laminates of drawn layers: the design file has each layer's role and its shape by name."""
 
 from __future__ import annotations
 
 import difflib
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -14,22 +10,30 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
+from sbafab.actuators.shapes import (
+    Angle,
+    Coordinates,
+    NamedShapes,
+    Names,
+    Row,
+    ShapeRegions,
+    Vertex,
+    is_table,
+    marks_of,
+)
 from sbafab.actuators.stacking import CutFilm, channel_pin, layers
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
-from sbafab.design.outline import refuse_crossings
 from sbafab.design.records import Design, Drawn, Form, Free, Mechanism, MechanismKind, Wrap, card
 from sbafab.design.sections import NAME_PATTERN
-from sbafab.design.strands import Strand, polyline
+from sbafab.design.strands import polyline
 from sbafab.design.toml_table import Section, writable
-from sbafab.design.units import LONGEST, Length, LengthOrZero, Millimetres
+from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError, SbafabError
-from sbafab.geometry.contour import Mark, tidy
-from sbafab.geometry.edges import EPSILON, Edge, Point, unit
-from sbafab.geometry.offset import fillet, grow
-from sbafab.geometry.region import Region, difference, disc, polygon, stadium, strip, union
+from sbafab.geometry.edges import Edge, unit
+from sbafab.geometry.region import Region
 from sbafab.laminate.folding import lies_on, toward, unfolded
 from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import (
@@ -45,165 +49,12 @@ from sbafab.laminate.joints import (
 )
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, Role
 
-Coordinate = Annotated[float, Millimetres(-LONGEST, LONGEST)]
-Coordinates = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
-Bulge = Annotated[float, Field(ge=-100, le=100)]
-BulgedCoordinates = Annotated[tuple[Coordinate, Coordinate, Bulge], Field(strict=False)]
-Vertex = Annotated[
-    Annotated[Coordinates, Tag("(x, y)")] | Annotated[BulgedCoordinates, Tag("(x, y, bulge)")],
-    Discriminator(lambda row: "(x, y)" if _entries(row) == 2 else "(x, y, bulge)"),
-]
-Names = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=200)]
 NoteText = Annotated[str, Field(min_length=1, max_length=400), AfterValidator(writable)]
-Angle = Annotated[float, Field(ge=-360, le=360)]
 LayerPair = Annotated[tuple[int, int], Field(strict=False)]
-SHAPE_NAME = re.compile("[a-z][a-z0-9_-]{0,31}")
-MOST_SHAPES = 200
 MOST_LAYERS = 500
 
-NEEDS: Mapping[str, tuple[str, ...]] = {
-    "disc": (),
-    "ring": (),
-    "slot": ("width",),
-    "stadium": (),
-    "polygon": (),
-    "path": (),
-    "file": (),
-    "offset": ("by",),
-    "fillet": ("radius",),
-    "union": (),
-    "difference": (),
-    "pattern": ("count",),
-}
-"""Keys of a shape, of which it has just one, and the keys that this one needs beside it."""
-MOST_EDGES = 5000
-"""Edges of one shape; patterns of patterns would have any number."""
-PLACING = ("at", "turned")
-PATTERNS = ("round", "step")
-FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",)}
-"""Keys that a shape of this kind may have beside those that it needs."""
 
-
-class _Row(Section):
-    """A table in a list or under a name of the user's, which names the keys it does not know."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _knows_its_keys(cls, data: Any) -> Any:
-        strange = [key for key in data if key not in cls.model_fields] if _is_table(data) else []
-        if strange:
-            near = difflib.get_close_matches(strange[0], cls.model_fields, 1)
-            hint = f"did you mean {near[0]}" if near else f"known are {', '.join(cls.model_fields)}"
-            raise ValueError(f"has a key {shown(strange[0])} that is not known; {hint}?")
-        return data
-
-
-class NamedShape(_Row):
-    """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one made of others."""
-
-    disc: Length | None = None
-    """Diameter of a disc."""
-    ring: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
-    """Outer and inner diameter of a ring."""
-    slot: Annotated[tuple[Coordinates, Coordinates], Field(strict=False)] | None = None
-    """Ends of a straight slot with square ends, as wide as ``width``."""
-    stadium: Annotated[tuple[Length, Length], Field(strict=False)] | None = None
-    """Width along x and length along y of a slot with round ends."""
-    polygon: Annotated[tuple[Coordinates, ...], Field(strict=False, min_length=3)] | None = None
-    """Corners, in either order."""
-    path: Annotated[tuple[Vertex, ...], Field(strict=False, min_length=2)] | None = None
-    """Corners ``[x, y]`` in either order; ``[x, y, bulge]`` where an arc goes on to the next one.
-    Its bulge is the tangent of a quarter of its angle: 1 for half a circle, less than 0 clockwise.
-    """
-    file: str | None = Field(default=None, min_length=1, max_length=1000)
-    """A DXF or SVG file, or a ``laminate.json``: all that its closed contours enclose, where they
-    lie in it; a contour within another is a hole."""
-    layer: str | None = Field(default=None, min_length=1, max_length=255)
-    """The layer of a DXF file, the group of an SVG file (label or id) or the pattern of a
-    ``laminate.json`` that is the shape; by default all that a drawing shows."""
-    offset: str | None = None
-    """A shape that is grown ``by`` a distance; less than 0 shrinks it."""
-    fillet: str | None = None
-    """A shape whose concave corners are rounded to ``radius``."""
-    union: Names | None = None
-    """Shapes that are joined."""
-    difference: Names | None = None
-    """A shape, and those that are cut out of it."""
-    pattern: str | None = None
-    """A shape repeated ``count`` times, evenly ``round`` a point or in steps of ``step``."""
-    width: Length | None = None
-    """Width of a slot."""
-    by: Coordinate | None = None
-    """Distance of an offset."""
-    radius: Length | None = None
-    """Radius of a fillet."""
-    count: int | None = Field(default=None, ge=1, le=200)
-    """Copies in a pattern."""
-    round: Coordinates | None = None
-    """The point that a pattern goes round."""
-    step: Coordinates | None = None
-    """From one copy of a pattern to the next, along x and y."""
-    at: Coordinates = (0.0, 0.0)
-    """Where the shape's origin comes to lie."""
-    turned: Angle = 0.0
-    """Degrees by which it is turned about its origin first, counter-clockwise."""
-
-    @property
-    def kind(self) -> str:
-        """The key that says what the shape is."""
-        return next(kind for kind in NEEDS if getattr(self, kind) is not None)
-
-    @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        given = [key for key in type(self).model_fields if getattr(self, key) is not None]
-        kinds = [key for key in given if key in NEEDS]
-        if len(kinds) != 1:
-            how = f"has {' and '.join(kinds)}" if kinds else "has none of its keys"
-            raise ValueError(f"{how}; a shape is one of {', '.join(NEEDS)}")
-        (kind,) = kinds
-        missing = [key for key in NEEDS[kind] if key not in given]
-        if missing:
-            raise ValueError(f"is a {kind} without {missing[0]}; add it")
-        ways = [key for key in PATTERNS if key in given]
-        if kind == "pattern" and len(ways) != 1:
-            raise ValueError("is a pattern, which has either round or step; give one of the two")
-        for key in given:
-            allowed = (kind, *NEEDS[kind], *PLACING, *FURTHER.get(kind, ()))
-            if key not in allowed:
-                raise ValueError(f"is a {kind}, which has no {key}; remove it")
-        if self.ring is not None and self.ring[0] <= self.ring[1]:
-            raise ValueError("is a ring whose outer diameter, the first, must be the larger one")
-        if self.stadium is not None and self.stadium[0] > self.stadium[1]:
-            raise ValueError("is a stadium wider than it is long; swap the two and add turned = 90")
-        if self.slot is not None and self.slot[0] == self.slot[1]:
-            raise ValueError("is a slot whose ends are one point; move one of them")
-        return self
-
-
-class NamedShapes(Section):
-    """The shapes by name, a table each."""
-
-    model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, NamedShape] = Field(init=False)
-
-    @model_validator(mode="after")
-    def _names_can_be_written(self) -> Self:
-        if len(self.by_name) > MOST_SHAPES:
-            raise ValueError(f"has {len(self.by_name)} shapes; at most {MOST_SHAPES} may be")
-        for name in self.by_name:
-            if not SHAPE_NAME.fullmatch(name):
-                raise ValueError(
-                    f"has a shape named {shown(name)}; a name is a small letter and up to 31 small "
-                    "letters, digits, - or _"
-                )
-        return self
-
-    @property
-    def by_name(self) -> Mapping[str, NamedShape]:
-        return self.__pydantic_extra__ or {}
-
-
-class DrawnLayer(_Row):
+class DrawnLayer(Row):
     """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
 
     role: Role
@@ -218,7 +69,7 @@ class DrawnLayer(_Row):
     """Whether it lies with its upper face down; the upper half of a fold does, by itself."""
 
 
-class DrawnChamber(_Row):
+class DrawnChamber(Row):
     """A chamber, and the inlet strip through which it is filled."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -237,7 +88,7 @@ class DrawnChamber(_Row):
     """The chamber gaps that it has pockets in, from 1 at the bottom; all by default."""
 
 
-class DrawnPin(_Row):
+class DrawnPin(Row):
     """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -250,7 +101,7 @@ class DrawnPin(_Row):
     """By how much the layers' holes for it are wider."""
 
 
-class DrawnTube(_Row):
+class DrawnTube(Row):
     """The tube that the finished laminate is wrapped round."""
 
     outer_diameter: Length
@@ -263,7 +114,7 @@ class DrawnTube(_Row):
     """What holds the sheet round the tube."""
 
 
-class DrawnSeam(_Row):
+class DrawnSeam(Row):
     """A seam: two films bonded by a moving tool along a path."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -295,7 +146,7 @@ class DrawnSeam(_Row):
         return self
 
 
-class DrawnFold(_Row):
+class DrawnFold(Row):
     """A film folded along a straight line into two layers."""
 
     layers: LayerPair
@@ -310,7 +161,7 @@ class DrawnFold(_Row):
         return self
 
 
-class DrawnMechanism(_Row):
+class DrawnMechanism(Row):
     """What the pockets do when they fill, for the closed forms of ``predict``; none by default."""
 
     kind: MechanismKind
@@ -330,7 +181,7 @@ class DrawnMechanism(_Row):
         return self
 
 
-class DrawnPort(_Row):
+class DrawnPort(Row):
     """A place in a gap that nets name: a pocket, the end of a channel, or a hole for a tube."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -402,14 +253,14 @@ class DrawnDesign(Design):
     def _balloons_are_counted(cls, data: Any) -> Any:
         """One balloon for each gap with a chamber, unless the file says how many there are."""
         rows, stack = data.get("layers"), data.get("stack", {})
-        if not isinstance(rows, list | tuple) or not _is_table(stack) or "balloons" in stack:
+        if not isinstance(rows, list | tuple) or not is_table(stack) or "balloons" in stack:
             return data
-        roles = [str(row.get("role")) if _is_table(row) else "" for row in rows]
+        roles = [str(row.get("role")) if is_table(row) else "" for row in rows]
         seams = data.get("seams")
         pairs = {
             tuple(row["layers"])
             for row in (seams if isinstance(seams, list | tuple) else ())
-            if _is_table(row) and isinstance(row.get("layers"), list | tuple)
+            if is_table(row) and isinstance(row.get("layers"), list | tuple)
         }
         count = sum(chamber_gaps(roles, pairs).values())
         return {**data, "stack": {**stack, "balloons": count}} if count else data
@@ -478,7 +329,7 @@ class DrawnDesign(Design):
             yield read_drawing(file, named[key.split(".")[1]].layer)
 
     def drawn_shapes(self) -> Mapping[str, Region | None]:
-        shapes = ShapeRegions(self)
+        shapes = ShapeRegions(self.shapes.by_name, self.drawings)
         regions: dict[str, Region | None] = {}
         for name in self.shapes.by_name:
             try:
@@ -499,7 +350,7 @@ def build(design: DrawnDesign) -> Laminate:
     Raises DesignError, which names the key at fault, or what keeps its films from being joined.
     """
     _check(design)
-    shapes = ShapeRegions(design)
+    shapes = ShapeRegions(design.shapes.by_name, design.drawings)
     balloons = design.stack.balloons
     cuts = _cuts(design, shapes)
     chambers = tuple(
@@ -558,14 +409,6 @@ def build(design: DrawnDesign) -> Laminate:
 
 def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:
     return {} if design.nets is None else design.nets.by_name
-
-
-def _is_table(value: object) -> bool:
-    return isinstance(value, Mapping)
-
-
-def _entries(value: object) -> int:
-    return len(value) if isinstance(value, list | tuple) else 0
 
 
 def _check(design: DrawnDesign) -> None:
@@ -781,7 +624,7 @@ def _seam_path(seam: DrawnSeam, shapes: ShapeRegions) -> tuple[tuple[Edge, ...],
     if seam.shape is not None:
         region = shapes.of(seam.shape, f"seam {seam.name}")
         return tuple(contour.edges for contour in region.contours)
-    marks = _marks(seam.path or ())
+    marks = marks_of(seam.path or ())
     return (polyline(marks, closed=seam.closed and marks[0][:2] != marks[-1][:2]),)
 
 
@@ -814,130 +657,3 @@ def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
         settings.tab_length if chamber.length is None else chamber.length,
         settings.tube_outer_diameter,
     )
-
-
-class ShapeRegions:
-    """The shapes of a design as regions, each made once."""
-
-    def __init__(self, design: DrawnDesign) -> None:
-        self.shapes = design.shapes.by_name
-        self.files = design.drawings
-        self._regions: dict[str, Region] = {}
-        self._open: list[str] = []
-
-    def of(self, name: str, user: str) -> Region:
-        """Return the shape of this name for its ``user``, a key. Raises DesignError."""
-        if name not in self.shapes:
-            near = difflib.get_close_matches(name, self.shapes, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {listed(self.shapes)}"
-            raise DesignError(f"{user} names a shape {shown(name)} that is not there; {hint}")
-        if name in self._open:
-            raise DesignError(
-                f"shapes.{name} is made of itself, by way of {' and '.join(self._open)}; name "
-                "another shape"
-            )
-        if name not in self._regions:
-            self._open.append(name)
-            try:
-                region = self._placed(name, self.shapes[name])
-            finally:
-                self._open.pop()
-            if region.is_empty:
-                raise DesignError(f"shapes.{name} encloses no area; change its sizes")
-            self._regions[name] = region
-        return self._regions[name]
-
-    def _placed(self, name: str, shape: NamedShape) -> Region:
-        region = self._drawn(name, shape) if shape.kind in PRIMITIVES else self._made(name, shape)
-        if shape.turned:
-            region = region.turned(shape.turned)
-        return region.moved(*shape.at) if shape.at != (0.0, 0.0) else region
-
-    def _drawn(self, name: str, shape: NamedShape) -> Region:
-        centre = (0.0, 0.0)
-        if shape.disc is not None:
-            return disc(centre, shape.disc / 2)
-        if shape.ring is not None:
-            outer, inner = shape.ring
-            return disc(centre, outer / 2) - disc(centre, inner / 2)
-        if shape.slot is not None and shape.width is not None:
-            return strip(*shape.slot, shape.width)
-        if shape.stadium is not None:
-            return stadium(centre, *shape.stadium)
-        if shape.polygon is not None:
-            return _polygon(name, shape.polygon)
-        if shape.path is not None:
-            return _path(name, shape.path)
-        return read_drawing(self.files[f"shapes.{name}.file"], shape.layer)
-
-    def _made(self, name: str, shape: NamedShape) -> Region:
-        def region(other: str) -> Region:
-            return self.of(other, f"shapes.{name}.{shape.kind}")
-
-        if shape.offset is not None and shape.by is not None:
-            return grow(region(shape.offset), shape.by)
-        if shape.fillet is not None and shape.radius is not None:
-            return fillet(region(shape.fillet), shape.radius)
-        if shape.union is not None:
-            return union(map(region, shape.union))
-        if shape.difference is not None:
-            first, *others = map(region, shape.difference)
-            return difference(first, union(others))
-        assert shape.pattern is not None
-        assert shape.count is not None
-        repeated = region(shape.pattern)
-        if len(repeated.edges) * shape.count > MOST_EDGES:
-            raise DesignError(
-                f"shapes.{name}.count = {shape.count} makes more than {MOST_EDGES} edges; repeat "
-                "less"
-            )
-        return union(_copies(repeated, shape.count, shape.round, shape.step))
-
-
-PRIMITIVES = ("disc", "ring", "slot", "stadium", "polygon", "path", "file")
-
-
-def _copies(
-    region: Region, count: int, about: Point | None, step: Point | None
-) -> Sequence[Region]:
-    if about is not None:
-        return [region.turned(360 * i / count, about) for i in range(count)]
-    x, y = step or (0.0, 0.0)
-    return [region.moved(i * x, i * y) for i in range(count)]
-
-
-def _polygon(name: str, points: Sequence[Point]) -> Region:
-    loop = _simple_loop(f"shapes.{name}.polygon", [(x, y, 0.0) for x, y in points])
-    return polygon([edge.start for edge in loop])
-
-
-def _path(name: str, vertices: Sequence[tuple[float, ...]]) -> Region:
-    key = f"shapes.{name}.path"
-    contour = tidy(_simple_loop(key, _marks(vertices)))
-    if contour is None:
-        raise DesignError(f"{key} encloses no area; move a corner, or give an edge a bulge")
-    return Region((contour.reversed() if contour.is_hole else contour,))
-
-
-def _marks(vertices: Sequence[tuple[float, ...]]) -> list[Mark]:
-    """Return x, y and bulge of each corner of a path."""
-    marks = []
-    for here, there in pairwise([*vertices, vertices[0]]):
-        x, y, bulge = (*here, 0.0)[:3]
-        # An arc that leaves its chord by nothing has a circle beyond all numbers.
-        height = abs(bulge) * math.dist((x, y), there[:2]) / 2
-        marks.append((x, y, bulge if height > EPSILON else 0.0))
-    return marks
-
-
-def _simple_loop(key: str, vertices: Sequence[Mark]) -> Strand:
-    """Return the closed loop through x, y and bulge of each corner. Raises DesignError."""
-    corners = [(x, y) for x, y, _ in vertices]
-    if any(start == end for start, end in pairwise([*corners, corners[0]])):
-        raise DesignError(f"{key} has one corner twice in a row; remove one")
-    loop = polyline(vertices, closed=True)
-    try:
-        refuse_crossings(loop)
-    except DesignError as error:
-        raise DesignError(f"{key} {error}") from None
-    return loop
