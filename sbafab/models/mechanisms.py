@@ -18,7 +18,7 @@ from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, strip
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
-from sbafab.models import inflated_beam, jamming, pouch
+from sbafab.models import pouch
 from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest
 from sbafab.models.formulas import force
 
@@ -295,25 +295,25 @@ def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     of = filled.of
     pocket = filled.pockets[0]
     length, width = pocket.length, pocket.width
-    across = 2 * inflated_beam.radius(width)
-    if length < inflated_beam.SLENDER * across:
+    across = 2 * pouch.tube_radius(width)
+    if length < pouch.SLENDER * across:
         reason = (
-            f"{length:.4g} mm is less than {inflated_beam.SLENDER:g} times the inflated diameter, "
+            f"{length:.4g} mm is less than {pouch.SLENDER:g} times the inflated diameter, "
             f"{across:.3g} mm: no beam"
         )
         yield LeftOut(f"inflated beam{of}", reason)
         return
     model = Model(
-        inflated_beam.MODEL,
+        pouch.BEAM,
         "Comer and Levy, AIAA J. 1 (1963) 1652",
         f"a tube {length:.4g} long of flat width {width:.4g} mm, held at one end, its load at the "
         f"other; {_stretch_note(pocket.film_stiffness)}; {NOT_CALIBRATED}",
     )
     yield Figure("size", f"inflated diameter of a beam{of}", across, "mm", model)
-    limit = _stretch(pocket.film_stiffness, inflated_beam.hoop_tension(1.0, width))
+    limit = _stretch(pocket.film_stiffness, pouch.hoop_tension(1.0, width))
     loads = (
-        ("load that wrinkles", inflated_beam.wrinkling_moment),
-        ("load that collapses", inflated_beam.collapse_moment),
+        ("load that wrinkles", pouch.wrinkling_moment),
+        ("load that collapses", pouch.collapse_moment),
     )
     for words, law in loads:
 
@@ -344,7 +344,7 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     assert filled.mechanism.friction is not None
     count, width, length, thick = len(sheets), pocket.width, pocket.length, film.thickness
     model = Model(
-        jamming.MODEL,
+        pouch.JAMMING,
         "Narang, Vlassak and Howe, Adv. Funct. Mater. 28 (2018) 1707136",
         f"{count} sheets of {thick:g} mm as one cantilever {length:.4g} x {width:.4g} mm until "
         f"they slip, friction {filled.mechanism.friction:g} as given; the bag's films not "
@@ -357,8 +357,8 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     else:
         modulus = film.elastic[0]
         for words, law in (
-            ("loose", jamming.loose_stiffness),
-            ("jammed", jamming.jammed_stiffness),
+            ("loose", pouch.loose_stiffness),
+            ("jammed", pouch.jammed_stiffness),
         ):
             value = law(modulus, width, thick, count)
             yield Figure("stiffness", f"bending stiffness{of}, {words}", value, "N mm2", model)
@@ -367,7 +367,7 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         if pressure > ATMOSPHERE:
             yield LeftOut(name, f"no vacuum is larger than {ATMOSPHERE:.0f} kPa")
             continue
-        value = jamming.slip_force(pressure, filled.mechanism.friction, width, thick, count)
+        value = pouch.slip_force(pressure, filled.mechanism.friction, width, thick, count)
         yield Figure("force", name, value, "N", model)
 
 

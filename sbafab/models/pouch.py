@@ -1,11 +1,23 @@
-"""Pouches of film that does not stretch: as a motor that shortens, and as a hinge that bends.
+"""Pouches of film that does not stretch: as a motor that shortens, as a hinge that bends, as a beam
+that pressure makes stiff, and as a bag of sheets that a vacuum presses on each other.
 
 A pouch of length L between two seams of width D fills to two arcs of half angle t that keep their
 length. The motor is the model of Niiyama et al., Soft Robotics 2 (2015) 59, doi
 10.1089/soro.2014.0023: length L sin t / t, volume D L^2 (t - sin t cos t) / 2 t^2, pull
 p D L cos t / t. The hinge is its pouch across the joint of two stiff plates: one film lies on them,
 the other is an arc over both. Its moment is our statics of that section: film tension p L / 2t at
-the plates' ends, less the pressure on a plate. Lengths mm, pressures kPa, forces N, moments N mm.
+the plates' ends, less the pressure on a plate.
+
+The beam is a tube of film, bent as a cantilever: wrinkles start where the pressure's tension along
+the tube is used up, at a moment of pi p r^3 / 2, and it collapses at twice that (Comer and Levy,
+AIAA Journal 1 (1963) 1652, doi 10.2514/3.1873). A flat tube of width w opens to r = w / pi.
+
+Sheets in a bag (laminar jamming): until they slip, n sheets of thickness h bend as one of n h, n^2
+times as stiff as loose ones. They first slip where shear is largest, at the middle: 3 F / 2 b n h =
+mu P of a cantilever. Mechanism and measurements: Narang, Vlassak and Howe, Adv. Funct. Mater. 28
+(2018) 1707136; the formulas are those of beams.
+
+Lengths mm, pressures kPa, moduli MPa, forces N, moments N mm.
 """
 
 from __future__ import annotations
@@ -23,8 +35,12 @@ if TYPE_CHECKING:
 
 MOTOR = "pouch motor"
 HINGE = "pouch hinge"
+BEAM = "inflated beam"
+JAMMING = "laminar jamming"
 LARGEST_CONTRACTION = 1 - 2 / math.pi
 """Share of the flat length: both arcs are then half circles."""
+SLENDER = 5.0
+"""Least ratio of length to diameter for a beam; ours."""
 SHALLOW = 1e-4
 """Half angle below which series are exact to 1e-9."""
 
@@ -100,3 +116,50 @@ def free_bend() -> float:
 
 def _angle_at(bend: NDArray[np.float64]) -> NDArray[np.float64]:
     return half_angle(1 - np.cos(bend / 2))
+
+
+# The beam: a tube of film.
+
+
+def tube_radius(width: float) -> float:
+    """Return the radius in mm that a flat tube of this width opens to."""
+    return width / math.pi
+
+
+def wrinkling_moment(pressure: float, width: float) -> float:
+    """Return the moment in N mm at which its inner side goes slack."""
+    return math.pi * pressure / 1000 * tube_radius(width) ** 3 / 2
+
+
+def collapse_moment(pressure: float, width: float) -> float:
+    """Return the moment in N mm at which the slack goes all round."""
+    return 2 * wrinkling_moment(pressure, width)
+
+
+def hoop_tension(pressure: float, width: float) -> float:
+    """Return the tension in N/mm round the tube, twice that along it."""
+    return pressure / 1000 * tube_radius(width)
+
+
+# The bag of sheets.
+
+
+def loose_stiffness(modulus: float, width: float, thickness: float, sheets: int) -> float:
+    """Return the bending stiffness in N mm2 of sheets that slide on each other."""
+    return sheets * modulus * width * thickness**3 / 12
+
+
+def jammed_stiffness(modulus: float, width: float, thickness: float, sheets: int) -> float:
+    """Return the bending stiffness in N mm2 of sheets that do not slip."""
+    return modulus * width * (sheets * thickness) ** 3 / 12
+
+
+def slip_force(
+    vacuum: float, friction: float, width: float, thickness: float, sheets: int
+) -> float:
+    """Return the tip force in N at which a cantilever's sheets first slip.
+
+    Exact for an even number of sheets, one of whose joints is the middle; ``vacuum`` in kPa below
+    the air outside.
+    """
+    return 2 / 3 * friction * vacuum / 1000 * width * sheets * thickness
