@@ -133,7 +133,8 @@ class DrawnSeam(Row):
     tool: SeamTool
     """What makes it: laser, hot-tip, ultrasonic or roller; a roller's ends are square."""
     kind: SeamKind = "lap"
-    """How the films lie: lap, flat on each other; fin, with their edges standing out."""
+    """How the films lie: lap, flat on each other; fin, with their edges standing out together. It
+    changes the instruction to the bench alone: shapes and rules take both as a lap."""
 
     @model_validator(mode="after")
     def _has_one_path(self) -> Self:

@@ -559,11 +559,17 @@ def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
             temperature_c=None if bond is None else bond.temperature_c,
             speed_mm_s=None,
             instructions=(
-                f"{laid}Follow the path with the middle of the {seam.tool}, {seam.width:g} mm "
-                f"wide: it bonds layers {seam.below} and {seam.above}."
+                f"{laid}{STAND_OUT if seam.kind == 'fin' else ''}Follow the path with the middle "
+                f"of the {seam.tool}, {seam.width:g} mm wide: it bonds layers {seam.below} and "
+                f"{seam.above}."
             ),
             reason=step.joining.reason,
         )
+
+
+STAND_OUT = (
+    "Fin seam: let the edges of both films stand out together, face to face, and weld them there. "
+)
 
 
 def fold_steps(laminate: Laminate) -> Iterator[FoldStep]:

@@ -26,6 +26,7 @@ ARROW = 1.7
 TIMES = "\u00d7"
 DARK = "#1a1a1a"
 GREY = "#5a5a5a"
+BOND = "#2a7ab9"
 FONT = "Helvetica, Arial, 'Liberation Sans', sans-serif"
 
 
@@ -103,6 +104,21 @@ def text_width(words: str, size: float = TEXT) -> float:
 def line(points: Sequence[Point], *, colour: str = DARK, width: float = THIN) -> str:
     path = "M" + "L".join(f"{coord(x)} {coord(y)}" for x, y in points)
     return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{coord(width)}"/>'
+
+
+def seam_styles(width: float, thin: float = THIN, is_round: bool = True) -> tuple[str, str]:
+    """Return the attributes of a seam's bond, ``width`` wide, and of the tool's path over it."""
+    ends = "round" if is_round else "butt"
+    return (
+        f'fill="none" stroke="{BOND}" stroke-opacity="0.4" stroke-width="{coord(width)}" '
+        f'stroke-linecap="{ends}" stroke-linejoin="round"',
+        f'fill="none" stroke="{DARK}" stroke-width="{coord(thin)}"',
+    )
+
+
+def fold_style() -> str:
+    """Return the attributes of a fold's line: dash and dot."""
+    return f'fill="none" stroke="{DARK}" stroke-width="0.35" stroke-dasharray="2.6 0.7 0.5 0.7"'
 
 
 def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: float = THIN) -> str:

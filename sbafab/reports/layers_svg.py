@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.geometry.region import coord, path_data
+from sbafab.geometry.region import chain_data, coord, path_data
 from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import ink
+from sbafab.laminate.folding import lies_on
+from sbafab.laminate.joints import Fold, Seam
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import (
@@ -48,7 +50,8 @@ def layers_svg(laminate: Laminate) -> str:
     cards = [pattern_card(laminate, layers, holding) for layers in laminate.patterns.values()]
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     rows = max(0, len(laminate.notes) - 1) + max(0, len(_warnings(laminate)) - 1)
-    block = BLOCK + max(NOTE_ROW * rows, FILM_ROW * max(0, len(films) - 2))
+    keyed = len(films) + bool(laminate.seams) + bool(laminate.folds)
+    block = BLOCK + max(NOTE_ROW * rows, FILM_ROW * max(0, keyed - 2))
     grid = _grid(cards, block)
     elements: list[str] = []
     for place, card in enumerate(cards):
@@ -120,7 +123,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
-    """The key: films, and the mark of a pin where one is drawn."""
+    """The key: films, and the marks of pins, seams and folds where there are any."""
     parts: list[str] = []
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     for row, film in enumerate(films):
@@ -135,7 +138,25 @@ def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
         x, y = at[0] + 3.0, at[1] + 3.4 + FILM_ROW * len(films) + 1.4
         parts.append(pin_mark((x, y), 2.0))
         parts.append(draw.text((x + 5.0, y + 1.0), "dowel pin that holds the layer"))
+    middle, row = f"of the {_tools(laminate)}", len(films) + pinned
+    for styles, words, is_drawn in (
+        (
+            draw.seam_styles(3.0, is_round=False),
+            f"seam: its width, and the path {middle}",
+            bool(laminate.seams),
+        ),
+        ((draw.fold_style(),), "fold: the film goes on in its other half", bool(laminate.folds)),
+    ):
+        if is_drawn:
+            x, y = at[0], at[1] + 3.4 + FILM_ROW * row + 1.8
+            parts += [f'<path d="M{coord(x)} {coord(y)}h6" {style}/>' for style in styles]
+            parts.append(draw.text((x + 8.0, y + 1.0), words))
+            row += 1
     return parts
+
+
+def _tools(laminate: Laminate) -> str:
+    return " or ".join(dict.fromkeys(seam.tool for seam in laminate.seams))
 
 
 def _scale_bar(scale: float, end: Point) -> list[str]:
@@ -161,6 +182,10 @@ def _scale_bar(scale: float, end: Point) -> list[str]:
 # The drawing of one pattern: exact outline, dimensions, callouts, caption.
 
 
+MOST_NAMES = 3
+"""Seams that a caption names."""
+PAST_FOLD = 3.0
+"""mm on the page by which a fold's line is drawn past the film."""
 CAPTION, LEFT, UNDER, PAD = 17.0, 11.0, 10.0, 3.0
 ROW = 4.8
 LEAD = 5.0
@@ -182,13 +207,16 @@ class CardFrame:
 class Card:
     """One pattern with all that its drawing says; ``bounds`` holds phantom circles too.
 
-    ``pins`` are the dowel pins that hold all its layers when they are laid.
+    ``pins`` are the dowel pins that hold all its layers when they are laid; ``seams`` and ``folds``
+    join any of its layers to others.
     """
 
     layers: tuple[Layer, ...]
     pins: tuple[Pin, ...]
     marks: tuple[Circle | WidthDimension, ...]
     bounds: Bounds
+    seams: tuple[Seam, ...] = ()
+    folds: tuple[Fold, ...] = ()
 
     @property
     def size(self) -> Point:
@@ -207,8 +235,17 @@ class Card:
         return (
             f"{first.pattern}  {roles}",
             f"{first.film.material} film {coord(first.film.thickness)}, {len(self.layers)} needed",
-            f"{word} {layer_numbers([layer.index for layer in self.layers])}",
+            f"{word} {layer_numbers([layer.index for layer in self.layers])}{self._seam_words}",
         )
+
+    @property
+    def _seam_words(self) -> str:
+        if not self.seams:
+            return ""
+        names = ", ".join(seam.name for seam in self.seams)
+        if len(self.seams) == 1:
+            return f"; seam {names}"
+        return f"; seams {names}" if len(self.seams) <= MOST_NAMES else f"; {len(self.seams)} seams"
 
     def cell(self, scale: float) -> Point:
         """Width and height in mm that the card takes on the page."""
@@ -238,7 +275,15 @@ def pattern_card(
     if laminate.panel is not None:
         # Corner pins stand in the sheet round the part.
         pins = ()
-    return Card(layers, pins, tuple(marks), (low_x, low_y, high_x, high_y))
+    joined = {layer.index for layer in layers}
+    return Card(
+        layers,
+        pins,
+        tuple(marks),
+        (low_x, low_y, high_x, high_y),
+        tuple(seam for seam in laminate.seams if joined & {seam.below, seam.above}),
+        tuple(fold for fold in laminate.folds if joined & {fold.lower, fold.upper}),
+    )
 
 
 def drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
@@ -258,6 +303,7 @@ def drawn(card: Card, scale: float, corner: Point, cell: Point) -> list[str]:
         f'<g id="{card.layers[0].pattern}">',
         *_heading(card, corner, cell),
         *_outline(card, frame),
+        *_joints(card, frame),
         *_overall(card, frame),
         *_callouts(card, frame, column, (y + CAPTION + 2.0, y + cell[1] - UNDER)),
         "</g>",
@@ -302,6 +348,39 @@ def _outline(card: Card, frame: CardFrame) -> list[str]:
         if contour.circle is not None:
             parts += _centre_mark(frame.at(contour.circle[0]), contour.circle[1] * frame.scale)
     parts += [pin_mark(frame.at(pin.centre), pin.diameter * frame.scale / 2) for pin in card.pins]
+    return parts
+
+
+def _joints(card: Card, frame: CardFrame) -> list[str]:
+    """Seams as wide as they bond, with their paths, and the lines of folds."""
+    folds = (part for fold in card.folds for part in _fold(fold, card.layers[0], frame))
+    return [*(part for seam in card.seams for part in _seam(seam, frame)), *folds]
+
+
+def _seam(seam: Seam, frame: CardFrame) -> list[str]:
+    data = "".join(
+        f"{chain_data(chain)}{'Z' if chain[0].start == chain[-1].end else ''}"
+        for chain in seam.path
+    )
+    styles = draw.seam_styles(seam.width, draw.THIN / frame.scale, seam.tool != "roller")
+    x, y, scale = coord(frame.left), coord(frame.top), coord(frame.scale)
+    return [
+        f'<g transform="translate({x} {y}) scale({scale} -{scale})">',
+        *(f'<path d="{data}" {style}/>' for style in styles),
+        "</g>",
+    ]
+
+
+def _fold(fold: Fold, layer: Layer, frame: CardFrame) -> list[str]:
+    """The line of a fold along the edges of a layer that end there, and past them."""
+    parts = []
+    for edge in layer.profile.edges:
+        if lies_on(edge, [fold.line]):
+            (x, y), (u, v) = frame.at(edge.start), frame.at(edge.end)
+            past = PAST_FOLD / math.dist((x, y), (u, v))
+            dx, dy = past * (u - x), past * (v - y)
+            ends = f"M{coord(x - dx)} {coord(y - dy)}L{coord(u + dx)} {coord(v + dy)}"
+            parts.append(f'<path d="{ends}" {draw.fold_style()}/>')
     return parts
 
 

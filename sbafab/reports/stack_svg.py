@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from sbafab.laminate.assembly import assembly
 from sbafab.laminate.films import Film, ink
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
-from sbafab.reports.drawing import length
+from sbafab.reports.drawing import BOND, length
 
 # The dowel pins that the section cuts: through which layers each stands, and in which steps.
 
@@ -94,10 +94,26 @@ class SectionSlab:
 
 @dataclass(frozen=True)
 class Joint:
-    """An interface cut by the plane: where along it the gap is filled with TPE."""
+    """An interface cut by the plane: where along it the films are bonded."""
 
     interface: Interface
     spans: tuple[Interval, ...]
+
+    @property
+    def layer(self) -> int:
+        """Index of the layer in whose height it is drawn: a mask, or the film above."""
+        masks = self.interface.masks
+        return masks[0].index if masks else self.interface.above.index
+
+
+@dataclass(frozen=True)
+class FoldEnd:
+    """A fold cut by the plane, at ``s`` along it; its film lies ahead of it, or behind."""
+
+    lower: Layer
+    upper: Layer
+    s: float
+    is_ahead: bool
 
 
 @dataclass(frozen=True)
@@ -120,6 +136,7 @@ class StackSection:
     hidden: int
     break_above: int
     rods: tuple[Rod, ...]
+    folds: tuple[FoldEnd, ...] = ()
 
 
 def chamber_section(laminate: Laminate) -> StackSection:
@@ -144,7 +161,9 @@ def chamber_section(laminate: Laminate) -> StackSection:
     joints = [
         Joint(interface, _clipped(section(interface.bond, origin, direction), crop))
         for interface in laminate.interfaces
-        if interface.masks and shown.issuperset(mask.index for mask in interface.masks)
+        if (interface.masks or interface.seams)
+        and shown.issuperset(mask.index for mask in interface.masks)
+        and (interface.masks or shown.issuperset(interface.layer_indices))
     ]
     slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
     return StackSection(
@@ -159,7 +178,25 @@ def chamber_section(laminate: Laminate) -> StackSection:
         hidden,
         break_above,
         tuple(rod for rod in rods(laminate, origin, direction) if rod.span[0] > crop),
+        tuple(_fold_ends(laminate, slabs, origin, direction)),
     )
+
+
+def _fold_ends(
+    laminate: Laminate, slabs: Sequence[SectionSlab], origin: Point, direction: Point
+) -> Iterator[FoldEnd]:
+    """Yield the folds that the plane meets, where the films shown end at them."""
+    spans = {slab.layer.index: slab.spans for slab in slabs}
+    for fold in laminate.folds:
+        (x, y), (u, v) = fold.line
+        along = direction[0] * (v - y) - direction[1] * (u - x)
+        if abs(along) < 1e-9 * math.dist((x, y), (u, v)):
+            continue
+        s = ((x - origin[0]) * (v - y) - (y - origin[1]) * (u - x)) / along
+        both = laminate.layer(fold.lower), laminate.layer(fold.upper)
+        for start, end in spans.get(fold.lower, ()):
+            if abs(start - s) < 1e-6 or abs(end - s) < 1e-6:
+                yield FoldEnd(*both, s, abs(start - s) < 1e-6)
 
 
 def _tab(inlet: Inlet, origin: Point) -> Interval:
@@ -205,8 +242,9 @@ ROW_STEP = 6.0
 SLIT = 0.18
 """Share of the gap drawn open above and below a mask, so that one sees what does not bond."""
 EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
-BOND = "#2a7ab9"
 STEEL = "#ccd2d8"
+SEAM = 1.0
+"""mm on the page by which a bond without a gap is drawn high."""
 PAST = 2.0
 """mm by which a pin's axis is drawn past its ends."""
 
@@ -259,6 +297,8 @@ def stack_svg(laminate: Laminate) -> str:
         *(part for rod in view.section.rods for part in _rod(rod, view)),
         *(part for joint in view.section.joints for part in _joint(joint, view)),
         *(part for slab in view.section.slabs for part in _slab(slab, view)),
+        *(part for joint in view.section.joints for part in _seam(joint, view)),
+        *(part for fold in view.section.folds for part in _fold(fold, view)),
         *_breaks(view),
         *_dimensions_above(view),
         *_dimensions_below(view),
@@ -292,12 +332,49 @@ def _slab(slab: SectionSlab, view: StackView) -> list[str]:
 
 
 def _joint(joint: Joint, view: StackView) -> list[str]:
-    interface = joint.interface
-    index = interface.masks[0].index
+    interface, index = joint.interface, joint.layer
+    if not interface.masks:
+        return []
     bottom, top = view.y(interface.z, index), view.y(interface.z + interface.gap, index)
     return [
         draw.box((view.x(start), top), (view.x(end), bottom), fill=BOND)
         for start, end in joint.spans
+    ]
+
+
+def _seam(joint: Joint, view: StackView) -> list[str]:
+    """The bonds of a gap without masks, over the line on which the films lie on each other."""
+    if joint.interface.masks:
+        return []
+    y = view.y(joint.interface.z, joint.layer)
+    return [
+        draw.box((view.x(start), y - SEAM / 2), (view.x(end), y + SEAM / 2), fill=BOND)
+        for start, end in joint.spans
+    ]
+
+
+def _fold(fold: FoldEnd, view: StackView) -> list[str]:
+    """The film that goes round from one half to the other, and the line of the fold."""
+    x, away = view.x(fold.s), -1.0 if fold.is_ahead else 1.0
+    bottom = view.y(fold.lower.z, fold.lower.index)
+    top = view.y(fold.upper.z + fold.upper.film.thickness, fold.upper.index)
+    inner = fold.lower.film.thickness * view.up
+    outer = (bottom - top) / 2
+    low, high = coord(bottom), coord(top)
+    turn = int(away > 0)
+    data = (
+        f"M{coord(x)} {low}A{coord(outer)} {coord(outer)} 0 0 {1 - turn} {coord(x)} {high}"
+        f"V{coord(top + inner)}"
+    )
+    hollow = outer - inner
+    if hollow > 1e-6:
+        data += f"A{coord(hollow)} {coord(hollow)} 0 0 {turn} {coord(x)} {coord(bottom - inner)}"
+    film = fold.lower.film
+    ends = f"M{coord(x)} {coord(top - PAST)}V{coord(bottom + PAST)}"
+    return [
+        f'<path d="{data}Z" fill="{draw.film_fill(film)}" stroke="{ink(film).line}" '
+        f'stroke-width="{draw.THIN}"/>',
+        f'<path d="{ends}" {draw.fold_style()}/>',
     ]
 
 
@@ -480,8 +557,12 @@ def _legend(view: StackView, page: float) -> list[str]:
     entries = [
         (f"{film.material} film, {coord(film.thickness)}", draw.film_fill(film)) for film in films
     ]
-    entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
-    entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
+    gaps = [joint.interface for joint in view.section.joints]
+    if not gaps or any(gap.masks for gap in gaps):
+        entries.append((f"bond: the gap filled with {_bonding(films)}", BOND))
+        entries.append(("unbonded: drawn as a slit beside the mask", "#ffffff"))
+    if any(joint.spans and not joint.interface.masks for joint in view.section.joints):
+        entries.append(("bond of a seam, drawn over the line between the films", BOND))
     if view.section.rods:
         entries.append(("dowel pin", STEEL))
     parts: list[str] = []
@@ -493,6 +574,12 @@ def _legend(view: StackView, page: float) -> list[str]:
         parts.append(draw.box((x, y - 2.6), (x + 6.0, y + 0.6), fill=fill, stroke=draw.GREY))
         parts.append(draw.text((x + 7.6, y), words))
         x += width
+    if view.section.folds:
+        words = "fold: the film goes on in its other half"
+        if x + 7.6 + draw.text_width(words) > PAGE_WIDTH - 5.0:
+            x, y = 10.0, y + 5.0
+        parts.append(f'<path d="M{coord(x)} {coord(y - 1.0)}h6" {draw.fold_style()}/>')
+        parts.append(draw.text((x + 7.6, y), words))
     return parts
 
 
@@ -561,7 +648,7 @@ def _joints(section: StackSection, kind: str) -> list[Joint]:
 
 def _in_gap(words: str, s: float, joint: Joint) -> StackLabel:
     interface = joint.interface
-    return StackLabel(words, s, interface.z + interface.gap / 2, interface.masks[0].index)
+    return StackLabel(words, s, interface.z + interface.gap / 2, joint.layer)
 
 
 def _bond(section: StackSection) -> StackLabel | None:

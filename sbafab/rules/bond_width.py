@@ -38,7 +38,8 @@ RULE = Rule(
     Explanation(
         "every bond is at least 0.75 mm wide between facing edges",
         "A narrower ring peels or leaks under pressure; the paper found 0.75 mm to hold (Sec. 2).",
-        "Make bond.width larger, move what lies near the edge away from it, or round the outline.",
+        "Make bond.width larger, or a seam wider, move what lies near the edge away from it, or "
+        "round the outline.",
         ("rules.bond_width", "bond.width"),
     ),
 )
@@ -52,13 +53,15 @@ def _finding(value: float | None, limits: Limits, place: Place, message: str) ->
 def _message(value: float, width: Width | None, distinct: DistinctInterface, limits: Limits) -> str:
     where = interface_name(distinct.interface) + distinct.suffix
     if width is None:
+        if distinct.interface.seams and not distinct.interface.pressed:
+            return f"nothing bonds at {where}: its seams lie beside the films; move their paths"
         return f"nothing bonds at {where}: the mask covers all of it; make the mask smaller"
     narrowest = f"the narrowest bond is {value:.3f} mm, at {where}, {at(width.middle)}"
     if holds(value, limits.bond_width):
         return narrowest
-    remedy = (
-        "raise bond.width, or move the edges on either side apart there"
-        if value
-        else "round the sharp corner there"
-    )
+    remedy = "raise bond.width, or move the edges on either side apart there"
+    if not value:
+        remedy = "round the sharp corner there"
+    elif distinct.interface.seams and not distinct.interface.pressed:
+        remedy = "make the seam there wider, or move its path inward from the film's edge"
     return f"{narrowest}; it needs {limits.bond_width:g}: {remedy}"

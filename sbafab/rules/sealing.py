@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import Chamber, Laminate
+from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
@@ -76,7 +76,8 @@ RULE = Rule(
     Explanation(
         "every pocket is reached from its own chamber's inlet and from nowhere else",
         "A pocket that opens elsewhere leaks; one that is cut off never inflates.",
-        "Look at the place named: an opening too near another, or a mask that crosses a bond.",
+        "Look at the place named: an opening too near another, a mask that crosses a bond, or a "
+        "seam with a gap.",
         ("bore.diameter", "lumen.diameter", "inlet.width"),
     ),
     at_most=True,
@@ -153,9 +154,12 @@ def _missing_pockets(
             pieces = pockets.get((interface.index, chamber.name), [])
             for centre in chamber.centres:
                 if not any(_holds(piece, centre) for piece in pieces):
+                    remedy = "add its disc to the mask there"
+                    if _is_seamed(interface):
+                        remedy = "move the path of the seam off it, so that it goes round it"
                     message = (
                         f"{chamber.name} has no pocket at chamber interface {interface.index} "
-                        f"({at(centre)}); add its disc to the mask there"
+                        f"({at(centre)}); {remedy}"
                     )
                     offences.append(_Offence(message, interface.index, centre))
     if len(levels) != laminate.balloons:
@@ -183,16 +187,16 @@ def _wrong_reaches(
         voids = [void for void, names in owners.items() if names == {chamber.name}]
         came = graph.reached(void for void in voids if void in fed)
         if OUTSIDE in came:
-            leak = _leak(chamber, graph, came)
+            leak = _leak(chamber, laminate, graph, came)
             offences.setdefault(leak[0], leak[1])
     for void, names in owners.items():
         if void not in fed and void not in offences:
             came = graph.reached([void])
             if OUTSIDE in came and len(names) == 1:
                 chamber = next(c for c in laminate.chambers if c.name in names)
-                offences[void] = _leak(chamber, graph, came)[1]
+                offences[void] = _leak(chamber, laminate, graph, came)[1]
             else:
-                offences[void] = _cut_off(void, names, graph)
+                offences[void] = _cut_off(void, names, laminate, graph)
     return [offences[void] for void in sorted(offences, key=lambda void: void[1:])]
 
 
@@ -223,16 +227,19 @@ def _loose_films(laminate: Laminate) -> list[_Offence]:
             bond = gap.bond if len(pieces) == 1 else gap.bond & piece
             if bond.is_empty:
                 p = _somewhere(piece)
+                remedy = f"open the mask at interface {gap.index} there"
+                if _is_seamed(gap):
+                    remedy = "move the path of a seam onto it"
                 message = (
                     f"the film of layer {gap.above.index} ({gap.above.name}) at {at(p)} is bonded "
-                    f"to nothing below it; open the mask at interface {gap.index} there"
+                    f"to nothing below it; {remedy}"
                 )
                 offences.append(_Offence(message, gap.index, p))
     return offences
 
 
 def _leak(
-    chamber: Chamber, graph: VoidGraph, came: dict[Void, Void | None]
+    chamber: Chamber, laminate: Laminate, graph: VoidGraph, came: dict[Void, Void | None]
 ) -> tuple[Void, _Offence]:
     """Pocket at which the path to the outside starts, and the fault where it leaves."""
     path = [OUTSIDE]
@@ -250,22 +257,36 @@ def _leak(
         outlet = f"into the slit between two balloons at interface {foreign.level}"
     else:
         outlet = f"to the outside at {where}"
+    remedy = "close the opening or bond round it"
+    if last.kind != "opening" and _is_seamed(laminate.interfaces[interface - 1]):
+        remedy = "close the path of the seam there, make it wider, or move it onto both films"
     message = (
         f"{chamber.name} leaks {outlet} ({at(p)}), from its pocket at chamber interface "
-        f"{pocket.level}; close the opening or bond round it"
+        f"{pocket.level}; {remedy}"
     )
     return pocket, _Offence(message, interface, p)
 
 
-def _cut_off(void: Void, names: frozenset[str], graph: VoidGraph) -> _Offence:
+def _cut_off(void: Void, names: frozenset[str], laminate: Laminate, graph: VoidGraph) -> _Offence:
     p = _somewhere(graph.pieces[void])
     where = f"at chamber interface {void.level} ({at(p)})"
     if names:
         whose = f"the pocket of {' and '.join(sorted(names))}"
-        message = f"{whose} {where} is reached from no inlet; open a bore or a strip to it"
+        remedy = "open a bore or a strip to it"
+        if _is_seamed(laminate.interfaces[void.level - 1]):
+            remedy = "open the path of the seam toward the mouth"
+        message = f"{whose} {where} is reached from no inlet; {remedy}"
     else:
-        message = f"a pocket of no chamber lies {where}; remove that part of the mask"
+        remedy = "remove that part of the mask"
+        if _is_seamed(laminate.interfaces[void.level - 1]):
+            remedy = "make the seam there wider, or move its path, so that it bonds there"
+        message = f"a pocket of no chamber lies {where}; {remedy}"
     return _Offence(message, void.level, p)
+
+
+def _is_seamed(interface: Interface) -> bool:
+    """Return True where seams alone bond, so that no mask decides what is open."""
+    return bool(interface.seams) and not interface.pressed
 
 
 def _somewhere(piece: Region) -> Point:

@@ -104,6 +104,9 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
             opening = _Fit(inlet, interface, "the mouth", cut, needed, inlet.mouth, REMEDY, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]
     message = "open a mask strip to the tab's end"
+    gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
+    if gaps and not any(interface.pressed for interface in gaps):
+        message = "open the path of the seam at the tab's end, as wide as that"
     needed = math.pi * inlet.tube_diameter / 2
     return [_Fit(inlet, None, "the mouth", 0.0, needed, inlet.mouth, message)]
 

@@ -17,6 +17,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.joints import balloon_numbers
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import seam_steps
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
 
@@ -82,7 +83,10 @@ def test_a_welded_pouch_passes_and_a_gap_in_its_seam_leaks(tmp_path: Path) -> No
     assert failing(drawn(tmp_path, WELDED)) == set()
     data = deepcopy(WELDED)
     data["seams"][0]["path"] = data["seams"][0]["path"][:-2]
-    assert "sealing" in failing(drawn(tmp_path, data))
+    findings = {finding.rule: finding for finding in run_deck(drawn(tmp_path, data), FEW)}
+    assert findings["sealing"].verdict == "fail"
+    assert "close the path of the seam there, make it wider" in findings["sealing"].message
+    assert "mask" not in findings["sealing"].message + findings["tube-fit"].message
 
 
 def test_a_seam_too_narrow_is_measured_by_its_width(tmp_path: Path) -> None:
@@ -91,6 +95,15 @@ def test_a_seam_too_narrow_is_measured_by_its_width(tmp_path: Path) -> None:
     (bond,) = (f for f in run_deck(drawn(tmp_path, data), FEW) if f.rule == "bond-width")
     assert bond.verdict == "fail"
     assert bond.measured == pytest.approx(0.7, abs=1e-9)
+    assert "make the seam there wider, or move its path inward" in bond.message
+
+
+@pytest.mark.parametrize("kind", ["lap", "fin"])
+def test_the_step_of_a_fin_seam_alone_says_that_edges_stand_out(tmp_path: Path, kind: str) -> None:
+    data = deepcopy(WELDED)
+    data["seams"][0]["kind"] = kind
+    (step,) = seam_steps(drawn(tmp_path, data))
+    assert ("stand out together, face to face" in step.instructions) == (kind == "fin")
 
 
 def test_a_closed_seam_parts_a_pouch_from_the_flap_round_it(tmp_path: Path) -> None:

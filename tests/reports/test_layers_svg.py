@@ -172,3 +172,26 @@ def test_a_name_with_markup_is_escaped() -> None:
 )
 def test_layer_numbers_are_shortened_without_loss(indices: list[int], words: str) -> None:
     assert layer_numbers(indices) == words
+
+
+def test_seams_and_folds_are_drawn_on_the_layers_they_join() -> None:
+    laminate = build(load_design("folded"))
+    root = ElementTree.fromstring(layers_svg(laminate).encode())
+    for card in root.findall(f"{SVG}g"):
+        placed = card.findall(f"{SVG}g")
+        assert len(placed) == len(laminate.seams)
+        for seam, group in zip(laminate.seams, placed, strict=True):
+            band, middle = group.findall(f"{SVG}path")
+            assert float(band.attrib["stroke-width"]) == seam.width
+            assert band.attrib["stroke-linecap"] == "round"
+            for path in (band, middle):
+                assert Path(path.attrib["d"]).length() == pytest.approx(seam.length, abs=1e-6)
+        dashed = [path for path in card.findall(f"{SVG}path") if "stroke-dasharray" in path.attrib]
+        (fold,) = (Path(path.attrib["d"]) for path in dashed)
+        outline = Path(card.findall(f"{SVG}path")[0].attrib["d"]).bbox()
+        assert fold.bbox()[1::2] == pytest.approx((outline[3], outline[3]))
+        words = [str(text.text) for text in card.iter(f"{SVG}text")]
+        assert any(said.endswith("; seams left, right") for said in words)
+    legend = [str(text.text) for text in root.findall(f"{SVG}text")]
+    assert "seam: its width, and the path of the hot-tip" in legend
+    assert "fold: the film goes on in its other half" in legend

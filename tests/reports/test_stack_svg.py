@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -163,3 +164,36 @@ def test_tails_run_on_to_their_pins() -> None:
     words = words_of(stack_svg(laminate))
     assert {"pin strip1, steps 1, 2, 5", "pin chamber1, steps 1, 4", "tail 3.50"} <= set(words)
     assert "dowel pin" in words
+
+
+SEAMED = """
+name = "seamed"
+family = "drawn"
+layers = [{role = "base", shape = "film"}, {role = "cap", shape = "film"}]
+seams = [{name = "rim", layers = [1, 2], shape = "rim", width = 2, tool = "laser"}]
+chambers = [{name = "pouch", centres = [[0, 0]], mouth = [0, 15], angle = 90}]
+[shapes]
+film = {disc = 30}
+rim = {disc = 20}
+"""
+
+
+def test_a_seam_is_cut_half_its_width_on_both_sides_of_its_path(tmp_path: Path) -> None:
+    design = tmp_path / "seamed.toml"
+    design.write_text(SEAMED)
+    laminate = build(load_design(design))
+    (joint,) = chamber_section(laminate).joints
+    assert joint.spans == (pytest.approx((-11, -9)), pytest.approx((9, 11)))
+    svg = stack_svg(laminate)
+    assert svg.count(f'fill="{BOND}"') == len(joint.spans) + 1  # one in the legend
+    assert "bond of a seam, drawn over the line between the films" in words_of(svg)
+
+
+def test_a_fold_is_drawn_where_the_section_meets_its_line() -> None:
+    laminate = build(load_design("folded"))
+    (fold,) = chamber_section(laminate).folds
+    # From the chamber's centre at y = -1 to the line at y = -12; the film lies toward the mouth.
+    assert (fold.s, fold.is_ahead) == (pytest.approx(-11), True)
+    svg = stack_svg(laminate)
+    assert "fold: the film goes on in its other half" in words_of(svg)
+    assert svg.count("stroke-dasharray") == 2
