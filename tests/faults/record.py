@@ -9,6 +9,8 @@ from sbafab.laminate.laminate import Laminate
 from tests.faults.specimen import Change, Pick, Specimen
 
 Put = Callable[[Specimen], None]
+PAPER = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm")
+"""The templates of the paper's families, which most faults are put into."""
 WhyNot = Callable[[Laminate], str]
 """Why a fault does not apply to a laminate; empty where it does."""
 
@@ -20,7 +22,7 @@ class Fault:
     ``sheets``: it is one of the film sheets. These are looked at for such faults alone, for they
     cut what the layers were and would tell every fault of a layer; the deck is then left out.
     ``beside``: it is in a file beside the cut ones. All that a run writes is then in the folder,
-    and everything is looked at.
+    and everything is looked at. It is put into its ``templates`` alone.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Fault:
     settings: tuple[str, ...] = ()
     sheets: bool = False
     beside: bool = False
+    templates: tuple[str, ...] = PAPER
 
 
 @dataclass(frozen=True)
