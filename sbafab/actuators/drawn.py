@@ -192,7 +192,7 @@ class DrawnPort(Row):
     at: Coordinates
     """Its place, in a void."""
     kind: PortKind = "place"
-    """A place of that gap, or a hole of the top or bottom film beside it, which a tube fills."""
+    """A place of that gap, or a hole of the top or bottom film beside it, with a tube glued on."""
 
 
 class NamedNets(Section):
@@ -398,7 +398,8 @@ def build(design: DrawnDesign) -> Laminate:
             for fold in design.stated_folds
         ),
         ports=tuple(
-            Port(port.name, *port.layers, port.at, port.kind) for port in design.ports or ()
+            Port(port.name, *port.layers, port.at, port.kind, _tube_on(port, design))
+            for port in design.ports or ()
         ),
         nets=tuple(Net(name, members) for name, members in _nets(design).items()),
         bonds=design.stated_bonds,
@@ -406,6 +407,10 @@ def build(design: DrawnDesign) -> Laminate:
     _check_folds(laminate, design)
     joinings(laminate)
     return laminate
+
+
+def _tube_on(port: DrawnPort, design: DrawnDesign) -> float | None:
+    return design.inlet.tube_outer_diameter if port.kind == "hole" else None
 
 
 def _nets(design: DrawnDesign) -> Mapping[str, tuple[str, ...]]:

@@ -91,8 +91,10 @@ def import_laminate(path: Path) -> Imported:
     tables["layup"] = _layup(laminate, names)
     if laminate.bores:
         tables["bore"] = {"diameter": laminate.bores[0].diameter}
-    if laminate.inlets:
-        tables["inlet"] = {"tube_outer_diameter": laminate.inlets[0].tube_diameter}
+    tubes = [inlet.tube_diameter for inlet in laminate.inlets]
+    tubes += [port.tube_diameter for port in laminate.ports if port.tube_diameter is not None]
+    if tubes:
+        tables["inlet"] = {"tube_outer_diameter": tubes[0]}
     tube = None
     if laminate.tube is not None:
         tube = {"outer_diameter": laminate.tube, "pitch": _pitch(laminate), "glue": NO_GLUE}

@@ -392,8 +392,26 @@ def _design(circuit: Circuit) -> Imported:
         "shapes": shapes,
         "nets": {name: [*members] for name, members in circuit.nets.items()},
     }
+    tube = _tube(circuit, ports)
+    if tube is not None:
+        tables["inlet"] = {"tube_outer_diameter": tube}
+        remarks.append(
+            f"tubes: a ParchMint file names none, so they are {tube:g} mm outside, as wide as its "
+            "widest port"
+        )
     remarks.append("films: a ParchMint file names none, so layers are of tpe and ptfe as in layup")
     return Imported(tables, drawings, tuple(remarks))
+
+
+def _tube(circuit: Circuit, ports: Sequence[Mapping[str, Any]]) -> float | None:
+    """Outer diameter of a tube as wide as the widest port with a hole, mm; None without one."""
+    holes = {row["name"] for row in ports if row.get("kind") == "hole"}
+    radii = [
+        circuit.components[name].radius
+        for (_, name), label in circuit.labels.items()
+        if label in holes
+    ]
+    return max((round(2 * radius * MM, 6) for radius in radii if radius is not None), default=None)
 
 
 def _film_role(number: int, top: int) -> str:

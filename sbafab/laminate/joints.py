@@ -102,7 +102,8 @@ class Port:
     """A named place at ``at`` in the gap between the structural layers ``below`` and ``above``.
 
     Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel. A
-    "hole" is an opening of the top or bottom film beside that gap, which a tube fills.
+    "hole" is an opening of the top or bottom film beside that gap; a tube of ``tube_diameter`` mm
+    outside (None: not known) is glued on the film round it.
     """
 
     name: str
@@ -110,6 +111,7 @@ class Port:
     above: int
     at: Point
     kind: PortKind = "place"
+    tube_diameter: float | None = None
 
 
 @dataclass(frozen=True)

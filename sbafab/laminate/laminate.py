@@ -311,6 +311,16 @@ class Laminate:
             return self.bond_of(below, above, PRESS) is not None
         return not self.seams_between(below, above)
 
+    @property
+    def tube_holes(self) -> tuple[Port, ...]:
+        """Ports that are holes of an outer film, on each of which a tube is glued."""
+        return tuple(port for port in self.ports if port.kind == "hole")
+
+    @property
+    def tube_count(self) -> int:
+        """Number of tubes: one for each inlet and each hole."""
+        return len(self.inlets) + len(self.tube_holes)
+
     @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:
         """The layers that bond: all of structural films, TPE or further ones."""

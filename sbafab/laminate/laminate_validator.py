@@ -70,7 +70,14 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
         "order": _COUNT,
     },
     "folds": {"lower": _COUNT, "upper": _COUNT, "line": _POINTS},
-    "ports": {"name": _TEXT, "below": _COUNT, "above": _COUNT, "at": _POINT, "kind": _TEXT},
+    "ports": {
+        "name": _TEXT,
+        "below": _COUNT,
+        "above": _COUNT,
+        "at": _POINT,
+        "kind": _TEXT,
+        "tube_diameter": "size?",
+    },
     "nets": {"name": _TEXT, "ports": _TEXTS},
     "bonds": {
         "name": _TEXT,
@@ -86,7 +93,7 @@ LATER: Mapping[str, Mapping[str, Any]] = {
     "films": {"faces": None},
     "layers": {"turned": False},
     "chambers": {"balloons": []},
-    "ports": {"kind": "place"},
+    "ports": {"kind": "place", "tube_diameter": None},
 }
 """Keys that files of earlier versions lack, and what holds there."""
 TOOLS = ("laser", "hot-tip", "ultrasonic", "roller")

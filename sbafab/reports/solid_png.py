@@ -238,7 +238,7 @@ def cutaway(laminate: Laminate) -> RemovedSector:
     """The sector beside one chamber: a face runs through its middle and along its inlet.
 
     Round a lumen the tip is on the actuator's axis and the other face runs between two lobes;
-    else the tip is the chamber's middle and the sector a quarter.
+    else the tip is the chamber's middle and the sector a quarter. Without chambers it is a port.
     """
     inlet = next(iter(laminate.inlets), None)
     u, v = inlet.direction if inlet else (1.0, 0.0)
@@ -251,6 +251,7 @@ def cutaway(laminate: Laminate) -> RemovedSector:
         return _sector(laminate, laminate.chambers[0].name, (0.0, 0.0), last - sector, last)
     # The chamber at the sector's open side: the quarter then cuts no other.
     places = [(p, chamber.name) for chamber in laminate.chambers for p in chamber.centres]
+    places = places or [(port.at, port.name) for port in laminate.ports]
     apex, name = max(places, key=lambda place: place[0][0] * v - place[0][1] * u)
     return _sector(laminate, name, apex, last - math.pi / 2, last)
 

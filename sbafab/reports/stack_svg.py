@@ -140,15 +140,12 @@ class StackSection:
 
 
 def chamber_section(laminate: Laminate) -> StackSection:
-    """The section in the plane of the first chamber's axis and its inlet."""
-    chamber = laminate.chambers[0]
-    origin = next(
-        (bore.centre for bore in laminate.bores if bore.chamber == chamber.name),
-        chamber.centres[0],
-    )
-    inlet = next(
-        (candidate for candidate in laminate.inlets if candidate.chamber == chamber.name), None
-    )
+    """The section in the plane of the first chamber's axis and its inlet.
+
+    Without a chamber it is that along x through the first port.
+    """
+    name, origin = _axis(laminate)
+    inlet = next((candidate for candidate in laminate.inlets if candidate.chamber == name), None)
     direction = inlet.direction if inlet else (1.0, 0.0)
     layers, hidden, break_above = _shown(laminate)
     lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
@@ -167,7 +164,7 @@ def chamber_section(laminate: Laminate) -> StackSection:
     ]
     slabs = [SectionSlab(layer, _clipped(cuts[layer.pattern], crop)) for layer in layers]
     return StackSection(
-        chamber.name,
+        name,
         tuple(slabs),
         tuple(joints),
         crop,
@@ -197,6 +194,16 @@ def _fold_ends(
         for start, end in spans.get(fold.lower, ()):
             if abs(start - s) < 1e-6 or abs(end - s) < 1e-6:
                 yield FoldEnd(*both, s, abs(start - s) < 1e-6)
+
+
+def _axis(laminate: Laminate) -> tuple[str, Point]:
+    """The name and place of the first chamber's axis, or of the first port."""
+    if not laminate.chambers:
+        port = laminate.ports[0]
+        return port.name, port.at
+    chamber = laminate.chambers[0]
+    bored = (bore.centre for bore in laminate.bores if bore.chamber == chamber.name)
+    return chamber.name, next(bored, chamber.centres[0])
 
 
 def _tab(inlet: Inlet, origin: Point) -> Interval:
@@ -396,8 +403,9 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
+    along = "its inlet" if laminate.chambers else "x"
     content = (
-        f"Section through {view.section.chamber} along its inlet. "
+        f"Section through {view.section.chamber} along {along}. "
         f"Height exaggerated {view.factor}{draw.TIMES}, {coord(laminate.thickness)} in all "
         "(nominal). All dimensions in mm."
     )

@@ -4,20 +4,25 @@ A channel w wide opens to a perimeter of 2 w. In it lie the tube and, along one 
 strip: the tube's half circle there is one strip's thickness farther out, so w must be pi / 2 times
 the sum of the tube's diameter and the strip's thickness. Both edges of the strip may be cut off by
 the cutting error, and a kerf that is not compensated makes it narrower by its width.
+
+A port that is a hole has its tube glued on the film round it: the tube must cover the hole as cut
+at its widest, and the film go on past the hole for a bond's width.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region, polygon, strip
-from sbafab.laminate.laminate import Inlet, Interface, Laminate
+from sbafab.laminate.joints import Port
+from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
 from sbafab.rules.boundary import edges_along, outward_reach
-from sbafab.rules.finding import Finding, Place
+from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
@@ -43,9 +48,17 @@ class _Fit(NamedTuple):
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The strip's width at the mouth and along its straight run, and the bond on both sides."""
+    """The strip's width at the mouth and along its run, and its bonds; tubes on holes of films."""
     laminate, limits = measures.laminate, measures.limits
     fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, limits)]
+    on_holes = [
+        fit
+        for port in laminate.ports
+        if port.kind == "hole"
+        for fit in _on_hole(port, laminate, limits)
+    ]
+    if on_holes and not fits:
+        return [_of_holes(on_holes)]
     if not fits:
         message = "the laminate has no inlet, so no tube can be fitted; give every chamber one"
         return [Finding(NAME, "fail", None, None, "mm", Place(), message)]
@@ -69,9 +82,9 @@ def check(measures: Measures) -> list[Finding]:
     place = Place(None, (), *worst.at)
     if worst.interface is not None:
         place = Place(worst.interface.index, worst.interface.layer_indices, *worst.at)
-    return [
-        Finding(NAME, "pass" if good else "fail", worst.limit, worst.value, "mm", place, message)
-    ]
+    verdict: Verdict = "pass" if good else "fail"
+    finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
+    return [finding, _of_holes(on_holes)] if on_holes else [finding]
 
 
 RULE = Rule(
@@ -84,6 +97,75 @@ RULE = Rule(
         ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
     ),
 )
+
+
+# Ports that are holes of an outer film.
+
+
+class _HoleFit(NamedTuple):
+    """A measure of a tube on a hole: value and least value, mm, and the sentence that tells it."""
+
+    layer: Layer
+    port: Port
+    value: float
+    limit: float
+    words: str
+    remedy: str
+
+
+def _of_holes(fits: Sequence[_HoleFit]) -> Finding:
+    """The finding of the worst tube on a hole."""
+    worst = min(fits, key=lambda fit: fit.value - fit.limit)
+    good = holds(worst.value, worst.limit)
+    message = worst.words if good else f"{worst.words}: {worst.remedy}"
+    place = Place(None, (worst.layer.index,), *worst.port.at)
+    verdict: Verdict = "pass" if good else "fail"
+    return Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
+
+
+def _on_hole(port: Port, laminate: Laminate, limits: Limits) -> Iterator[_HoleFit]:
+    """Yield how far the tube covers the hole, and how far film goes on round it.
+
+    Both are measured from the port's place, where the tube's middle is glued.
+    """
+    ends = {layer.index: layer for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1])}
+    beside = [ends[index] for index in (port.below, port.above) if index in ends]
+    here = f"the hole of {port.name}, {at(port.at)},"
+    for layer in beside:
+        hole = next((hole for hole in layer.profile.holes if hole.winding(port.at)), None)
+        if hole is not None:
+            break
+    else:
+        words = f"{here} is in no outer film, so no tube can be glued there"
+        yield _HoleFit(beside[0], port, 0.0, limits.bond_width, words, "draw it in the film")
+        return
+    reach = max(_farthest(edge, port.at) for edge in hole.edges)
+    if port.tube_diameter is not None:
+        kerf = 0.0 if layer.film.material in limits.kerf else limits.unknown_kerf
+        cut = 2 * (reach + limits.tolerances.cutting) + kerf
+        words = (
+            f"{here} is drawn {2 * reach:.3f} mm wide and cut {cut:.3f} at worst; a tube of "
+            f"{port.tube_diameter:g} is glued on it"
+        )
+        remedy = "make the hole smaller, or take a wider tube (inlet.tube_outer_diameter)"
+        yield _HoleFit(layer, port, port.tube_diameter, cut, words, remedy)
+    others = Region(tuple(other for other in layer.profile.contours if other is not hole))
+    film = others.distance_to_edge(port.at) - reach
+    words = (
+        f"{here} has {film:.3f} mm of film round it; to glue its tube on it needs "
+        f"{limits.bond_width:g}"
+    )
+    yield _HoleFit(layer, port, film, limits.bond_width, words, "move what is cut beside it away")
+
+
+def _farthest(edge: Edge, p: Point) -> float:
+    """The greatest distance of an edge from a point, mm; of an arc, that of its whole circle."""
+    if isinstance(edge, Line):
+        return max(math.dist(edge.start, p), math.dist(edge.end, p))
+    return math.dist(edge.centre, p) + edge.radius
+
+
+# Inlets between two films.
 
 
 def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:

@@ -51,8 +51,9 @@ film = {polygon = [[-16, -12], [16, -12], [16, 12], [-16, 12]]}
 hole-a = {disc = 1, at = [-8, -5]}
 hole-b = {disc = 1, at = [8, 5]}
 hole-c = {disc = 1, at = [0, 9]}
+under-tube = {disc = 0.7, at = [0, 9]}
 middle = {difference = ["film", "hole-a", "hole-b", "hole-c"]}
-top = {difference = ["film", "hole-c"]}
+top = {difference = ["film", "under-tube"]}
 pad-a = {offset = "hole-a", by = 0.7}
 pad-b = {offset = "hole-b", by = 0.7}
 pad-c = {offset = "hole-c", by = 0.7}
@@ -83,7 +84,7 @@ def failures(laminate: Laminate) -> list[Finding]:
 
 def test_a_routed_design_passes_the_deck(tmp_path: Path) -> None:
     laminate = drawn(tmp_path, tables())
-    assert laminate.ports[2] == Port("tube", 3, 5, (0.0, 9.0), "hole")
+    assert laminate.ports[2] == Port("tube", 3, 5, (0.0, 9.0), "hole", 1.016)
     assert laminate.nets == (Net("a", ("supply", "left")), Net("b", ("tube", "right")))
     assert laminate.bores == ()
     assert failures(laminate) == []

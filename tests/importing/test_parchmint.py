@@ -359,3 +359,25 @@ def test_circuits_of_others_are_wired_as_a_union_of_shapely_says(
     layers = [row["id"] for row in document["layers"] if row["type"] != "INTEGRATION"]
     is_sound = all(real == declared for real, declared in (groups(document, i) for i in layers))
     assert is_sound == (not kinds & {"open", "short"})
+
+
+def test_a_circuit_without_chambers_goes_through_to_its_traveller(tmp_path: Path) -> None:
+    document = circuit()
+    document["components"][3] = component("out2", "PORT", [20000, 10000], 3000, "f")
+    document["connections"][1]["sinks"][0]["component"] = "out2"
+    document["connections"][1]["paths"][0]["sink"]["component"] = "out2"
+    file = written(document, tmp_path).file
+    result = CliRunner().invoke(app, ["generate", str(file), "-o", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    folder = tmp_path / "two-channels"
+    findings = json.loads((folder / "checks.json").read_text())["findings"]
+    assert {row["rule"] for row in findings if row["verdict"] == "fail"} == set()
+    (fit,) = (row for row in findings if row["rule"] == "tube-fit")
+    # The tube is as wide as the port, 3 mm; the hole is 0.5 less all round, and cut 0.3 wider.
+    assert (fit["measured"], fit["limit"]) == (3.0, pytest.approx(2.3))
+    page = " ".join(re.sub(r"<[^>]+>", "", (folder / "traveller.html").read_text()).split())
+    assert "Fit the tubes Mark the holes of in1, in2 and out2 with a pen" in page
+    assert "Cut 3 pieces of tubing of your choice, outer diameter 3 mm" in page
+    assert "Tubes of in2 and out2 lead into the same channels (net net2): close all of" in page
+    assert "in the tube's bore;" in page.replace("&#39;", "'")
+    assert "the tab" not in page.split("Fit the tubes")[1]

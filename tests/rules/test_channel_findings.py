@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import disc, rectangle, strip
+from sbafab.geometry.region import Region, disc, rectangle, strip
+from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import channel_clear, sealing, tube_fit
 from sbafab.rules.finding import Finding, Place
@@ -300,3 +301,80 @@ def test_a_strip_that_is_narrow_inside_the_mouth_is_so_wide_less_the_errors(
         mask = mask - strip(*ends, 1.0)
     (found,) = tube_fit.check(Measures(spoil(laminate, 2, mask), LIMITS))
     assert (found.verdict, found.measured) == ("fail", pytest.approx(0.6))
+
+
+def on_hole(good: Good, tube: float | None, *cut: Region) -> Laminate:
+    """A pouch of 5 mm without an inlet, and a tube on the cap, from which more is ``cut``."""
+    laminate = good(*ONE)
+    cap = laminate.tpe_layers[-1]
+    profile = cap.profile
+    for region in cut:
+        profile = profile - region
+    gap = laminate.interfaces[-1]
+    return replace(
+        laminate,
+        layers=(*laminate.layers[:-1], replace(cap, profile=profile, pattern="cap-with-hole")),
+        inlets=(),
+        ports=(Port("supply", gap.below.index, gap.above.index, AXIS, "hole", tube),),
+    )
+
+
+HOLE = disc(AXIS, 0.5)
+
+
+def test_a_tube_covers_its_hole_as_cut_at_its_widest(good: Good) -> None:
+    found = only(tube_fit.check(Measures(on_hole(good, 1.35, HOLE), LIMITS)))
+    # A hole of 1.0, 0.1 off on each side, and a kerf of up to 0.1.
+    assert (found.verdict, found.measured) == ("pass", 1.35)
+    assert found.limit == pytest.approx(1.0 + 2 * 0.1 + 0.1)
+    assert found.message == (
+        "the hole of supply, x 0.000, y 0.000, is drawn 1.000 mm wide and cut 1.300 at worst; a "
+        "tube of 1.35 is glued on it"
+    )
+    narrow = only(tube_fit.check(Measures(on_hole(good, 1.25, HOLE), LIMITS)))
+    assert narrow.verdict == "fail"
+    assert narrow.message.endswith(
+        ": make the hole smaller, or take a wider tube (inlet.tube_outer_diameter)"
+    )
+    measured = Limits(kerf={"TPE": 0.12})
+    assert only(tube_fit.check(Measures(on_hole(good, 1.25, HOLE), measured))).verdict == "pass"
+
+
+def test_a_hole_off_its_port_is_covered_by_so_much_less(good: Good) -> None:
+    aside = disc((0.1, 0.0), 0.5)
+    found = only(tube_fit.check(Measures(on_hole(good, 1.35, aside), LIMITS)))
+    assert (found.verdict, found.limit) == ("fail", pytest.approx(2 * 0.6 + 0.3))
+
+
+def test_a_tube_on_a_hole_needs_film_to_glue_it_on(good: Good) -> None:
+    slot = rectangle((1.2, -0.5), (1.5, 0.5))
+    found = only(tube_fit.check(Measures(on_hole(good, 3.0, HOLE, slot), LIMITS)))
+    assert (found.verdict, found.limit) == ("fail", 0.75)
+    assert found.measured == pytest.approx(1.2 - 0.5)
+    assert "has 0.700 mm of film round it; to glue its tube on it needs 0.75: " in found.message
+    farther = rectangle((1.3, -0.5), (1.5, 0.5))
+    assert (
+        only(tube_fit.check(Measures(on_hole(good, 3.0, HOLE, farther), LIMITS))).verdict == "pass"
+    )
+
+
+def test_a_tube_needs_its_hole(good: Good) -> None:
+    found = only(tube_fit.check(Measures(on_hole(good, 3.0), LIMITS)))
+    assert (found.verdict, found.measured) == ("fail", 0.0)
+    assert found.message == (
+        "the hole of supply, x 0.000, y 0.000, is in no outer film, so no tube can be glued there: "
+        "draw it in the film"
+    )
+
+
+def test_a_tube_of_unknown_size_is_measured_by_the_film_round_its_hole(good: Good) -> None:
+    found = only(tube_fit.check(Measures(on_hole(good, None, HOLE), LIMITS)))
+    assert (found.verdict, found.limit) == ("pass", 0.75)
+
+
+def test_a_laminate_without_inlet_and_hole_takes_no_tube(good: Good) -> None:
+    found = only(tube_fit.check(Measures(replace(on_hole(good, 3.0, HOLE), ports=()), LIMITS)))
+    assert (found.verdict, found.message) == (
+        "fail",
+        "the laminate has no inlet, so no tube can be fitted; give every chamber one",
+    )

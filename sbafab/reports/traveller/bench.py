@@ -451,7 +451,7 @@ def _before(works: Sequence[Work]) -> Iterator[str]:
     yield f"Clean and dry: {plate}film as it comes off the roll."
     if works[0].schedule.steps:
         yield from _before_the_press(works)
-    if any(work.laminate.inlets for work in works):
+    if any(work.laminate.tube_count for work in works):
         yield "Adhesive in date; curing time on its package: ________ h."
 
 
@@ -522,10 +522,12 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         rows.append(Tool(f"{tool.capitalize()}, {wide} wide", "seams, along the paths of layers/"))
     if works[0].schedule.steps:
         rows += _press_tools(works)
-    if any(laminate.inlets for laminate in laminates):
+    if any(laminate.tube_count for laminate in laminates):
         ears = "ears, " if any(laminate.registration == "ears" for laminate in laminates) else ""
+        has_tabs = any(laminate.inlets for laminate in laminates)
+        uses = "strips and tubes; mark tabs" if has_tabs else "tubes; mark holes"
         rows += [
-            Tool("Fine scissors, razor blade, pen", f"cut {ears}strips and tubes; mark tabs"),
+            Tool("Fine scissors, razor blade, pen", f"cut {ears}{uses}"),
             Tool(
                 "Regulator or syringe with a gauge, water or soapy water, eye protection",
                 "leak and proof test",

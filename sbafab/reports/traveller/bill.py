@@ -41,9 +41,9 @@ def bill(work: Work) -> list[Item]:
     """Return all that must be at hand before the work starts, for all copies."""
     job, laminate = work.job, work.laminate
     items = [*_films(work)]
-    if laminate.inlets:
-        number = len(laminate.inlets) * job.copies
-        diameter = units.millimetres(laminate.inlets[0].tube_diameter)
+    if laminate.tube_count:
+        number = laminate.tube_count * job.copies
+        diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
         tube = tube_name(work.design)
         items.append(
             Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"))

@@ -103,7 +103,7 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
 
     It does so over the inlet tab, under a balloon larger than those between. None without one.
     """
-    if len(laminate.chambers) > 1 or len(laminate.chambers[0].centres) > 1:
+    if len(laminate.chambers) != 1 or len(laminate.chambers[0].centres) > 1:
         return None
     (x, y), (dx, dy) = laminate.chambers[0].centres[0], laminate.inlets[0].direction
     turn = -math.degrees(math.atan2(dy, dx))

@@ -312,7 +312,43 @@ def finishing(work: Work) -> list[Action]:
 
 
 def tubing(work: Work) -> list[Action]:
-    """Return the paper's step 5, one box an inlet where it is done for each of them."""
+    """Return the paper's step 5, one box an inlet where it is done for each of them.
+
+    Tubes on holes of an outer film are glued on after that, which the paper has not.
+    """
+    return [*_in_inlets(work), *_on_holes(work)]
+
+
+def _on_holes(work: Work) -> list[Action]:
+    """Return the gluing of tubes on holes of an outer film; empty without one."""
+    holes = work.laminate.tube_holes
+    if not holes:
+        return []
+    names = _boxes([port.name for port in holes])
+    diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
+    at = f"the {'hole' if len(holes) == 1 else 'holes'} of {joined_words([p.name for p in holes])}"
+    return [
+        *_each_copy(work, "Glue the tubes on their holes"),
+        Action(f"Mark {at} with a pen beside each, on the face that it opens to."),
+        Action(
+            f"Cut {units.count(len(holes), 'piece')} of {tube_name(work.design)}, outer diameter "
+            f"{diameter}, square and without burr, as long as your rig needs."
+        ),
+        Action("Wipe the film round the hole with isopropanol and let it dry.", (), names),
+        Action(
+            f"Stand the tube, or a flange with the tube in it, on the hole, its bore over the "
+            f"opening, and seal its foot all round with {work.design.inlet.adhesive}, at least "
+            f"{units.millimetres(work.design.rules.bond_width)} wide on the film; keep it out of "
+            "the hole.",
+            (),
+            names,
+        ),
+        Action("Let the adhesive cure as its package says before you pressurise anything."),
+    ]
+
+
+def _in_inlets(work: Work) -> list[Action]:
+    """Return the fitting of tubes between two films; empty without an inlet."""
     inlets = work.laminate.inlets
     if not inlets:
         return []
@@ -367,11 +403,13 @@ def _boxes(names: Sequence[str]) -> tuple[str, ...]:
 
 def leak_test(work: Work) -> list[Action]:
     """Return the paper's way to find leaks, then the proof test; pressures and times are ours."""
-    names = _boxes([chamber.name for chamber in work.laminate.chambers])
+    holes = [port.name for port in work.laminate.tube_holes]
+    names = _boxes([*[chamber.name for chamber in work.laminate.chambers], *holes])
     lumen = ["lumen"] if work.laminate.lumen else []
+    tab = ["tab"] if work.laminate.inlets or not holes else []
     alone = work.job.copies == 1
     where = "at the head of this traveller" if alone else "beside its serial number"
-    places = joined_words(["outline", "tab", "tube", "cap", *lumen])
+    places = joined_words(["outline", *tab, "tube", "cap", *lumen])
     several = (
         [
             Action(
@@ -379,7 +417,7 @@ def leak_test(work: Work) -> list[Action]:
                 "a leak between chambers.",
             )
         ]
-        if len(work.laminate.inlets) > 1
+        if work.laminate.tube_count > 1
         else []
     )
     return [
@@ -388,6 +426,7 @@ def leak_test(work: Work) -> list[Action]:
             f"Fit to each tube: {fitting(work)}; push it in by 5 mm or more. Connect a "
             "regulator or a syringe with a gauge. Wear eye protection."
         ),
+        *_joined_tubes(work),
         Action(
             f"Under water, or brushed with soapy water, raise each chamber slowly to "
             f"{leak_words(work).replace(' for ', ' and hold for ')}.",
@@ -400,6 +439,19 @@ def leak_test(work: Work) -> list[Action]:
         Action("Release the pressure; dry the actuator."),
         *proof_test(work, names, where),
     ]
+
+
+def _joined_tubes(work: Work) -> Iterator[Action]:
+    """Yield which tubes to close, for each net with a tube on a hole and one more tube."""
+    holes = {port.name for port in work.laminate.tube_holes}
+    tubes = holes | {inlet.chamber for inlet in work.laminate.inlets}
+    for net in work.laminate.nets:
+        joined = [name for name in net.ports if name in tubes]
+        if len(joined) > 1 and holes.intersection(joined):
+            yield Action(
+                f"Tubes of {joined_words(joined)} lead into the same channels (net {net.name}): "
+                "close all of them but one, and fill by that."
+            )
 
 
 # Taking down, after the press has opened. The order is ours; the paper gives none.
@@ -654,7 +706,7 @@ def proof_words(work: Work) -> str:
 
 def fitting(work: Work) -> str:
     """Return what joins tube and supply, with the bore of the tube where the kit knows it."""
-    tube = kit_of(work.design).tubes.get(work.design.inlet.tube)
+    tube = kit_of(work.design).tubes.get(tube_name(work.design))
     bore = None if tube is None else tube.inner_diameter
     of = "" if bore is None else f" of {units.millimetres(bore)}"
     return f"{work.design.acceptance.fitting}, in the tube's bore{of}"
