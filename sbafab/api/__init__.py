@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         build,
         dimensions,
         drawing,
-        import_design,
         load,
         loads,
         read_laminate,
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     )
     from sbafab.api.lab import kerf, record, report
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
-    from sbafab.api.runs import cut, generate, mesh, nest, press, simulate
+    from sbafab.api.runs import cut, generate, import_design, mesh, nest, press, simulate
     from sbafab.api.search import compare, find, sweep
 
 __all__ = [
@@ -80,7 +79,7 @@ MODULES = {
     "checks": ("check", "check_folder", "checking", "nets_of"),
     "lab": ("kerf", "record", "report"),
     "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
-    "runs": ("cut", "generate", "mesh", "nest", "press", "simulate"),
+    "runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
     "search": ("compare", "find", "sweep"),
 }
 """The functions by their module, which is loaded when first asked for one of them; ``designs`` has

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from io import StringIO
@@ -21,8 +20,6 @@ from sbafab.cutting.order import cutting_order
 from sbafab.design.files import Change, template_names, template_text
 from sbafab.design.records import Design
 from sbafab.design.records import resolved as written_out
-from sbafab.importing.sources import import_source
-from sbafab.importing.write import default_file, write_imported
 from sbafab.laminate import laminate_file
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.solid import solid as surface_of
@@ -116,23 +113,6 @@ def read_laminate(path: str | Path) -> Laminate:
     Raises DesignError, which names the file and the place in it, for what is no such file.
     """
     return laminate_file.read_laminate(Path(path))
-
-
-def import_design(source: str | Path, out: str | Path | None = None) -> Design:
-    """Import what another program, or a run, wrote: a design of drawn layers, with its files.
-
-    ``source`` is what ``sbafab import`` reads; ``out`` is the design file to write, by default
-    its name in this folder, with drawings in a folder beside it. What is not carried over is
-    warned of, a ``UserWarning`` a place. Raises DesignError for what cannot be imported,
-    OutputError where a file is in the way.
-    """
-    path = Path(source)
-    _, imported = import_source(path)
-    file = default_file(imported) if out is None else Path(out)
-    design = write_imported(imported, file, path.name).design
-    for remark in imported.remarks:
-        warnings.warn(remark, stacklevel=2)
-    return design
 
 
 def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,32 @@ from sbafab.api.designs import Source, either_of, load, parted
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import Change
+from sbafab.design.records import Design
+from sbafab.importing.sources import import_source
+from sbafab.importing.write import default_file, write_imported
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.process import Progress
 from sbafab.runs.run import Conforming, Run, RunRequest, Simulated
 from sbafab.runs.run import generate as run
 from sbafab.runs.run import simulate as run_simulator
 from sbafab.simulators.simulator import Name, SimulationRequest
+
+
+def import_design(source: str | Path, out: str | Path | None = None) -> Design:
+    """Import what another program, or a run, wrote: a design of drawn layers, with its files.
+
+    ``source`` is what ``sbafab import`` reads; ``out`` is the design file to write, by default
+    its name in this folder, with drawings in a folder beside it. What is not carried over is
+    warned of, a ``UserWarning`` a place. Raises DesignError for what cannot be imported,
+    OutputError where a file is in the way.
+    """
+    path = Path(source)
+    _, imported = import_source(path)
+    file = default_file(imported) if out is None else Path(out)
+    design = write_imported(imported, file, path.name).design
+    for remark in imported.remarks:
+        warnings.warn(remark, stacklevel=2)
+    return design
 
 
 def generate(

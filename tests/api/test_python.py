@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import warnings
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,9 +13,10 @@ import pytest
 import shapely
 
 import sbafab
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.rules.finding import Finding, Place
 from sbafab.runs.run import Run
+from tests.importing.test_parchmint import circuit
 
 SMALL = {"stack.balloons": 2, "rules": {"yield_builds": 100}}
 
@@ -173,3 +176,31 @@ def test_notebooks_show_tables_and_pictures(what: str, tmp_path: Path) -> None:
         "run": "press.json",
     }
     assert said[what] in page
+
+
+def test_a_laminate_is_imported_as_a_design(tmp_path: Path) -> None:
+    pouch = sbafab.generate("pouch", out=tmp_path)
+    source = pouch.folder / "laminate.json"
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        design = sbafab.import_design(source, tmp_path / "again.toml")
+    assert design == sbafab.load(tmp_path / "again.toml")
+    layers = [layer.profile for layer in sbafab.build("pouch").layers]
+    assert [layer.profile for layer in sbafab.build(design).layers] == layers
+    assert all(item.category is UserWarning for item in remarks)
+    with pytest.raises(OutputError, match="is there already"):
+        sbafab.import_design(source, tmp_path / "again.toml")
+    with pytest.raises(DesignError, match="does not exist"):
+        sbafab.import_design(tmp_path / "none")
+
+
+def test_what_an_import_leaves_out_is_warned_of(tmp_path: Path) -> None:
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(circuit()), encoding="utf-8")
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        design = sbafab.import_design(path, tmp_path / "valves.toml")
+    assert "layer electrodes: holds no channels; it is not imported" in [
+        str(item.message) for item in remarks
+    ]
+    assert design.family == "drawn"
