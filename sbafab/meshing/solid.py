@@ -6,6 +6,7 @@ meet edge to edge.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -338,6 +339,10 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     """
     laminate = parted(laminate)
     axes = [bore.centre for bore in laminate.bores if bore.chamber == chamber.name]
+    if laminate.nets:
+        # Chambers of nets have no bores: they go through the holes that are drawn.
+        inner = laminate.tpe_layers[1:-1]
+        axes = [_middle(hole) for layer in inner for hole in layer.profile.holes]
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     pockets = [
         Slab(Region(tuple(contours)), interface.z, interface.z + interface.gap)
@@ -351,7 +356,11 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
             f"Chamber {chamber.name} has no pocket at x {x:.3f}, y {y:.3f}; "
             "a chamber mask must cover that place."
         )
-    channels = _channels(laminate, chamber, axes, pockets[0].top, pockets[-1].bottom)
+    channels = (
+        _holes_between(laminate, pockets)
+        if laminate.nets
+        else _channels(laminate, chamber, axes, pockets[0].top, pockets[-1].bottom)
+    )
     return sorted([*pockets, *channels], key=lambda slab: slab.bottom)
 
 
@@ -411,6 +420,23 @@ def _channels(
                     f"x {x:.3f}, y {y:.3f}; cut a bore there with a neck ring round it."
                 )
             yield Slab(opening, bottom, top)
+
+
+def _middle(contour: Contour) -> Point:
+    low_x, low_y, high_x, high_y = contour.bounds
+    return (low_x + high_x) / 2, (low_y + high_y) / 2
+
+
+def _holes_between(laminate: Laminate, pockets: Sequence[Slab]) -> Iterator[Slab]:
+    """The holes of films that open to a pocket below and to one above."""
+    for layer in laminate.tpe_layers:
+        top = layer.z + layer.film.thickness
+        below = [pocket.region for pocket in pockets if math.isclose(pocket.top, layer.z)]
+        above = [pocket.region for pocket in pockets if math.isclose(pocket.bottom, top)]
+        for hole in layer.profile.holes if below and above else ():
+            opening = Region((hole.reversed(),))
+            if all(any(not (opening & r).is_empty for r in side) for side in (below, above)):
+                yield Slab(opening, layer.z, top)
 
 
 def _opening(holes: Iterable[Contour], axis: Point) -> Region | None:

@@ -73,6 +73,8 @@ def check(measures: Measures) -> list[Finding]:
     clearances = [_clear(channel) for channel in channels(laminate)]
     if not clearances:
         message = "no balloon is joined to another, so there is no channel to keep clear"
+        if laminate.nets:
+            message = "no balloon has a bore; what drawn holes join is judged by nets"
         return [Finding(NAME, "pass", None, None, "mm", Place(), message)]
     worst = min(clearances, key=lambda clear: clear.diameter - clear.channel.diameter)
     stated = worst.channel.diameter

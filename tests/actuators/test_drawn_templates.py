@@ -118,3 +118,12 @@ def test_the_traveller_says_which_face_of_a_coated_film_is_up(tmp_path: Path) ->
     page = (tmp_path / "finger" / "traveller.html").read_text("utf-8")
     assert "Its pe face is up, its pet face down" in page
     assert "Lay the PET sheet with its coated side up" in page
+
+
+def test_the_grippers_right_cavity_goes_through_its_via() -> None:
+    laminate = build(load_design("gripper"))
+    (right,) = [chamber for chamber in laminate.chambers if chamber.name == "right"]
+    # Pouch; channel down to its corner, along and at its end; the via through a film of 0.1 mm.
+    lower, upper = 16 * 14, 3 * (24 - 2.5) + 3 * 25 + 3 * 4
+    expected = 0.025 * (lower + upper) + 0.1 * math.pi * 0.52**2
+    assert cavity(laminate, right, 1e-4).volume == pytest.approx(expected, rel=1e-4)
