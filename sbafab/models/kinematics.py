@@ -181,7 +181,8 @@ class Actuator:
     Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of round
     pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
     drawn outlines. ``full_stroke`` mm counts as full actuation, ``full_height`` mm is its height
-    then; ``thickness`` mm the flat laminate's, the press factor included.
+    then; ``thickness`` mm the flat laminate's, the press factor included. ``press_factor`` is 1 for
+    sheets that stay solid and are not the paper's film, on which it was measured.
     """
 
     design: Design
@@ -193,6 +194,7 @@ class Actuator:
     full_stroke: float
     full_height: float
     thickness: float
+    press_factor: float
 
     def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a chamber's length at a stroke: from the flat thickness to the full height."""
@@ -210,7 +212,7 @@ class Actuator:
     @property
     def has_the_papers_film(self) -> bool:
         """True if the films are the paper's, so that its measurements apply."""
-        return all(layer.film.is_the_papers for layer in self.laminate.tpe_layers)
+        return _has_the_papers_film(self.laminate)
 
     @property
     def knows_full(self) -> bool:
@@ -229,6 +231,10 @@ class Actuator:
         )
 
 
+def _has_the_papers_film(laminate: Laminate) -> bool:
+    return all(layer.film.is_the_papers for layer in laminate.tpe_layers)
+
+
 def actuator(
     design: Design, laminate: Laminate, calibration: Factors, form: Form | None = None
 ) -> Actuator:
@@ -237,7 +243,9 @@ def actuator(
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
     full = full_height = 0.0
-    thickness = laminate.thickness * calibration.press_factor
+    flows = isinstance(form.pockets, Slots | Discs) or _has_the_papers_film(laminate)
+    press_factor = calibration.press_factor if flows else 1.0
+    thickness = laminate.thickness * press_factor
     if isinstance(form.pockets, Slots):
         kinematics = slot_stack(form.pockets.width, form.pockets.run, balloons)
         full = kinematics[0].largest_stroke
@@ -248,5 +256,14 @@ def actuator(
         # The paper divides its whole height by its balloons (Sec. 4.6: 1.2 mm each).
         full = full_height = full_stroke(radii)
     return Actuator(
-        design, form, laminate, balloons, radii, kinematics, full, full_height, thickness
+        design,
+        form,
+        laminate,
+        balloons,
+        radii,
+        kinematics,
+        full,
+        full_height,
+        thickness,
+        press_factor,
     )

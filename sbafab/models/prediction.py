@@ -556,7 +556,7 @@ def _geometric_figures(
 ) -> Iterator[Figure | LeftOut]:
     mass = _mass(actuator.laminate)
     grams = None if isinstance(mass, LeftOut) else mass.value
-    yield from _sizes(actuator, request)
+    yield from _sizes(actuator)
     if actuator.kinematics and actuator.form.is_parallel:
         yield folding(actuator, request)
     yield mass
@@ -620,12 +620,9 @@ def _relations(
         yield _diameter_relation(actuator, actuator.form.wrap)
 
 
-def _sizes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
+def _sizes(actuator: Actuator) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
-    factor = request.factors.press_factor
-    if not (actuator.kinematics or actuator.has_the_papers_film):
-        # Measured on the paper's film; a sheet that stays solid does not flow.
-        factor = 1.0
+    factor = actuator.press_factor
     pressed = NOMINAL.times("press factor", factor)
     for name, value in sizes(actuator.design, actuator.laminate, factor).items():
         shown = name.replace("_", " ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,7 +11,10 @@ import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.design.records import Discs, Slots
+from sbafab.models.balloons import balloons_of
+from sbafab.models.elastic import free_rise
 from sbafab.models.figures import REACHED, WIDEST
+from sbafab.models.formulas import sizes
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart
@@ -448,8 +452,10 @@ def _figures_of_arm(
     free = arm_stack.pose(every)
     flat = arm_stack.flat_height
     yield AssemblyFigure(name, "height, flat", flat, "mm", ELASTIC, "about 1 (Sec. 6)")
-    yield AssemblyFigure(name, "height, inflated", free.height, "mm", ELASTIC, "about 20 (Sec. 5)")
-    three_quarters = arm_stack.pose(every, plate=flat + 0.75 * (free.height - flat))
+    stroke = _free_stroke(placed, pressure)
+    height = flat + stroke
+    yield AssemblyFigure(name, "height, inflated", height, "mm", BALLOON, "about 20 (Sec. 5)")
+    three_quarters = arm_stack.pose(every, plate=flat + 0.75 * stroke)
     yield AssemblyFigure(name, "push at 75 % of its stroke", three_quarters.force, "N", ELASTIC)
     if arm_stack.chambers > 1:
         single = arm_stack.pose((pressure, *(0.0,) * (arm_stack.chambers - 1)))
@@ -463,6 +469,13 @@ def _figures_of_arm(
         yield AssemblyFigure(
             name, f"sag of the tip, {load_g:g} g across it", sag, "mm", ELASTIC, paper
         )
+
+
+def _free_stroke(placed: PlacedSba, pressure: float) -> float:
+    """Return the free stroke in mm as in ``predict``: the stack's maps are only near."""
+    design, laminate = placed.made.design, placed.made.laminate
+    kinds = Counter(balloons_of(design, laminate, factors_of(design)))
+    return free_rise(kinds, pressure).stroke
 
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:

@@ -333,7 +333,7 @@ class Subject:
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate, self.factors.press_factor)
+        return sizes(self.design, self.laminate, self._actuator.press_factor)
 
     @cached_property
     def _keys(self) -> Mapping[str, Any]:
@@ -478,7 +478,7 @@ class Subject:
         at = f"at {quantity.kpa or 0.0:g} kPa"
         flow = f"at {quantity.flow or WATER_FLOW:g} ml/min"
         if quantity.name == "height":
-            factor = self.factors.press_factor
+            factor = self._actuator.press_factor
             pressed = f" x press factor {factor:.3g}" if factor != 1 else ""
             return "deflated height", FLAT_HEIGHT_OF_FILMS + pressed
         if group_of(quantity, self.design.form) is None:

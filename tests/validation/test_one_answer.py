@@ -92,6 +92,24 @@ def test_find_has_the_figure_of_predict(case: Case, prediction: Prediction) -> N
     assert value == _near(_figure(prediction, case.figure))
 
 
+@pytest.mark.parametrize(
+    ("name", "quantities"),
+    [
+        ("radial-15mm", {f"{size}_diameter" for size in ("deflated", "reached", "inflated")}),
+        # Its films stay solid in the press: no press factor.
+        ("folded", {"height"}),
+    ],
+)
+def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
+    design = sbafab.load(name)
+    subject = Subject(design, sbafab.build(design))
+    figures = {one.name: one.value for one in sbafab.predict(name).figures}
+    for quantity in quantities:
+        figure = "deflated height" if quantity == "height" else quantity.replace("_", " ")
+        value = subject.value(read_quantity(quantity), lambda: 1.0)
+        assert value == pytest.approx(figures[figure], rel=1e-12)
+
+
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_measured_curves_have_it_beside_them(case: Case, prediction: Prediction) -> None:
     answer = model_values(case.curve, factors_of(sbafab.load(NAME)))
