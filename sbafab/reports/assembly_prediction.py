@@ -14,7 +14,6 @@ from sbafab.design.records import Discs, Slots
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import free_rise
 from sbafab.models.figures import REACHED, WIDEST
-from sbafab.models.formulas import sizes
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart
