@@ -93,6 +93,7 @@ EXTRAS = {
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "studio": ("starlette", "sbafab studio"),
+    "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),
 }
 """By extra: a module that it installs, and the feature that needs it."""
 

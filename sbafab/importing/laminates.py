@@ -42,8 +42,8 @@ def import_folder(folder: Path) -> Imported:
     """
     data = read_toml(folder / DESIGN)
     if data.get("family") == ASSEMBLY:
-        parts = sorted(path.parent.name for path in folder.glob(f"designs/*/{DESIGN}"))
-        hint = f"import one of its designs: {listed(parts)} in {folder / 'designs'}"
+        parts = sorted(path.parent.name for path in folder.glob(f"*/{DESIGN}"))
+        hint = f"import one of its designs: {listed(parts)} in {folder}"
         raise DesignError(f"{folder} holds an assembly, and drawn layers are one laminate; {hint}")
     laminate = read_laminate(_beside(folder))
     design = load_design(folder / DESIGN)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,10 +87,11 @@ def _document(path: Path, text: str) -> Any:
         except (ValueError, RecursionError) as error:
             raise DesignError(f"{path} is no JSON: {error}; save it again") from None
     try:
-        yaml: Any = import_module("yaml")
+        import yaml
     except ImportError:
         raise DesignError(
-            f"{path} is YAML, which takes PyYAML to read; pip install pyyaml, or save it as JSON"
+            f"{path} is YAML, which takes PyYAML to read; "
+            'pip install "sbafab[yaml]", or save it as JSON'
         ) from None
     # Objects of foldable_robotics are plain ones here, and no other is made.
     loader: Any = type("Loader", (yaml.SafeLoader,), {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -211,3 +212,12 @@ def test_polygons_without_a_table_say_what_is_missing(importing: Importing, tmp_
     (tmp_path / "hinge.cad").write_text("!!python/object:popupcad.filetypes.design.Design\n")
     said = importing(tmp_path / "hinge.cad").output
     assert "is a popupCAD design, which holds operations on sketches and no layers" in said
+
+
+def test_yaml_without_pyyaml_names_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, importing: Importing
+) -> None:
+    source = polygons(tmp_path, POLYGONS, ROWS.replace(".json", ".yaml"))
+    (source / "lam.yaml").write_text("id: 1\n")
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    assert 'pip install "sbafab[yaml]"' in importing(source).output

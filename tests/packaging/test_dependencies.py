@@ -18,6 +18,7 @@ INSTALLED_AS = {
     "netgen": "netgen-mesher",
     "resvg_py": "resvg-py",
     "tomli_w": "tomli-w",
+    "yaml": "pyyaml",
     "zxingcpp": "zxing-cpp",
 }
 
