@@ -136,7 +136,7 @@ ENDS = _taylor_shift(-1.0, 3), _taylor_shift(1.0, DEGREE + 1)
 class BalloonMap:
     """The map of one balloon from no pressure to ``most_pressure`` kPa and from flat to
     ``most_height`` mm; ``coefficients`` are those of the potential, in height and in
-    asinh(p / ``scale_pressure``).
+    asinh(p / ``scale_pressure``). ``base`` is the map that this one was ``stiffened`` from.
     """
 
     balloon: Balloon
@@ -144,6 +144,7 @@ class BalloonMap:
     most_height: float
     coefficients: Array
     scale_pressure: float
+    base: BalloonMap | None = None
 
     def stiffened(self, ratio: float) -> BalloonMap:
         """Return the map of the balloon whose films have ``ratio`` times the modulus.
@@ -275,6 +276,7 @@ def _stiffened(made: BalloonMap, ratio: float) -> BalloonMap:
         made.most_height,
         ratio * made.coefficients,
         ratio * made.scale_pressure,
+        made.base or made,
     )
 
 

@@ -112,16 +112,19 @@ def _short(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-PYTHON = '''"""The balloons of {name}, as sbafab maps them. Plain Python, no imports but math.
+PYTHON = '''"""The balloons of {name}, as sbafab maps them. Plain Python and its standard library.
 
 force(p, h), volume(p, h), stiffness(p, h) of one balloon at a pressure p (kPa) and a height h (mm,
 what it has risen by): mN on the plates, ul, mN/mm. Below 0 the plates pull. All three come from one
 potential W, so force = -dW/dh, volume = -dW/dp and dvolume/dh = dforce/dp. balloon is one of
 BALLOONS; LEVELS says which one each level of a chamber has, bottom to top. p, h or both may be
-numpy arrays, of shapes that numpy broadcasts.
+numpy arrays, of shapes that numpy broadcasts. Where holds(p, h) is false the map is more than 3 %
+off, and the others warn.
 """
 
 import math
+import warnings
+from bisect import bisect
 
 LEVELS = {levels}
 FLAT_LEVEL = {pitch}  # mm, to be added to a balloon's height for that of its level
@@ -129,6 +132,16 @@ CHAMBER_AXES = {axes}  # mm
 SPANS_P, SPANS_H = {spans_p}, {spans_h}
 PIECES = {pieces}
 BALLOONS = {balloons}
+
+
+def _cell_holds(b, p, h):
+    i, j = bisect(b["cell_pressures"], p) - 1, bisect(b["cell_heights"], h) - 1
+    return b["holds"][min(i, len(b["holds"]) - 1)][min(j, len(b["holds"][0]) - 1)] == "+"
+
+
+def _warn(holds):
+    if not holds:
+        warnings.warn("the map is more than 3 % off here, see holds", stacklevel=4)
 
 
 def _weights(u, order):
@@ -157,6 +170,7 @@ def _spline(balloon, p, h, by_p, by_h):
     y = min(h * SPANS_H / b["most_height"], SPANS_H * (1 - 1e-12))
     i, j = int(x), int(y)
     across, along = _weights(x - i, by_p), _weights(y - j, by_h)
+    _warn(_cell_holds(b, p, h))
     rate = (each / math.hypot(p, p0)) ** by_p * (SPANS_H / b["most_height"]) ** by_h
     rows = b["coefficients"][i : i + {count}]
     return rate * sum(
@@ -171,6 +185,7 @@ def _array_spline(b, p, h, by_p, by_h):
     most = (b["most_pressure"], b["most_height"])
     if not ((p >= 0) & (p <= most[0]) & (h >= 0) & (h <= most[1])).all():
         raise ValueError("outside the map: give 0 to %g kPa and 0 to %g mm" % most)
+    _warn(all(_cell_holds(b, *place) for place in zip(p.ravel().tolist(), h.ravel().tolist())))
     p0 = b["scale_pressure"]
     each = SPANS_P / math.asinh(most[0] / p0)
     x = np.minimum(np.arcsinh(p / p0) * each, SPANS_P * (1 - 1e-12))
@@ -182,6 +197,11 @@ def _array_spline(b, p, h, by_p, by_h):
     return rate * sum(
         a * w * table[i + k, j + n] for k, a in enumerate(across) for n, w in enumerate(along)
     )
+
+
+def holds(p, h, balloon=0):
+    """Whether the map is within 3 % at numbers p and h."""
+    return _cell_holds(BALLOONS[balloon], p, h)
 
 
 def potential(p, h, balloon=0):
@@ -210,6 +230,16 @@ def area(p, h, balloon=0):
 '''
 
 
+def _cells(balloon: BalloonMap) -> dict[str, list[float] | list[str]]:
+    """Return cells of pressure and height, and a row a pressure with + where the map holds."""
+    covered = map_range(balloon)
+    return {
+        "cell_pressures": [_short(p) for p in covered.pressures.tolist()],
+        "cell_heights": [_short(h) for h in covered.heights.tolist()],
+        "holds": ["".join("+" if cell else "-" for cell in row) for row in covered.within.tolist()],
+    }
+
+
 def _python(name: str, stack: Stack) -> str:
     balloons = [
         {
@@ -220,6 +250,7 @@ def _python(name: str, stack: Stack) -> str:
             "coefficients": [
                 [float(f"{c:.10g}") for c in row] for row in balloon.coefficients.tolist()
             ],
+            **_cells(balloon),
         }
         for balloon in stack.maps
     ]

@@ -48,6 +48,16 @@ class MapRange:
         return np.asarray(self.within[cells[0], cells[1]])
 
 
+def scaled_range(made: BalloonMap) -> MapRange:
+    """Return where a map holds, by the map that it was stiffened from: heights are equal at equal
+    pressure over modulus.
+    """
+    base = made.base or made
+    covered = map_range(base)
+    ratio = made.scale_pressure / base.scale_pressure
+    return MapRange(ratio * covered.pressures, covered.heights, covered.within)
+
+
 @lru_cache(maxsize=64)
 def map_range(made: BalloonMap) -> MapRange:
     """Return where a map is within MOST_ERROR of balloons between plates, as far as checked.

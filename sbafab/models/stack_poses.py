@@ -23,7 +23,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.map_range import map_range
+from sbafab.models.map_range import scaled_range
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
 from sbafab.models.stack_loads import (
@@ -269,11 +269,11 @@ class PosedStack:
 
     def within(self, pose: Pose) -> bool:
         """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
-        plates, as far as ``map_range`` checked.
+        plates, as far as ``map_range`` checked. It takes up to seconds the first time.
         """
         pressures = np.asarray(pose.pressures)
         return all(
-            bool(map_range(self.maps[kind]).holds(pressures, gaps).all())
+            bool(scaled_range(self.maps[kind]).holds(pressures, gaps).all())
             for kind, gaps in zip(self.levels, pose.gaps, strict=True)
         )
 
