@@ -215,8 +215,6 @@ def test_a_pose_tells_whether_maps_hold_for_it() -> None:
     three = sbafab.stack("3dof-15mm")
     pose = three.pose((10.0, 5.0, 8.0))
     assert three.within(pose)
-    # Far higher than balloons without pressure stand.
-    pulled = replace(pose, pressures=(0.0, 0.0, 0.0), gaps=np.full((15, 3), 1.8))
-    covered = map_range(three.maps[0])
-    assert three.within(pulled) == bool(covered.holds(0.0, 1.8))
-    assert three.within(replace(pulled, gaps=np.full((15, 3), 0.6)))
+    # Beyond the map's largest height nothing was checked.
+    high = replace(pose, gaps=np.full((15, 3), 1.05 * three.maps[0].most_height))
+    assert not three.within(high)
