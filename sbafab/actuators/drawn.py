@@ -276,7 +276,7 @@ class DrawnDesign(Design):
         if asked is not None:
             mechanism = Mechanism(asked.kind, asked.direction, asked.friction)
         words = "laminate of drawn layers"
-        return Form(words, stacks, Drawn(), self.lumen, self.lumen_pin, wrap, mechanism)
+        return Form(words, stacks, Drawn(), self.lumen, self.lumen_pin, wrap, mechanism, True)
 
     @property
     def lumen_pin(self) -> float | None:

@@ -345,6 +345,7 @@ class Form:
     ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
     same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
     ``lumen_pin`` its dowel pin's; ``mechanism`` what drawn pockets do, where the design says so.
+    ``is_drawn``: every layer is drawn, so that the paper's handling times do not carry over.
     """
 
     words: str
@@ -354,6 +355,7 @@ class Form:
     lumen_pin: float | None = None
     wrap: Wrap | None = None
     mechanism: Mechanism | None = None
+    is_drawn: bool = False
 
     @property
     def is_parallel(self) -> bool:

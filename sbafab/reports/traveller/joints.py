@@ -12,6 +12,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import FoldStep, SeamStep
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
+from sbafab.reports.traveller.lay_up import face_down
 
 WIDEST = 90.0
 """mm: the longer side of a picture on the page."""
@@ -68,9 +69,8 @@ def _seams(work: Work) -> Iterator[JointPage]:
 def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
     for index in step.adds:
         layer = work.laminate.layer(index)
-        face = ", upper face down" if layer.turned else ""
-        role = layer.role.replace("-", " ")
-        yield Action(f"Lay layer {index}: {layer.film.material} {role}{face}, by eye.", (index,))
+        what = f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}"
+        yield Action(f"Lay layer {index}: {what}{face_down(layer)}, by eye.", (index,))
     yield Action(
         f"Try the {step.tool} on scrap of the same films until the seam holds and is "
         f"{units.millimetres(step.width_mm)} wide; write temperature, speed and pressure above."

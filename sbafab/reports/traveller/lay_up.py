@@ -98,6 +98,16 @@ class Things:
         return films[-1] if films else self.laminate.layer(thing[-1])
 
 
+def face_down(layer: Layer) -> str:
+    """Return which face of a layer is laid down, ", tpu face down"; empty for a film laid as it
+    was cut whose faces do not differ.
+    """
+    upper, lower = layer.faces
+    if upper != lower:
+        return f", {lower} face down"
+    return ", upper face down" if layer.turned else ""
+
+
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
     """Return the lowest separator mask among layers round one axis that reaches out to one side.
 

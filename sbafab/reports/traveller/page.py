@@ -61,6 +61,9 @@ def context(work: Work) -> dict[str, Any]:
     laminate, job = work.laminate, work.job
     text = record_text(laminate.name, job.design_sha256, job.generator)
     other_marks = _other_marks(work)
+    # A drawing's notes say how it is laid up; what other families note is to be trimmed.
+    is_drawn = work.design.form.is_drawn
+    notes = tuple(f"{note.rstrip('.')}." for note in laminate.notes)
     return {
         **frame(laminate.name, job.design_sha256, job.generator),
         "work": work,
@@ -89,6 +92,8 @@ def context(work: Work) -> dict[str, Any]:
         "laser_minutes": bill.laser_minutes(work),
         "laser_basis": bill.laser_basis(work),
         "lay_up": _lay_up(work),
+        "lay_up_notes": notes if is_drawn else (),
+        "trim_notes": () if is_drawn else notes,
         "force_notes": _force_notes(work),
         "plate_holes": base_plate.holes(work),
         "plate_notes": base_plate.plate_notes(work),

@@ -23,7 +23,14 @@ from sbafab.reports.traveller import bench, units
 from sbafab.reports.traveller.base_plate import punch
 from sbafab.reports.traveller.bench import HeatBlank, closing, reseat, underlay
 from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.traveller.lay_up import PiecePlace, Things, over_tab, pitch, places
+from sbafab.reports.traveller.lay_up import (
+    PiecePlace,
+    Things,
+    face_down,
+    over_tab,
+    pitch,
+    places,
+)
 from sbafab.reports.traveller.shapes import (
     Bed,
     Picture,
@@ -278,7 +285,8 @@ def _turned(laminate: Laminate, layers: Sequence[int]) -> str:
 def _named(layer: Layer) -> str:
     pieces = len(layer.profile.pieces)
     loose = f" in {pieces} pieces" if pieces > 1 else ""
-    return f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}{loose}"
+    role = layer.role.replace("-", " ")
+    return f"{layer.film.material} {role} {layer.pattern}{loose}{face_down(layer)}"
 
 
 def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
