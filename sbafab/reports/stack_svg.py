@@ -123,6 +123,7 @@ class StackSection:
     ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
     ``lumen`` is the axis of the actuator along the plane, where there is a lumen. ``cropped``
     says that what lies beyond ``low`` is not shown. ``tab`` runs from the outline to its mouth.
+    ``is_bored``: the chamber's axis runs through bores.
     """
 
     chamber: str
@@ -137,6 +138,7 @@ class StackSection:
     break_above: int
     rods: tuple[Rod, ...]
     folds: tuple[FoldEnd, ...] = ()
+    is_bored: bool = True
 
 
 def chamber_section(laminate: Laminate) -> StackSection:
@@ -176,6 +178,7 @@ def chamber_section(laminate: Laminate) -> StackSection:
         break_above,
         tuple(rod for rod in rods(laminate, origin, direction) if rod.span[0] > crop),
         tuple(_fold_ends(laminate, slabs, origin, direction)),
+        bool(laminate.bores),
     )
 
 
@@ -404,10 +407,10 @@ def _rod(rod: Rod, view: StackView) -> list[str]:
 
 def _heading(laminate: Laminate, view: StackView) -> list[str]:
     along = "its inlet" if laminate.chambers else "x"
+    scale = f"Height exaggerated {view.factor}{draw.TIMES}" if view.factor > 1 else "To scale"
     content = (
         f"Section through {view.section.chamber} along {along}. "
-        f"Height exaggerated {view.factor}{draw.TIMES}, {coord(laminate.thickness)} in all "
-        "(nominal). All dimensions in mm."
+        f"{scale}, {coord(laminate.thickness)} in all (nominal). All dimensions in mm."
     )
     return [
         draw.text((10.0, 13.0), laminate.name, size=4.6, bold=True),
@@ -713,7 +716,8 @@ def _bore(section: StackSection) -> StackLabel | None:
     for slab in section.slabs:
         through = opening(slab.spans, 0.0)
         if not slab.layer.is_mask and through is not None:
-            return _in_slab(f"bore ⌀{length(through[1] - through[0])}", 0.0, slab)
+            name = "bore ⌀" if section.is_bored else "opening "
+            return _in_slab(f"{name}{length(through[1] - through[0])}", 0.0, slab)
     return None
 
 
