@@ -20,3 +20,28 @@ def test_notes_of_a_drawn_design_head_its_lay_up(sheet_files: Any) -> None:
     lay_up = words_of(tree.get_element_by_id("lay-up").getparent())
     assert "Note: Coated sides face each other: the base's up, the cap's down. Repeat" in lay_up
     assert tree.xpath("//*[@id='trim']") == []
+
+
+def test_a_fold_is_placed_on_the_loose_part(sheet_files: Any) -> None:
+    tree = page(sheet_files, "folded")
+    (fold,) = [step for step in tree.findall(".//article") if "Fold of layers" in words_of(step)]
+    words = words_of(fold)
+    # The line is at y = -12 and the mouth at y = 24 of the design, which is not on the page.
+    assert "fold 36.0 mm from the tab's end of half 1." in words
+    assert "Fold half 2 up along the line and over onto half 1" in words
+    assert "-12" not in words
+    (picture,) = fold.xpath(".//*[local-name()='svg']")
+    assert [text for text in ("half 1", "half 2", "36.0") if text not in words_of(picture)] == []
+    assert picture.xpath(".//*[@stroke-dasharray]")
+    assert "Never turn a part over but for folds" in words_of(tree)
+
+
+def test_a_seam_names_its_file_and_its_beginning(sheet_files: Any) -> None:
+    tree = page(sheet_files, "folded")
+    left, right = [words_of(s) for s in tree.findall(".//article") if ": Seam " in words_of(s)]
+    assert "Follow the path (layers/seam_001_left.dxf)" in left
+    assert "Follow the path (layers/seam_002_right.dxf)" in right
+    # From (-19, -13) on films with their lower left corner at (-20, -12).
+    start = "1.0 mm right of the films' left edge and 1.0 mm below their lower edge"
+    assert start in left
+    assert "heat-proof mat" in left

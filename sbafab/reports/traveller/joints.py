@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from sbafab.geometry.region import chain_data, coord, path_data
+from sbafab.cutting.seam_files import seam_path
+from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.region import Region, chain_data, coord, path_data, union
 from sbafab.laminate.films import ink
-from sbafab.laminate.joints import Seam
+from sbafab.laminate.folding import distance_from, unfolded
+from sbafab.laminate.joints import Fold, Seam
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import FoldStep, SeamStep
+from sbafab.pressing.schedule import SeamStep, layers_in_words
+from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.traveller.lay_up import face_down
+from sbafab.reports.traveller.lay_up import EQUAL, face_down
+from sbafab.reports.traveller.shapes import Picture, label
+from sbafab.reports.traveller.shapes import flat as flat_matrix
 
 WIDEST = 90.0
 """mm: the longer side of a picture on the page."""
+RIM, PAST_FOLD, NUMBER = 5.0, 3.0, 3.5
+"""mm on the page: free round a picture, of a fold line past the part, and letters of numbers."""
+HOT_TIP = (
+    "Lay the films on a heat-proof mat, such as silicone or glass cloth with PTFE, and a release "
+    "film of PTFE over them: the tip runs on that. (Our advice, not tried.)"
+)
+START = 0.9
+"""mm on the page: radius of the dot where a path begins."""
 SEAM_INK, PATH_INK = "#d1495b", "#1a1a1a"
 
 
@@ -71,44 +87,146 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
         layer = work.laminate.layer(index)
         what = f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}"
         yield Action(f"Lay layer {index}: {what}{face_down(layer)}, by eye.", (index,))
+    if step.tool == "hot-tip":
+        yield Action(HOT_TIP)
     yield Action(
         f"Try the {step.tool} on scrap of the same films until the seam holds and is "
         f"{units.millimetres(step.width_mm)} wide; write temperature, speed and pressure above."
     )
+    seam = next(seam for seam in work.laminate.seams if seam.name == step.seam)
+    path = seam_path(seam)
     yield Action(
-        "Follow the path of the picture (seam file of layers/) with the middle of the tool, once, "
-        "without a stop."
+        f"Print {path} at 1:1 and check a length of it with a rule, or mark its path on the films: "
+        f"it begins at the dot of the picture, {_start_words(work.laminate, step.layers, seam)}."
     )
+    yield Action(f"Follow the path ({path}) with the middle of the tool, once, without a stop.")
     yield Action("Look along the seam: no gap, no hole, nothing bonded beside it.")
 
 
+def _start_words(laminate: Laminate, layers: Sequence[int], seam: Seam) -> str:
+    """Return where a path begins from the left and lower edge of the films in hand."""
+    x, y = seam.path[0][0].start
+    low_x, low_y, *_ = _box([laminate.layer(index).profile for index in layers])
+    across = f"{_apart(x - low_x)} {'right' if x >= low_x else 'left'} of the films' left edge"
+    return f"{across} and {_apart(y - low_y)} {'above' if y >= low_y else 'below'} their lower edge"
+
+
+def _apart(distance: float) -> str:
+    return f"{abs(distance):.1f} mm"
+
+
 def _folds(work: Work) -> Iterator[JointPage]:
+    by_layers = {(fold.lower, fold.upper): fold for fold in work.laminate.folds}
     for step in work.schedule.folds:
+        flat = _opened(work.laminate, by_layers[step.layers])
+        lower, upper = step.layers
+        masks = range(lower + 1, upper)
+        laid = f" Lay {layers_in_words(tuple(masks))} on half {lower}." if masks else ""
+        face = face_down(work.laminate.layer(lower))
+        words = f"{flat.lengths[0]:.1f} mm from {flat.ends[0]}"
         yield JointPage(
             step.step,
             step.title,
             step.reason,
-            (("Fold line", _line_words(step)),),
+            (("Fold line", f"{words}, and {flat.lengths[1]:.1f} mm from {flat.ends[1]}"),),
             (),
-            "",
+            _fold_picture(work.laminate, flat, f"fold-{step.step}"),
             (
-                Action(step.instructions, tuple(range(step.layers[0], step.layers[1] + 1))),
+                Action(f"Lay the flat part down as in the picture{face}.{laid}"),
+                Action(f"Mark the fold line with a pen: fold {words}."),
+                Action(
+                    f"Fold half {upper} up along the line and over onto half {lower}, which stays "
+                    "where it lies.",
+                    tuple(range(lower, upper + 1)),
+                ),
                 Action("Press the fold down with a fingertip; both edges lie on each other."),
             ),
         )
 
 
-def _line_words(step: FoldStep) -> str:
-    (x, y), (u, v) = step.line_mm
-    return f"from x {x:.3f}, y {y:.3f} to x {u:.3f}, y {v:.3f}"
+class _Opened(NamedTuple):
+    """Two halves of a film opened about their fold line, which lies along x through (0, 0).
+
+    The lower half lies above the line on the page. ``lengths`` are those of the lower and the upper
+    half square to the line, mm, and ``ends`` words for where they end.
+    """
+
+    fold: Fold
+    halves: tuple[Region, Region]
+    lengths: tuple[float, float]
+    ends: tuple[str, str]
+
+
+def _opened(laminate: Laminate, fold: Fold) -> _Opened:
+    (x0, y0), (x1, y1) = fold.line
+    degrees = math.degrees(math.atan2(y1 - y0, x1 - x0))
+    lower, upper = (laminate.layer(index).profile for index in (fold.lower, fold.upper))
+    flat = lower, unfolded(upper, [fold.line])
+    above, below = (half.moved(-x0, -y0).turned(-degrees) for half in flat)
+    lengths = above.bounds[3], -below.bounds[1]
+    tabs = [distance_from(fold.line, inlet.mouth) for inlet in laminate.inlets]
+
+    def end(index: int, length: float) -> str:
+        is_tab = any(abs(length - tab) < EQUAL for tab in tabs)
+        return f"the tab's end of half {index}" if is_tab else f"the far edge of half {index}"
+
+    ends = end(fold.lower, lengths[0]), end(fold.upper, lengths[1])
+    return _Opened(fold, (above, below), lengths, ends)
+
+
+def _fold_picture(laminate: Laminate, flat: _Opened, name: str) -> str:
+    """Return the flat part from above: the fold line dash-dot, both halves' numbers and lengths."""
+    low_x, low_y, high_x, high_y = _box(flat.halves)
+    scale = min(WIDEST / max(high_x - low_x, high_y - low_y), 4.0)
+    width, height = scale * (high_x - low_x) + 4 * RIM, scale * (high_y - low_y) + 2 * RIM
+    picture = Picture(name, width, height, f"flat part of {_names(flat)}, fold line dash-dot")
+
+    def at(x: float, y: float) -> Point:
+        return RIM + scale * (x - low_x), RIM + scale * (high_y - y)
+
+    colours = ink(laminate.layer(flat.fold.lower).film)
+    matrix = " ".join(map(coord, flat_matrix(scale, at(0.0, 0.0))))
+    for half in flat.halves:
+        picture.add(
+            f'<path d="{path_data(half)}" transform="matrix({matrix})" fill="{colours.fill}" '
+            'fill-rule="evenodd"/>',
+        )
+    whole = union(flat.halves)
+    picture.add(
+        f'<path d="{path_data(whole)}" transform="matrix({matrix})" fill="none" '
+        f'stroke="{colours.line}" stroke-width="{coord(0.22 / scale)}"/>'
+    )
+    (left, y), (right, _) = at(low_x, 0.0), at(high_x, 0.0)
+    ends = f"M{coord(left - PAST_FOLD)} {coord(y)}L{coord(right + PAST_FOLD)} {coord(y)}"
+    picture.add(f'<path d="{ends}" {draw.fold_style()}/>')
+    numbers = flat.fold.lower, flat.fold.upper
+    for number, way, length in zip(numbers, (1, -1), flat.lengths, strict=True):
+        middle = (low_x + high_x) / 2
+        picture.add(label(at(middle, way * length / 2), f"half {number}", NUMBER))
+        far = at(high_x, way * length)
+        tips = (far, (right, y)) if way > 0 else ((right, y), far)
+        picture.add(*draw.dimension(*tips, f"{length:.1f}", (1.0, 0.0), RIM))
+    return picture.svg()
+
+
+def _names(flat: _Opened) -> str:
+    return f"halves {flat.fold.lower} and {flat.fold.upper}"
+
+
+def _box(regions: Sequence[Region]) -> Bounds:
+    boxes = [region.bounds for region in regions]
+    return (
+        min(box[0] for box in boxes),
+        min(box[1] for box in boxes),
+        max(box[2] for box in boxes),
+        max(box[3] for box in boxes),
+    )
 
 
 def _picture(laminate: Laminate, words: str, layers: tuple[int, ...], seam: Seam) -> str:
     """Return the films in hand from above, the seam as wide as it is, and its path."""
     stack = [laminate.layer(index) for index in layers]
-    boxes = [layer.profile.bounds for layer in stack] + [seam.region.bounds]
-    low_x, low_y = min(box[0] for box in boxes), min(box[1] for box in boxes)
-    high_x, high_y = max(box[2] for box in boxes), max(box[3] for box in boxes)
+    low_x, low_y, high_x, high_y = _box([*(layer.profile for layer in stack), seam.region])
     margin = 0.03 * max(high_x - low_x, high_y - low_y)
     width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
     scale = min(WIDEST / max(width, height), 4.0)
@@ -118,11 +236,13 @@ def _picture(laminate: Laminate, words: str, layers: tuple[int, ...], seam: Seam
         for layer in stack
     )
     path = "".join(chain_data(chain) for chain in seam.path)
+    x, y = map(coord, seam.path[0][0].start)
     box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
     return (
         f'<svg class="picture" role="img" aria-label="{words}" viewBox="{box}" '
         f'width="{coord(width * scale)}mm" height="{coord(height * scale)}mm">'
         f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.2 / scale)}">'
         f'{films}<path d="{path_data(seam.region)}" fill="{SEAM_INK}" fill-opacity="0.5"/>'
-        f'<path d="{path}" fill="none" stroke="{PATH_INK}"/></g></svg>'
+        f'<path d="{path}" fill="none" stroke="{PATH_INK}"/>'
+        f'<circle cx="{x}" cy="{y}" r="{coord(START / scale)}" fill="{PATH_INK}"/></g></svg>'
     )
