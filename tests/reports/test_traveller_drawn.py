@@ -45,3 +45,19 @@ def test_a_seam_names_its_file_and_its_beginning(sheet_files: Any) -> None:
     start = "1.0 mm right of the films' left edge and 1.0 mm below their lower edge"
     assert start in left
     assert "heat-proof mat" in left
+
+
+def test_the_papers_actuator_is_not_on_other_pages(sheet_files: Any) -> None:
+    folded = words_of(page(sheet_files, "folded"))
+    assert "faced up in the press" not in folded
+    assert "balloons of 5 mm" not in folded
+    assert "Handling________ min" in folded
+    assert "Total, one actuator________ min" in folded
+    # From the mouth at 24 to 12, where the seams' corners begin to be round.
+    assert "Push the tube in between them, up to 5 mm deep, the inlet's length in" in folded
+    assert "the channel runs straight for 12 mm" in folded
+    paper = words_of(page(sheet_files, "1dof-5mm"))
+    assert "balloons of 5 mm" in paper
+    assert "Handling60 min" in paper
+    # Strips of the array's rows: from the pouch's rim at 9 + 4 mm to the mouth at 22 mm.
+    assert "the channel runs straight for 9 mm" in words_of(page(sheet_files, "array"))

@@ -378,7 +378,16 @@ def _batch(work: Work) -> list[Time]:
 def times(work: Work) -> list[Time]:
     """Return the rows of the time table, the total last but for the paper's."""
     plan = work.schedule
-    handling = plan.hands_minutes
+    # The paper's minutes are those of a stack of balloons.
+    is_drawn = work.design.form.is_drawn
+    handling = None if is_drawn else plan.hands_minutes
+    total = None if is_drawn else plan.estimated_build_minutes
+    basis = (
+        "cutting, lay-up, joining, tubes: nobody has timed this design"
+        if is_drawn
+        else "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, "
+        "assumed equal for every design"
+    )
     steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
     rows = []
     if plan.steps:
@@ -402,12 +411,11 @@ def times(work: Work) -> list[Time]:
         Time(
             "Handling",
             units.minutes(handling),
-            "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, assumed "
-            "equal for every design",
+            basis,
         ),
         Time(
             "Total, one actuator",
-            units.whole_minutes(plan.estimated_build_minutes),
+            units.whole_minutes(total),
             "not included: heating the press, warming the plate before each clock starts, curing "
             "the adhesive, leak and proof tests",
         ),

@@ -32,12 +32,14 @@ from sbafab.reports.traveller.lay_up import (
     places,
 )
 from sbafab.reports.traveller.shapes import (
+    STATION,
     Bed,
     Picture,
     Round,
     beds,
     inlets_in,
     rounds,
+    straight_run,
 )
 from sbafab.reports.traveller.step_pictures import INKS, build_up_svg, exploded, pin_lines, plan
 
@@ -362,7 +364,10 @@ def _in_inlets(work: Work) -> list[Action]:
         return []
     names = _boxes([inlet.chamber for inlet in inlets])
     diameter = units.millimetres(inlets[0].tube_diameter)
-    straight = units.millimetres(min(inlet.length for inlet in inlets))
+    deep = f"up to {units.millimetres(min(inlet.length for inlet in inlets))} deep: "
+    deep += "the length of the tab's straight run"
+    if work.design.form.is_drawn:
+        deep = _depth(work.laminate)
     masks = [mask for gap in work.laminate.interfaces for mask in gap.masks]
     strip = f"the {masks[-1].film.material} strip lies" if masks else "nothing lies"
     end = [Action("Snip the strip off flush with the tab's end.", (), names)] if masks else []
@@ -370,20 +375,13 @@ def _in_inlets(work: Work) -> list[Action]:
     first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
     return [
         *_each_copy(work, "Fit the tubes"),
-        Action(
-            f"Mark {first} with a pen, on the side that faced up in the press: the base is below."
-        ),
+        Action(f"Mark {first} with a pen, on {_upper_side(work)}."),
         Action(
             f"Cut {units.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
             f"{diameter}, square and without burr, as long as your rig needs."
         ),
         Action(f"Part the two films at the tab's end; {strip} between them.", (), names),
-        Action(
-            f"Push the tube in{beside}, up to {straight} deep: the length of the tab's "
-            "straight run.",
-            (),
-            names,
-        ),
+        Action(f"Push the tube in{beside}, {deep}.", (), names),
         *end,
         Action(
             f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
@@ -393,6 +391,28 @@ def _in_inlets(work: Work) -> list[Action]:
         ),
         Action("Let the adhesive cure as its package says before you pressurise anything."),
     ]
+
+
+def _upper_side(work: Work) -> str:
+    """Return words for the side of a tab that is marked."""
+    if not work.schedule.steps:
+        return "the upper side, on which the highest layer lies"
+    below = "the base is below"
+    if work.design.form.is_drawn:
+        below = f"layer {work.laminate.layers[0].index} is below"
+    return f"the side that faced up in the press: {below}"
+
+
+def _depth(laminate: Laminate) -> str:
+    """Return how deep a tube goes into drawn tabs, and how far the shortest runs straight."""
+    length = min(inlet.length for inlet in laminate.inlets)
+    run = math.floor(min(straight_run(laminate, inlet) for inlet in laminate.inlets) + STATION)
+    if run < length:
+        return f"up to {units.millimetres(length)} deep, the inlet's length in the design"
+    return (
+        f"up to {units.millimetres(length)} deep, the inlet's length in the design; the channel "
+        f"runs straight for {run} mm"
+    )
 
 
 def _each_copy(work: Work, task: str) -> list[Action]:

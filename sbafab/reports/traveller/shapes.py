@@ -152,6 +152,8 @@ def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
 
 
 LONGEST_ROUND = 12
+STATION = 0.1
+"""mm between the depths at which a channel's walls are looked for."""
 INSIDE = 0.1
 """mm inward of its mouth at which a tab is looked for."""
 
@@ -251,3 +253,27 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
             for shape in shapes
         )
     )
+
+
+def straight_run(laminate: Laminate, inlet: Inlet) -> float:
+    """Return how far an inlet's channel runs straight and evenly wide inward from its mouth, mm;
+    0 where no channel begins there.
+    """
+    (x, y), (u, v) = inlet.mouth, inlet.direction
+
+    def at(depth: float, left: float) -> Point:
+        return x - depth * u - left * v, y - depth * v + left * u
+
+    half, aside = inlet.width / 2 - STATION / 2, inlet.width / 2 + STATION / 2
+    void = next(
+        (gap.unbonded for gap in laminate.interfaces if gap.unbonded.contains(at(STATION, 0.0))),
+        None,
+    )
+    depth = 0.0
+    while void is not None:
+        here = depth + STATION
+        inside = all(void.contains(at(here, left)) for left in (-half, half))
+        if not inside or any(void.contains(at(here, left)) for left in (-aside, aside)):
+            break
+        depth = here
+    return depth
