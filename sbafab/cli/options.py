@@ -230,12 +230,23 @@ WAIVE_HELP = {
 }
 WAIVE_CUT = "Write the cut files although this rule fails; they will state it. Repeatable."
 
+
+def _refuse_file(_: click.Context, __: click.Parameter, out: Path) -> Path:
+    """Raises OutputError before anything is computed for a folder that is a file."""
+    # Help and completion do without it.
+    from sbafab.output.swap import refuse_file_as_folder
+
+    refuse_file_as_folder(out)
+    return out
+
+
 out_option = click.option(
     "-o",
     "--out",
     type=click.Path(path_type=Path, readable=False),
     default=Path("out"),
     show_default=True,
+    callback=_refuse_file,
     metavar="OUT",
     help="Folder in which OUT/<name>/ is written.",
 )

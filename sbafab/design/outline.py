@@ -329,12 +329,9 @@ def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
     try:
         drawing = readfile(path)
         return drawing, drawing.modelspace()
-    except Exception as error:
+    except Exception:
         # A damaged file fails anywhere in the parser, with any of the built-in errors.
-        kind = type(error).__name__
-        raise DesignError(
-            f"is not a DXF file that can be read ({kind}); save it again as DXF R2010"
-        ) from None
+        raise DesignError("is not a sound DXF file; save it again as DXF R2010") from None
 
 
 def _refuse_compensated(drawing: Drawing) -> None:

@@ -446,11 +446,10 @@ def _strands(drawn: list[DrawnShape], page: Page) -> Iterator[Strand]:
         text = path_of(shape, page)
         try:
             segments = list(PathData(text))
-        except Exception as error:
+        except Exception:
             # Numbers out of all bounds fail anywhere in the library, with any built-in error.
             raise DesignError(
-                f"holds a <{shape.name}> that cannot be read ({type(error).__name__}); "
-                "draw it again"
+                f"holds a <{shape.name}> that cannot be read; draw it again"
             ) from None
         yield from _subpaths(segments, _placement(matrix, page.across, -page.down))
 

@@ -1,7 +1,6 @@
 """A folder of drawings with a table of layers, and one of chambers, as a design.
 
-``layers.csv`` has a row a layer, bottom to top; ``chambers.csv`` a row a pocket's centre, where the
-laminate has chambers.
+``layers.csv`` has a row a layer, bottom to top; ``chambers.csv`` a row a pocket's centre.
 """
 
 from __future__ import annotations
@@ -77,12 +76,14 @@ def import_table(folder: Path) -> Imported:
             layer = {"layer": drawing[1]} if is_part else {}
             shapes[names[drawing]] = {"file": name, **layer}
         layers.append(_layer(row, names[drawing]))
-    chambers = _chambers(folder / CHAMBERS) if (folder / CHAMBERS).is_file() else []
+    if not (folder / CHAMBERS).is_file():
+        columns = ", ".join(CHAMBER_COLUMNS)
+        raise DesignError(f"{folder} has no {CHAMBERS} (columns {columns}); add it")
     tables: dict[str, Any] = {
         "name": file_name(folder.resolve().name),
         "family": FAMILY,
         "layers": layers,
-        "chambers": chambers,
+        "chambers": _chambers(folder / CHAMBERS),
         "shapes": shapes,
     }
     if (folder / KIT).is_file():
@@ -109,7 +110,8 @@ def read_table(path: Path, columns: Mapping[str, bool]) -> list[CsvRow]:
             )
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, ValueError) as error:
-        raise DesignError(f"{path} cannot be read ({error}); save it as CSV in UTF-8") from None
+        reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+        raise DesignError(f"{path} cannot be read: {reason}; save it as CSV in UTF-8") from None
     lines = text.splitlines()
     head = next((line for line in lines if line.strip()), "")
     separator = max(",;\t", key=head.count)

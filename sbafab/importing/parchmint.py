@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from sbafab.actuators.drawn import FAMILY
 from sbafab.cutting.dxf_write import dxf_text
@@ -22,7 +22,7 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, disc, rectangle, union
-from sbafab.importing.records import Imported, file_name, key_name, named, read_text
+from sbafab.importing.records import Imported, file_name, key_name, named, not_json, read_text
 from sbafab.laminate.netlist import NO_MASK, VIA, Spot, parchmint_labels, parchmint_nets
 
 MM = 0.001
@@ -88,7 +88,7 @@ def import_parchmint(path: Path) -> Imported:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise DesignError(f"{path} is no JSON: {error}; save it again") from None
+        raise not_json(path, error) from None
     try:
         circuit = read_circuit(document, path.stem)
         return _design(circuit)
@@ -365,6 +365,8 @@ def _design(circuit: Circuit) -> Imported:
     low_x, low_y, high_x, high_y = _box(masks.values())
     plain = rectangle((low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN))
     holes, ports = _ports(circuit, frame, numbers, top, remarks)
+    if not any(row.get("kind") == "hole" for row in ports):
+        _refuse_without_holes(circuit)
     films = {n: plain - union(holes.get(n, ())) for n in range(1, top + 1, 2)}
 
     shapes: dict[str, dict[str, Any]] = {}
@@ -507,6 +509,23 @@ def _ports(
                 hole = disc(frame.point(component.centre), _hole(component.radius))
                 holes.setdefault(number, []).append(hole)
     return holes, rows
+
+
+def _refuse_without_holes(circuit: Circuit) -> NoReturn:
+    """Raises DesignError for a circuit that no tube can be joined to."""
+    named_ports = [c.id for c in circuit.components.values() if c.entity == PORT]
+    if not named_ports:
+        raise DesignError("components holds no PORT, so no tube can be joined; add one")
+    unsized = [c.id for c in circuit.components.values() if c.entity == PORT and c.radius is None]
+    if unsized:
+        raise DesignError(
+            f"component {unsized[0]} (PORT) has no params.portRadius, and no other port has a hole "
+            "for a tube; add it, in um"
+        )
+    raise DesignError(
+        f"component {named_ports[0]} (PORT) and all others lie between inner films, which no tube "
+        "reaches; place one on the bottom or the top layer"
+    )
 
 
 def _hole(radius: float) -> float:

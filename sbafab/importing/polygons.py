@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from sbafab.design.files import shown
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, polygon, union
-from sbafab.importing.records import read_text
+from sbafab.importing.records import not_json, read_text
 
 if TYPE_CHECKING:
     import shapely
@@ -85,7 +85,7 @@ def _document(path: Path, text: str) -> Any:
         try:
             return json.loads(text)
         except (ValueError, RecursionError) as error:
-            raise DesignError(f"{path} is no JSON: {error}; save it again") from None
+            raise not_json(path, error) from None
     try:
         import yaml
     except ImportError:

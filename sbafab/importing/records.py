@@ -61,6 +61,16 @@ def _inline(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+def not_json(path: Path, error: ValueError | RecursionError) -> DesignError:
+    """Return the error of a file that is not valid JSON, with the line and column at fault."""
+    where = "its lists and objects are nested too deep"
+    if isinstance(error, json.JSONDecodeError):
+        where = f"line {error.lineno} column {error.colno}: {error.msg.lower()}"
+    elif isinstance(error, ValueError):
+        where = "a number in it is too long"
+    return DesignError(f"{path} is not valid JSON: {where}; correct it, or save it again")
+
+
 def file_name(text: str, fallback: str = "import") -> str:
     """Return a text as a design's name: letters, digits, dot, dash and underscore, up to 64."""
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-._")[:64]

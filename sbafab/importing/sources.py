@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -10,8 +11,8 @@ from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import LAYERS, import_table
 from sbafab.importing.parchmint import import_parchmint
-from sbafab.importing.polygons import POPUPCAD, refuse_without_table
-from sbafab.importing.records import Imported
+from sbafab.importing.polygons import MOST_BYTES, POPUPCAD, refuse_without_table
+from sbafab.importing.records import Imported, not_json, read_text
 from sbafab.laminate.laminate_validator import SCHEMA
 
 
@@ -30,10 +31,20 @@ def import_source(source: Path) -> tuple[str, Imported]:
     for entry in FORMATS:
         if entry.matches(source):
             return entry.name, entry.read(source)
+    if source.suffix.lower() == ".json":
+        _refuse_broken_json(source)
     what = "folder" if source.is_dir() else "file"
     raise DesignError(
         f"{source} is a {what} of no format that is imported: " + "; ".join(f.name for f in FORMATS)
     )
+
+
+def _refuse_broken_json(source: Path) -> None:
+    """Raises DesignError for a file that no program can read as JSON."""
+    try:
+        json.loads(read_text(source, MOST_BYTES))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise not_json(source, error) from None
 
 
 def _has_design(source: Path) -> bool:

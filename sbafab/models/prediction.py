@@ -644,7 +644,10 @@ def _mass(laminate: Laminate) -> Figure | LeftOut:
     return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
 
 
-def _tubes(actuator: Actuator) -> Iterator[Figure]:
+def _tubes(actuator: Actuator) -> Iterator[Figure | LeftOut]:
+    if not actuator.laminate.inlets:
+        yield LeftOut("tube", "it has no inlet strip: tubes are glued on holes of its films")
+        return
     inlet = min(actuator.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     model = Model(
         "half the perimeter",

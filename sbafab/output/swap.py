@@ -45,9 +45,7 @@ def replaced_folder(target: Path) -> Iterator[Path]:
     not an output of this program, or somebody's file among the cut files.
     """
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        _refuse_foreign(target)
-        with FileLock(target.parent / f".{target.name}.lock", timeout=0):
+        with _locked(target):
             _tidy_up(target)
             fresh = Path(
                 tempfile.mkdtemp(prefix=f".{target.name}.", suffix=BEGUN, dir=target.parent)
@@ -60,19 +58,45 @@ def replaced_folder(target: Path) -> Iterator[Path]:
                 put_in_place(fresh, target)
             finally:
                 shutil.rmtree(fresh, ignore_errors=True)
-    except Timeout:
-        raise OutputError(
-            f"another run is writing {target}; wait for it to end or choose another folder with -o"
-        ) from None
     except OutputError:
         raise
     except OSError as error:
         raise _unwritten(target, error.strerror or str(error)) from None
+
+
+@contextlib.contextmanager
+def _locked(target: Path) -> Iterator[None]:
+    """Holds the lock of a folder that may be written. Raises OutputError or OSError."""
+    refuse_file_as_folder(target.parent)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _refuse_foreign(target)
+        lock = FileLock(target.parent / f".{target.name}.lock", timeout=0)
+        lock.acquire()
+    except Timeout:
+        raise OutputError(
+            f"another run is writing {target}; wait for it to end or choose another folder with -o"
+        ) from None
     except (ValueError, NotImplementedError) as error:
         # A path with a NUL; a file system without locks.
         if isinstance(error, SbafabError):
             raise
         raise _unwritten(target, str(error)) from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def refuse_file_as_folder(out: Path) -> None:
+    """Raises OutputError if a folder to write into, or one above it, is a file."""
+    for place in (out, *out.parents):
+        try:
+            is_file = place.is_file()
+        except (OSError, ValueError):
+            continue
+        if is_file:
+            raise OutputError(f"{place} is a file, not a folder; choose a folder with -o")
 
 
 def _unwritten(target: Path, reason: str) -> OutputError:

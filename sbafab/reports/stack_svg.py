@@ -152,6 +152,10 @@ def chamber_section(laminate: Laminate) -> StackSection:
     layers, hidden, break_above = _shown(laminate)
     lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
     patterns = {layer.pattern: layer.profile for layer in layers}
+    if not any(section(region, origin, direction) for region in patterns.values()):
+        # The chamber lies outside every layer: rule sealing names it, the picture has the films.
+        low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
+        origin = ((low_x + high_x) / 2, (low_y + high_y) / 2)
     cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
     ends = [end for spans in cuts.values() for span in spans for end in span]
     low, high = min(ends), max(ends)

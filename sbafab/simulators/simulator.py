@@ -106,6 +106,10 @@ def chamber_pressures(
     Without any it is the ``default`` in all of them; with single ones only, 0 in the others. Raises
     DesignError for a chamber that is not there and a pressure out of range.
     """
+    if not names:
+        raise DesignError(
+            "the design has no chamber, and a simulation fills chambers; add chambers to it"
+        )
     refuse_unknown(names, request.chambers, "pressure")
     in_all = (
         (0.0 if request.chambers else default) if request.pressure is None else request.pressure

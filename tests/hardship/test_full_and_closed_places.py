@@ -155,8 +155,8 @@ def test_something_else_in_the_folders_place(
 @pytest.mark.parametrize(
     ("out", "says"),
     [
-        ("file/out", "not a directory"),
-        ("file", "cannot be written"),
+        ("file/out", "file is a file, not a folder"),
+        ("file", "file is a file, not a folder"),
         ("x" * 300, "file name too long"),
         ("x/" * 3000, "file name too long"),
         ("a\0b", "NUL"),

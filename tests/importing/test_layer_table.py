@@ -221,3 +221,43 @@ def test_yaml_without_pyyaml_names_its_extra(
     (source / "lam.yaml").write_text("id: 1\n")
     monkeypatch.setitem(sys.modules, "yaml", None)
     assert 'pip install "sbafab[yaml]"' in importing(source).output
+
+
+def test_a_folder_without_chambers_csv_names_its_columns(
+    importing: Importing, tmp_path: Path
+) -> None:
+    source = pouch(tmp_path)
+    (source / "chambers.csv").unlink()
+    output = importing(source).output
+    assert "drawn pouch has no chambers.csv (columns name, x, y, mouth_x, mouth_y, angle" in output
+
+
+@pytest.mark.parametrize("content", [b"\x00\xff\xfe" * 500, b"hello\n", b"0\nSECTION\n2\nxx\n"])
+def test_a_damaged_drawing_is_named_without_words_of_python(
+    content: bytes, importing: Importing, tmp_path: Path
+) -> None:
+    source = pouch(tmp_path)
+    (source / "pouch.dxf").write_bytes(content)
+    output = importing(source).output
+    assert "pouch.dxf is not a sound DXF file; save it again" in output
+    assert "Error" not in output
+
+
+def test_a_table_that_is_no_text_is_named_without_words_of_python(
+    importing: Importing, tmp_path: Path
+) -> None:
+    source = pouch(tmp_path)
+    (source / "layers.csv").write_bytes(b"\xff\xfe")
+    output = importing(source).output
+    assert "layers.csv cannot be read: it is not text in UTF-8" in output
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [('{"a": 1,,}', "line 1 column 9"), ('{"components":\n [1,,]}', "line 2 column 5")],
+)
+def test_broken_json_is_named_with_its_place(
+    text: str, place: str, importing: Importing, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.json").write_text(text)
+    assert f"broken.json is not valid JSON: {place}" in importing(tmp_path / "broken.json").output

@@ -147,7 +147,7 @@ def test_the_netlist_of_the_file_matches_the_design(importing: Importing, tmp_pa
     document["connections"][0]["sinks"][0]["component"] = "tank"
     path.write_text(json.dumps(document), encoding="utf-8")
     said = CliRunner().invoke(app, command).output
-    assert re.search("netlist +fail", said), said
+    assert re.search("netlist +fail +1 differences +<= 0 differences", said), said
 
 
 def test_a_layer_that_holds_nothing_is_named(importing: Importing, tmp_path: Path) -> None:
@@ -361,12 +361,51 @@ def test_circuits_of_others_are_wired_as_a_union_of_shapely_says(
     assert is_sound == (not kinds & {"open", "short"})
 
 
-def test_a_circuit_without_chambers_goes_through_to_its_traveller(tmp_path: Path) -> None:
+def circuit_of_ports() -> dict[str, Any]:
     document = circuit()
     document["components"][3] = component("out2", "PORT", [20000, 10000], 3000, "f")
     document["connections"][1]["sinks"][0]["component"] = "out2"
     document["connections"][1]["paths"][0]["sink"]["component"] = "out2"
-    file = written(document, tmp_path).file
+    return document
+
+
+def test_ports_without_a_radius_are_named_with_file_and_key(
+    importing: Importing, tmp_path: Path
+) -> None:
+    document = circuit()
+    for row in document["components"]:
+        row["params"].pop("portRadius", None)
+    path = tmp_path / "circuit.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    output = importing(path).output
+    assert "circuit.json: component in1 (PORT) has no params.portRadius" in output
+    assert "chambers" not in output
+
+
+NO_CHAMBER = {
+    "predict": ("predict", 0, "no inlet strip"),
+    "mesh": ("mesh", 2, "two-channels has no chamber, and these meshes"),
+    "decks": ("generate --decks", 0, "has no chamber"),
+    "calculix": ("simulate --with calculix --export", 2, "the design has no chamber"),
+    "find": ("find --max outline_diameter=50", 2, "the search may change no key"),
+}
+
+
+@pytest.mark.parametrize("name", NO_CHAMBER)
+def test_what_needs_a_chamber_refuses_a_circuit_of_ports(name: str, tmp_path: Path) -> None:
+    file = written(circuit_of_ports(), tmp_path).file
+    command, code, words = NO_CHAMBER[name]
+    verb, *options = command.split()
+    target = tmp_path / ("out.toml" if verb == "find" else "out")
+    ended = CliRunner().invoke(app, [verb, str(file), *options, "-o", str(target)])
+    assert ended.exit_code == code, ended.output
+    assert words in " ".join(ended.output.split())
+    if code:
+        assert ended.exception is None or isinstance(ended.exception, SystemExit)
+
+
+def test_a_circuit_without_chambers_goes_through_to_its_traveller(tmp_path: Path) -> None:
+    file = written(circuit_of_ports(), tmp_path).file
     result = CliRunner().invoke(app, ["generate", str(file), "-o", str(tmp_path)])
     assert result.exit_code == 0, result.output
     folder = tmp_path / "two-channels"

@@ -141,7 +141,14 @@ def test_links_files_and_running_twice_are_refused(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with (
-        pytest.raises(OutputError, match="cannot be written"),
+        pytest.raises(OutputError, match="file is a file, not a folder"),
         replaced_folder(tmp_path / "file" / "run"),
     ):
+        pass
+
+
+def test_an_error_of_the_program_is_none_of_the_disk(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="a defect"), replaced_folder(tmp_path / "run"):
+        raise ValueError("a defect")
+    with replaced_folder(tmp_path / "run"):
         pass

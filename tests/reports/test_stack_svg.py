@@ -9,9 +9,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from click.testing import CliRunner
 from PIL import ImageFont
 
 from sbafab.actuators import build, load_design
+from sbafab.cli import app
+from sbafab.design.files import design_path
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.stack_svg import BOND, chamber_section, opening, stack_svg
 
@@ -197,3 +200,13 @@ def test_a_fold_is_drawn_where_the_section_meets_its_line() -> None:
     svg = stack_svg(laminate)
     assert "fold: the film goes on in its other half" in words_of(svg)
     assert svg.count("stroke-dasharray") == 2
+
+
+def test_a_chamber_beside_all_layers_fails_by_its_rule_and_is_drawn(tmp_path: Path) -> None:
+    text = design_path("pouch").read_text().replace("centres = [[0, 0]]", "centres = [[100, 0]]")
+    (tmp_path / "pouch.toml").write_text(text)
+    ended = CliRunner().invoke(app, ["generate", str(tmp_path / "pouch.toml"), "-o", str(tmp_path)])
+    assert ended.exit_code == 1, ended.output
+    assert "pouch failed: sealing" in " ".join(ended.output.split())
+    assert (tmp_path / "pouch" / "findings.html").is_file()
+    assert not (tmp_path / "pouch" / "layers").exists()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypedDict
 
 import numpy as np
 
+from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import (
     shell_mesh,
@@ -96,6 +97,11 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     Raises DesignError where the settings do not suit the laminate or Netgen is not installed,
     OutputError where a check fails.
     """
+    if not laminate.chambers:
+        raise DesignError(
+            f"{laminate.name} has no chamber, and these meshes hold the faces of chambers; the "
+            "solid in mesh/ of sbafab generate needs none"
+        )
     settings = settings or MeshSettings()
     stack = layup(laminate, settings)
     sheet = thin(stack)

@@ -58,6 +58,8 @@ def round_stack(laminate: Laminate) -> RoundStack:
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
             "shell mesh"
         )
+    if not laminate.chambers:
+        raise DesignError(f"{SUPPORTED}; {laminate.name} has no chamber")
     films = sorted({layer.film.material for layer in laminate.tpe_layers})
     if len(films) > 1:
         raise DesignError(
