@@ -61,3 +61,10 @@ def test_the_papers_actuator_is_not_on_other_pages(sheet_files: Any) -> None:
     assert "Handling60 min" in paper
     # Strips of the array's rows: from the pouch's rim at 9 + 4 mm to the mouth at 22 mm.
     assert "the channel runs straight for 9 mm" in words_of(page(sheet_files, "array"))
+
+
+def test_a_flash_bond_that_bonds_nothing_is_said_to_be_needless(sheet_files: Any) -> None:
+    first, second = [words_of(step) for step in page(sheet_files, "array").findall(".//article")]
+    assert "nothing bonds here" in first
+    assert "nothing bonds here" not in second
+    assert "nothing bonds here" not in words_of(page(sheet_files, "1dof-5mm"))

@@ -98,7 +98,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 tuple(bench.heat_blanks(step, work.schedule.heating)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
-                _place_notes(runs),
+                (*_place_notes(runs), *_loose_notes(work, part)),
                 placed,
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
@@ -144,6 +144,19 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
             "the plate goes to its number in the tray (section Batch)."
         )
     return tuple(notes)
+
+
+def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
+    """Return a note on a flash bond of one drawn film and masks that no pin holds."""
+    layers = [work.laminate.layer(index) for index in part.layers]
+    films = [layer for layer in layers if not layer.is_mask]
+    is_loose = part.bond == "flash" and not part.pins and len(films) < 2
+    if not is_loose or not work.design.form.is_drawn:
+        return ()
+    return (
+        "One film and masks, no pin: nothing bonds here, and masks may come off. You may leave "
+        "this step out and lay its layers in the next step, lowest first. (Our advice, not tried.)",
+    )
 
 
 def _bench_actions(
