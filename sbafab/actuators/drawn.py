@@ -15,9 +15,9 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from sbafab.actuators.shapes import (
     Angle,
     Coordinates,
+    DrawnRow,
     NamedShapes,
     Names,
-    Row,
     ShapeRegions,
     Vertex,
     is_table,
@@ -54,7 +54,7 @@ LayerPair = Annotated[tuple[int, int], Field(strict=False)]
 MOST_LAYERS = 500
 
 
-class DrawnLayer(Row):
+class DrawnLayer(DrawnRow):
     """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
 
     role: Role
@@ -69,7 +69,7 @@ class DrawnLayer(Row):
     """Whether it lies with its upper face down; the upper half of a fold does, by itself."""
 
 
-class DrawnChamber(Row):
+class DrawnChamber(DrawnRow):
     """A chamber, and the inlet strip through which it is filled."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -88,7 +88,7 @@ class DrawnChamber(Row):
     """The chamber gaps that it has pockets in, from 1 at the bottom; all by default."""
 
 
-class DrawnPin(Row):
+class DrawnPin(DrawnRow):
     """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -101,7 +101,7 @@ class DrawnPin(Row):
     """By how much the layers' holes for it are wider."""
 
 
-class DrawnTube(Row):
+class DrawnTube(DrawnRow):
     """The tube that the finished laminate is wrapped round."""
 
     outer_diameter: Length
@@ -114,7 +114,7 @@ class DrawnTube(Row):
     """What holds the sheet round the tube."""
 
 
-class DrawnSeam(Row):
+class DrawnSeam(DrawnRow):
     """A seam: two films bonded by a moving tool along a path."""
 
     name: str = Field(pattern=NAME_PATTERN)
@@ -147,7 +147,7 @@ class DrawnSeam(Row):
         return self
 
 
-class DrawnFold(Row):
+class DrawnFold(DrawnRow):
     """A film folded along a straight line into two layers."""
 
     layers: LayerPair
@@ -162,7 +162,7 @@ class DrawnFold(Row):
         return self
 
 
-class DrawnMechanism(Row):
+class DrawnMechanism(DrawnRow):
     """What the pockets do when they fill, for the closed forms of ``predict``; none by default."""
 
     kind: MechanismKind
@@ -182,7 +182,7 @@ class DrawnMechanism(Row):
         return self
 
 
-class DrawnPort(Row):
+class DrawnPort(DrawnRow):
     """A place in a gap that nets name: a pocket, the end of a channel, or a hole for a tube."""
 
     name: str = Field(pattern=NAME_PATTERN)

@@ -63,7 +63,7 @@ FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",
 """Keys that a shape of this kind may have beside those that it needs."""
 
 
-class Row(Section):
+class DrawnRow(Section):
     """A table in a list or under a name of the user's, which names the keys it does not know."""
 
     @model_validator(mode="before")
@@ -77,7 +77,7 @@ class Row(Section):
         return data
 
 
-class NamedShape(Row):
+class NamedShape(DrawnRow):
     """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one made of others."""
 
     disc: Length | None = None
