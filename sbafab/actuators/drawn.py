@@ -427,6 +427,7 @@ def _check(design: DrawnDesign) -> None:
             "chambers is missing; add a list of {name, centres, mouth, angle}, or a port of kind "
             '"hole" to a net'
         )
+    _check_centres(design)
     names = [chamber.name for chamber in design.chambers]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -466,6 +467,16 @@ def _check(design: DrawnDesign) -> None:
                 f"chambers.{number}.balloons = {strange[0]} is none of the {count} gaps with a "
                 "chamber; they count from 1 at the bottom"
             )
+
+
+def _check_centres(design: DrawnDesign) -> None:
+    """Raises DesignError for a centre given twice."""
+    for chamber in design.chambers:
+        for number, centre in enumerate(chamber.centres):
+            if centre in chamber.centres[:number]:
+                raise DesignError(
+                    f"chambers has the centre {list(centre)} of {chamber.name} twice; remove one"
+                )
 
 
 def _check_order(roles: Sequence[str]) -> None:

@@ -44,7 +44,8 @@ def sentence(
 ) -> str:
     problems = error.errors(include_url=False)
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
-    first = (unknown or problems)[0]
+    wrong = [problem for problem in problems if problem["type"] == "literal_error"]
+    first = (unknown or wrong or problems)[0]
     # Alternatives of a union put their own name in the location; a key is what the file holds.
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = (prefix + ".".join(where)).rstrip(".")
@@ -105,8 +106,8 @@ def _allowed(problem: Any) -> str:
         "string_type": "must be a text in quotes",
         "string_unicode": "must be plain text; remove what is no letter in it",
         "bool_type": "must be true or false",
-        "model_type": "must be a table of keys",
-        "model_attributes_type": "must be a table of keys",
+        "model_type": "must be a table of keys, such as {key = value}",
+        "model_attributes_type": "must be a table of keys, such as {key = value}",
         "tuple_type": "must be a list in brackets",
         "list_type": "must be a list in brackets",
     }
@@ -120,12 +121,15 @@ def _unknown_key(
     families_with_key = [name for name, model in families.items() if field in key_paths(model)]
     if families_with_key:
         return f"{field} is not a key of this family; it belongs to {listed(families_with_key)}"
+    if where[-2:-1] == ["faces"]:
+        return f"{field} is not a key of a film's faces; they are upper and lower"
     paths = key_paths(record)
     siblings = [path for path in paths if path.split(".")[:-1] == list(where[:-1])]
     near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], paths, 0.75)
     if near:
         return f"{field} is not a key of a design file; did you mean {near}?"
-    return f"{field} is not a key of a design file; known here: {', '.join(siblings)}"
+    known = f"; known here: {', '.join(siblings)}" if siblings else ""
+    return f"{field} is not a key of a design file{known}"
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:

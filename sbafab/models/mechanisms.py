@@ -348,7 +348,7 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
         "Narang, Vlassak and Howe, Adv. Funct. Mater. 28 (2018) 1707136",
         f"{count} sheets of {thick:g} mm as one cantilever {length:.4g} x {width:.4g} mm until "
         f"they slip, friction {filled.mechanism.friction:g} as given; the bag's films not "
-        f"counted; {NOT_CALIBRATED}",
+        f"counted; pressures are read as vacuum; {NOT_CALIBRATED}",
     )
     ratio = float(count**2)
     yield Figure("stiffness", f"jammed over loose stiffness{of}", ratio, "", model)
@@ -372,7 +372,7 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
 
 
 PUSH = Model(
-    "pressure x pocket area",
+    "pressure x pocket area; textile pouches pushed with 0.18 of it at 230 kPa",
     "statics of a stiff plate",
     "an upper bound, for a plate that lies flat on the whole pocket and for a wall without "
     "stiffness. Pouches of coated textile, 8 mm at 1 mm gaps, pushed with 2.1 N at 230 kPa (arXiv "
