@@ -77,8 +77,8 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
     "paths.svg": (lambda: svg('<path d="M0 0L1 1"/>' * (SIZE // 20)), "more than 2000 elements"),
     "groups.svg": (lambda: svg("<g>" * 100_000 + "</g>" * 100_000), "more than 2000 elements"),
     "deep.svg": (lambda: svg("<g>" * 1900 + "</g>" * 1900), "no closed path"),
-    "closings.svg": (lambda: svg(f'<path d="M0 0{"z" * SIZE}"/>'), "more than 500 edges"),
-    "path.svg": (lambda: svg(f'<path d="M0 0{"L1 1" * (SIZE // 4)}"/>'), "more than 500 edges"),
+    "closings.svg": (lambda: svg(f'<path d="M0 0{"z" * SIZE}"/>'), "more than 5000 edges"),
+    "path.svg": (lambda: svg(f'<path d="M0 0{"L1 1" * (SIZE // 4)}"/>'), "more than 5000 edges"),
     "style.svg": (lambda: svg(f"<style>{'a{b:c}' * (SIZE // 6)}</style>"), "long style sheet"),
     "turns.svg": (
         lambda: svg(f'<path transform="{"rotate(1)" * (SIZE // 9)}" d="M0 0L1 1"/>'),
