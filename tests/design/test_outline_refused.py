@@ -172,8 +172,8 @@ def test_an_svg_that_is_no_outline_is_refused(tmp_path: Path, name: str) -> None
 
 
 BAD_FILES = {
-    "text.dxf": (b"not a drawing", "not a DXF file"),
-    "cut_short.dxf": (b"0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n", "not a DXF file"),
+    "text.dxf": (b"not a drawing", "not a sound DXF file"),
+    "cut_short.dxf": (b"0\nSECTION\n2\nENTITIES\n0\nCIRCLE\n", "not a sound DXF file"),
     "large.dxf": (b"0" * 5_000_001, "5,000,001 bytes"),
     "picture.png": (b"", r"neither \.dxf nor \.svg"),
     "page.svg": (b"<html/>", "not an SVG"),
