@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +19,7 @@ from sbafab.actuators.drawn import FAMILY
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.files import shown
 from sbafab.errors import DesignError
-from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.edges import Line, Point, box_round
 from sbafab.geometry.offset import swept
 from sbafab.geometry.region import Region, disc, rectangle, union
 from sbafab.importing.records import Imported, file_name, key_name, named, not_json, read_text
@@ -362,7 +362,7 @@ def _design(circuit: Circuit) -> Imported:
         raise DesignError("no layer holds anything; there is nothing to import")
     numbers = {layer: 2 * i + 2 for i, layer in enumerate(masks)}
     top = 2 * len(masks) + 1
-    low_x, low_y, high_x, high_y = _box(masks.values())
+    low_x, low_y, high_x, high_y = box_round([mask.bounds for mask in masks.values()])
     plain = rectangle((low_x - MARGIN, low_y - MARGIN), (high_x + MARGIN, high_y + MARGIN))
     holes, ports = _ports(circuit, frame, numbers, top, remarks)
     if not any(row.get("kind") == "hole" for row in ports):
@@ -433,16 +433,6 @@ def _middle(circuit: Circuit) -> Point:
         raise DesignError("components and connections are empty; there is nothing to import")
     (xs, ys) = zip(*points, strict=True)
     return round((min(xs) + max(xs)) / 2), round((min(ys) + max(ys)) / 2)
-
-
-def _box(regions: Iterable[Region]) -> tuple[float, float, float, float]:
-    boxes = [region.bounds for region in regions]
-    return (
-        min(box[0] for box in boxes),
-        min(box[1] for box in boxes),
-        max(box[2] for box in boxes),
-        max(box[3] for box in boxes),
-    )
 
 
 def _mask(circuit: Circuit, layer: str, frame: _Frame) -> Region:

@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Literal, get_args
 
 from sbafab.geometry.cache import cached_attribute
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, coord, divided, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.laminate.folding import flat_part, fold_roots, unfolded
@@ -348,13 +348,7 @@ class Laminate:
     @cached_attribute
     def bounds(self) -> Bounds:
         """Least x, least y, largest x, largest y of all layers, mm."""
-        boxes = [layers[0].profile.bounds for layers in self.patterns.values()]
-        return (
-            min(box[0] for box in boxes),
-            min(box[1] for box in boxes),
-            max(box[2] for box in boxes),
-            max(box[3] for box in boxes),
-        )
+        return box_round([layers[0].profile.bounds for layers in self.patterns.values()])
 
     def layer(self, index: int) -> Layer:
         """The layer with this index, counted from 1 at the bottom."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.cutting.seam_files import seam_path
-from sbafab.geometry.edges import Bounds, Point
+from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, chain_data, coord, path_data, union
 from sbafab.laminate.films import ink
 from sbafab.laminate.folding import distance_from, unfolded
@@ -214,13 +214,7 @@ def _names(flat: _Opened) -> str:
 
 
 def _box(regions: Sequence[Region]) -> Bounds:
-    boxes = [region.bounds for region in regions]
-    return (
-        min(box[0] for box in boxes),
-        min(box[1] for box in boxes),
-        max(box[2] for box in boxes),
-        max(box[3] for box in boxes),
-    )
+    return box_round([region.bounds for region in regions])
 
 
 def _picture(laminate: Laminate, words: str, layers: tuple[int, ...], seam: Seam) -> str:
