@@ -254,6 +254,12 @@ class Films(Section):
         return self.__pydantic_extra__ or {}
 
     @property
+    def face_names(self) -> frozenset[str]:
+        """What the faces of structural films are of; a film without faces has its own name."""
+        bonding = {name: film for name, film in self.stock.items() if film.kind != "mask"}
+        return frozenset(face for name, film in bonding.items() for face in film.faces or (name,))
+
+    @property
     def stock(self) -> dict[str, Film]:
         """Every film by the name of its table: TPE, PTFE, then the others."""
         tpe, ptfe = self.tpe, self.ptfe

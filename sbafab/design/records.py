@@ -167,8 +167,19 @@ class Design(Section):
 
     @property
     def stated_bonds(self) -> tuple[FaceBond, ...]:
-        """Which faces bond, and by what; none where nothing is said of it."""
+        """Which faces bond, and by what; none where nothing is said of it.
+
+        Raises DesignError for a face that no film has.
+        """
         bonds = {} if self.face_bonds is None else self.face_bonds.by_name
+        faces = self.films.face_names if bonds else frozenset()
+        for name, bond in bonds.items():
+            strange = next((face for face in bond.faces if face not in faces), None)
+            if strange is not None:
+                raise DesignError(
+                    f"face_bonds.{name}.faces names {shown(strange)}, a face that no film has; "
+                    f"there are {listed(sorted(faces))}"
+                )
         return tuple(
             FaceBond(name, bond.faces, bond.by, bond.temperature_c, bond.after)
             for name, bond in bonds.items()

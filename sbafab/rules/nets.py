@@ -698,11 +698,13 @@ def _openings(
         is_good = pressure <= limit * (1 + 1e-9)
         message = (
             f"the channel of net {worst.net} that is hardest to open is {worst.width.value:.3f} mm "
-            f"wide, at interface {worst.interface} ({at(worst.width.middle)}), and takes "
-            f"{pressure:.3g} kPa to lift a film by its thickness (clamped plate)"
+            f"wide, at interface {worst.interface} ({at(worst.width.middle)}), and opens by a "
+            f"film's thickness at {pressure:.3g} kPa (clamped plate)"
         )
         if not is_good:
-            message += f"; it may take {limit:g}: widen it there"
+            message += (
+                f"; the limit is {limit:g} kPa: widen it there, or raise rules.opening_pressure_kpa"
+            )
         measured = pressure if math.isfinite(pressure) else None
         verdict: Literal["pass", "fail"] = "pass" if is_good else "fail"
         yield Finding(NAME, verdict, limit, measured, "kPa", place, message)

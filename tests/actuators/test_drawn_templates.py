@@ -10,6 +10,7 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.files import read_toml, template_names, template_text, templates_folder
+from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.meshing.conforming.meshes import conforming_meshes
 from sbafab.meshing.solid import MASKLESS_GAP, cavity, solid
@@ -127,3 +128,11 @@ def test_the_grippers_right_cavity_goes_through_its_via() -> None:
     lower, upper = 16 * 14, 3 * (24 - 2.5) + 3 * 25 + 3 * 4
     expected = 0.025 * (lower + upper) + 0.1 * math.pi * 0.52**2
     assert cavity(laminate, right, 1e-4).volume == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_face_that_no_film_has_is_named() -> None:
+    design = load_design("array", ['face_bonds.coatings.faces=["tpuu", "tpu"]'])
+    with pytest.raises(
+        DesignError, match=r"faces names 'tpuu', a face .* \"nylon\", \"tpe\", \"tpu\""
+    ):
+        build(design)
