@@ -48,6 +48,8 @@ BALLOONS = (6, 8, 10, 12, 15)
 LEANS, MODES = (0.003, 0.03, 0.2), (0.5, 1.0)
 """Leans of a level in rad, and waves along the column, from which buckled columns are sought."""
 LEAST_LEAN = 1e-3
+LEAST_BUCKLED = 0.2
+"""N; whether the search finds a column that hardly pushes depends on rounding."""
 
 
 def table() -> Table:
@@ -148,7 +150,7 @@ def columns() -> Iterator[list[str]]:
 
 def _column(whole: Stack, share: float, sticks: bool) -> tuple[Pose, Pose | None]:
     """Return a column that a plate holds at a share of the full stroke while straight, and the
-    stable buckled one of least energy, if the search finds one.
+    stable buckled one of least energy, if the search finds one that pushes by ``LEAST_BUCKLED``.
     """
     stroke = share * SHORT * len(whole.levels) / paper.BALLOONS
     plate = Plate((0.0, 0.0, whole.flat_height + stroke), sticks=sticks)
@@ -166,7 +168,8 @@ def _column(whole: Stack, share: float, sticks: bool) -> tuple[Pose, Pose | None
                 continue
             if pose.stable and np.abs(pose.freedoms[:, 1:]).max() > LEAST_LEAN:
                 buckled.append((pose.energy - paper.FORCE_KPA * float(pose.volumes.sum()), pose))
-    return straight, min(buckled, key=lambda pair: pair[0])[1] if buckled else None
+    best = min(buckled, key=lambda pair: pair[0])[1] if buckled else None
+    return straight, best if best is not None and best.force >= LEAST_BUCKLED else None
 
 
 def supply(whole: Stack) -> Iterator[list[str]]:

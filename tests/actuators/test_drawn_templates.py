@@ -69,6 +69,17 @@ def test_each_has_a_volume_mesh_with_open_chambers(name: str) -> None:
     assert all(len(faces[f"cavity_{chamber.name}"]) for chamber in laminate.chambers)
 
 
+def test_a_chamber_ends_where_a_hole_leads_to_the_next_one_of_its_net() -> None:
+    """The mask's area times its thickness; the via's own air, 0.06 mm3, is in neither."""
+    laminate = build(load_design("diode"))
+    volume = conforming_meshes(laminate, MeshSettings(h=1.0, gaps=True)).volume
+    base = laminate.layers[0].profile
+    masks = [layer for layer in laminate.layers if layer.is_mask]
+    for name, mask in zip(("in", "out"), masks, strict=True):
+        expected = (mask.profile & base).area * mask.film.thickness
+        assert volume.cavity(name)[0].volume == pytest.approx(expected, rel=2e-3)
+
+
 def test_a_pouch_without_a_mask_has_a_cavity_that_its_fold_closes() -> None:
     """36 mm between seams x 22.5 mm to half a millimetre from the fold, and the inlet: 2 x 13."""
     laminate = build(load_design("folded"))

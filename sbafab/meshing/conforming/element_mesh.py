@@ -223,6 +223,41 @@ def mouth_patch(
     return np.array(triangles, dtype=np.int64).reshape(-1, 3)
 
 
+def lids(
+    layup: Layup, swept: Sweep, void: MeshedVoid, beyond: NDArray[np.int64]
+) -> list[NDArray[np.int64]]:
+    """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
+
+    Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's. Raises
+    OutputError where the film ends at the hole.
+    """
+    of_holes = []
+    for k, cells in sorted(void.under.items()):
+        for ply, level, is_above in ((k - 1, swept.upper[k - 1], False), (k, swept.lower[k], True)):
+            hole = cells & ~layup.plies[ply].cells
+            if ply in void.in_films:
+                hole &= ~void.in_films[ply]
+            triangles, sides = bordering(hole, ~hole, beyond)
+            nodes = layup.plane.triangles[triangles]
+            rows = np.arange(len(nodes))
+            starts, ends = nodes[rows, sides], nodes[rows, (sides + 1) % 3]
+            after = dict(zip(starts.tolist(), zip(nodes[rows, 3 + sides].tolist(), ends.tolist())))
+            while after:
+                rim = [next(iter(after))]
+                while rim[-1] in after:
+                    rim += after.pop(rim[-1])
+                lid = level[rim[:-1]]
+                if lid.min() < 0:
+                    x, y = layup.plane.points[rim[int(lid.argmin())]]
+                    raise OutputError(
+                        f"Layer {layup.plies[ply].layer.index} ends at x {x:.3f}, y {y:.3f} beside "
+                        "a pocket; let the film go on round its hole."
+                    )
+                fan = [(lid[0], p, q) for p, q in pairwise(lid[1:])]
+                of_holes.append(np.array(fan)[:, :: 1 if is_above else -1])
+    return of_holes
+
+
 SQUARE_PARTS = ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7))
 
 
@@ -466,7 +501,9 @@ def _with_sets(stack: Layup, swept: Sweep) -> Mesh:
             named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
         if stack.sector is None:
             walls = flat_triangles("triangle6", swept.prisms, faces)[:, ::-1]
-            cavities[name] = np.concatenate([walls, *patches])
+            cavities[name] = np.concatenate(
+                [walls, *patches, *lids(stack, swept, void, beyond)]
+            )
     films, sections, thickness = _shell_cell_sets(stack, swept)
     return Mesh(
         "shell",
@@ -534,7 +571,9 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
             named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
         if stack.sector is None:
             walls = flat_triangles(kind, cells, faces)[:, ::-1]
-            cavities[name] = np.concatenate([walls, *patches])
+            cavities[name] = np.concatenate(
+                [walls, *patches, *lids(stack, swept, void, beyond)]
+            )
     cell_sets, expected = _cell_sets(
         stack, swept, 3 if is_tet else 1, [form.growth for form in forms]
     )
