@@ -240,8 +240,8 @@ def lids(
             triangles, sides = bordering(hole, ~hole, beyond)
             nodes = layup.plane.triangles[triangles]
             rows = np.arange(len(nodes))
-            starts, ends = nodes[rows, sides], nodes[rows, (sides + 1) % 3]
-            after = dict(zip(starts.tolist(), zip(nodes[rows, 3 + sides].tolist(), ends.tolist())))
+            ends = nodes[rows, sides], nodes[rows, 3 + sides], nodes[rows, (sides + 1) % 3]
+            after = {a: (middle, b) for a, middle, b in np.column_stack(ends).tolist()}
             while after:
                 rim = [next(iter(after))]
                 while rim[-1] in after:
@@ -501,9 +501,7 @@ def _with_sets(stack: Layup, swept: Sweep) -> Mesh:
             named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
         if stack.sector is None:
             walls = flat_triangles("triangle6", swept.prisms, faces)[:, ::-1]
-            cavities[name] = np.concatenate(
-                [walls, *patches, *lids(stack, swept, void, beyond)]
-            )
+            cavities[name] = np.concatenate([walls, *patches, *lids(stack, swept, void, beyond)])
     films, sections, thickness = _shell_cell_sets(stack, swept)
     return Mesh(
         "shell",
@@ -571,9 +569,7 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
             named_nodes[f"inlet_{name}"] = np.unique(np.concatenate(patches))
         if stack.sector is None:
             walls = flat_triangles(kind, cells, faces)[:, ::-1]
-            cavities[name] = np.concatenate(
-                [walls, *patches, *lids(stack, swept, void, beyond)]
-            )
+            cavities[name] = np.concatenate([walls, *patches, *lids(stack, swept, void, beyond)])
     cell_sets, expected = _cell_sets(
         stack, swept, 3 if is_tet else 1, [form.growth for form in forms]
     )
