@@ -5,14 +5,32 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
 from sbafab.cli.printing import console, print_json, print_verdict
-from sbafab.output.schema_ids import RECORDS_SCHEMA, REPORT_SCHEMA
-from sbafab.results.recording import built_from, found_by, read_batch
+from sbafab.output.schema_ids import CHAIN_SCHEMA, RECORDS_SCHEMA, REPORT_SCHEMA
+from sbafab.results.history import (
+    ENTRY_FIELDS,
+    Entry,
+    StoredEntry,
+    entries_of,
+    read_history,
+    unchecked_entry,
+)
+from sbafab.results.recording import (
+    Row,
+    all_rows,
+    built_from,
+    found_by,
+    matching,
+    read_batch,
+    record_history,
+    row_number,
+    row_words,
+)
 from sbafab.results.recording import record as record_results
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
 from sbafab.results.report import Comparison, Promise, Report, report
@@ -66,6 +84,48 @@ def _measurement_options(command: Command) -> Command:
     return command
 
 
+def _row_key(
+    context: click.Context, parameter: click.Parameter, value: str | None
+) -> tuple[bool, int] | None:
+    """Return whether a number such as e3 is that of an entry of history, and the number."""
+    match = re.fullmatch(r"(e?)(\d{1,9})", value or "")
+    if value is not None and match is None:
+        raise click.BadParameter(f"{value!r} is no record such as 3 and no entry such as e3")
+    return None if match is None else (match[1] == "e", int(match[2]))
+
+
+def _history_options(command: Command) -> Command:
+    """Add the options of a device's history."""
+    options = (
+        click.option(
+            "--entry",
+            multiple=True,
+            metavar="TEXT",
+            help="A line of the device's history: 'step=1 temperature_c=134 initials=AL'. Fields: "
+            f"{', '.join(ENTRY_FIELDS)}. Repeatable.",
+        ),
+        click.option(
+            "--history",
+            type=click.Path(path_type=Path),
+            metavar="FILE",
+            help="Lines of history from the filled record page: CSV, TOML or JSON.",
+        ),
+        click.option("--verify", is_flag=True, help="Compute the hash chain of all rows again."),
+        click.option(
+            "--head", default="", metavar="HASH", help="With --verify: a head noted earlier."
+        ),
+        click.option(
+            "--export",
+            type=click.Path(path_type=Path, dir_okay=False),
+            metavar="FILE",
+            help="Write the history of all devices, or of --find or --serial: CSV, JSON or PDF.",
+        ),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
 @click.command()
 @click.argument("design", metavar="[DESIGN]", required=False)
 @click.option(
@@ -79,12 +139,18 @@ def _measurement_options(command: Command) -> Command:
     help="Table with a row for each actuator, instead of --serial and measurements.",
 )
 @click.option("--again", is_flag=True, help="A new attempt, after a repair.")
-@click.option("--correct", type=int, metavar="N", help="Add a record that corrects record N.")
-@click.option("--withdraw", is_flag=True, help="With --correct: withdraw record N.")
+@click.option(
+    "--correct",
+    callback=_row_key,
+    metavar="N",
+    help="Add a record that corrects record N, or entry N, such as e3.",
+)
+@click.option("--withdraw", is_flag=True, help="With --correct: withdraw record or entry N.")
 @click.option(
     "--find", metavar="TEXT", help="Show the records of a serial, a design or a scanned code."
 )
 @click.option("--report", is_flag=True, help="Report on all records.")
+@_history_options
 @click.option(
     "--lab",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -108,41 +174,158 @@ def record(
 
     \b
     sbafab record 3dof-15mm --serial A1 --leak pass --stroke 16.8
+    sbafab record 3dof-15mm --serial A1 --entry "step=1 temperature_c=134 minutes=20"
     sbafab record 3dof-15mm --table batch.csv
     sbafab record --report
+    sbafab record --verify
     """  # noqa: D301 (click reads the backspace as a mark)
     store = Lab(lab)
     _one_task(design, values)
     if values["report"]:
         print_report(report(*store.contents()), as_json)
+    elif values["verify"]:
+        _verify(store, values["head"], as_json)
+    elif values["export"] is not None:
+        _export(store, values)
     elif values["find"] is not None:
-        records, builds = store.contents()
-        matches = found_by(values["find"], values["serial"], records, builds)
-        print_records(matches, records, builds, as_json, f"found in {lab}")
+        _find(store, values, as_json)
     else:
-        if values["correct"] is not None:
-            added = [store.correct(values["correct"], _change(values))]
-        else:
-            added = _add_records(store, str(design), assignments, values)
-        print_records(added, added, store.contents()[1], as_json, f"added to {lab}")
+        _store(store, design, assignments, values, as_json)
+
+
+TASKS = ("report", "find", "correct", "verify", "export")
 
 
 def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
     """Raise UsageError unless the options name exactly one task."""
-    tasks = [name for name in ("report", "find", "correct") if values[name] not in (None, False)]
-    if len(tasks) > 1 or (tasks and (design or values["table"])):
-        raise click.UsageError("give only one of DESIGN, --correct, --find and --report")
+    tasks = [name for name in TASKS if values[name] not in (None, False)]
+    if tasks == ["find", "export"]:
+        tasks = ["export"]
+    is_filled = values["table"] or values["history"]
+    if len(tasks) > 1 or (tasks and (design or is_filled)):
+        names = ", ".join(f"--{name}" for name in sorted(TASKS)[:-1])
+        raise click.UsageError(f"give only one of DESIGN, {names} and --{sorted(TASKS)[-1]}")
     if not tasks and design is None:
         raise click.UsageError("give the DESIGN that was built, --find or --report")
     if values["again"] and tasks:
         raise click.UsageError("--again goes with DESIGN, --serial and results")
     if values["withdraw"] and values["correct"] is None:
         raise click.UsageError("--withdraw goes with --correct N")
+    if values["head"] and not values["verify"]:
+        raise click.UsageError("--head goes with --verify")
+    _one_kind(tasks, values)
+
+
+def _one_kind(tasks: Sequence[str], values: Mapping[str, Any]) -> None:
+    """Raise UsageError where measurements stand beside what leaves no room for them."""
     has_result = not _result(values).is_empty or values["operator"] or values["kit"]
-    if (has_result or (values["serial"] and values["report"])) and tasks not in ([], ["correct"]):
+    is_shown = tasks not in ([], ["correct"])
+    if is_shown and (has_result or values["entry"] or (values["serial"] and values["report"])):
         raise click.UsageError(f"--{tasks[0]} only shows records; leave out the measurements")
     if values["table"] and (has_result or values["serial"]):
         raise click.UsageError("--table holds serials and measurements; leave out their options")
+    if (values["entry"] or values["history"]) and (has_result or values["table"]):
+        raise click.UsageError("record history and results one after the other")
+
+
+def _store(
+    store: Lab,
+    design: str | None,
+    assignments: tuple[str, ...],
+    values: Mapping[str, Any],
+    as_json: bool,
+) -> None:
+    """Store what the options state, and print it."""
+    records: list[Record] = []
+    entries: list[StoredEntry] = []
+    if values["correct"] is not None:
+        is_entry, number = values["correct"]
+        if is_entry:
+            entries = [store.correct_entry(number, _entry_change(values))]
+        else:
+            records = [store.correct(number, _change(values))]
+    elif values["entry"] or values["history"]:
+        lines = _entries(values)
+        built = built_from(str(design), assignments)
+        entries = record_history(store, built, lines, values["again"])
+    else:
+        records = _add_records(store, str(design), assignments, values)
+    shown = Shown(records, entries, records, entries, store.contents()[1])
+    print_records(shown, as_json, f"added to {store.path}")
+
+
+def _entries(values: Mapping[str, Any]) -> list[Entry]:
+    """Return the lines of history that the options state."""
+    serial = {"serial": values["serial"]} if values["serial"] else {}
+    lines: list[Entry] = []
+    for text in values["entry"]:
+        lines += entries_of({**serial, **_pairs(text)}, f"--entry {text!r}")
+    if values["history"] is not None:
+        lines += read_history(values["history"], serial)
+    return lines
+
+
+def _pairs(text: str) -> dict[str, str]:
+    """Return the fields of a line such as ``step=1 reason='leaks at the rim'``."""
+    import shlex
+
+    try:
+        words = shlex.split(text)
+    except ValueError:
+        raise click.UsageError(f"--entry {text!r} has a quotation mark without its other") from None
+    pairs = [word.partition("=")[::2] for word in words]
+    if not all(name and "=" in word for (name, _), word in zip(pairs, words, strict=True)):
+        raise click.UsageError(f"--entry {text!r} must be fields such as step=1 minutes=20")
+    return dict(pairs)
+
+
+def _entry_change(values: Mapping[str, Any]) -> Entry:
+    if len(values["entry"]) > 1 or not (values["entry"] or values["withdraw"]):
+        raise click.UsageError("give one --entry with what is right, or --withdraw")
+    pairs = _pairs(values["entry"][0]) if values["entry"] else {}
+    return unchecked_entry({**pairs, "withdrawn": values["withdraw"]})
+
+
+def _verify(store: Lab, head: str, as_json: bool) -> None:
+    """Print whether the chain holds, and its head; end with code 1 where it does not."""
+    chain = store.check(head)
+    if as_json:
+        print_json({"schema": CHAIN_SCHEMA, "holds": not chain.broken, **chain.as_dict()})
+    elif chain.broken:
+        click.echo(f"broken: {chain.broken}")
+    else:
+        click.echo(f"head {chain.head}")
+        if head:
+            click.echo(f"the noted head is in the chain; {chain.later} rows were added since")
+        if chain.adopted:
+            click.echo(
+                f"{chain.adopted} rows are older than the chain: it covers them from the day on "
+                "which they were linked"
+            )
+    if not as_json:
+        verdict = "does not hold" if chain.broken else "holds"
+        print_verdict(f"{store.path}: the chain of {chain.links} rows {verdict}")
+    if chain.broken:
+        raise SystemExit(1)
+
+
+def _export(store: Lab, values: Mapping[str, Any]) -> None:
+    from sbafab.results.export import lab_history, write_history
+
+    history = lab_history(store, values["find"] or "", values["serial"])
+    write_history(history, values["export"])
+    count = len(history.devices)
+    print_verdict(f"{values['export']}: {count} device{'s' if count != 1 else ''}")
+
+
+def _find(store: Lab, values: Mapping[str, Any], as_json: bool) -> None:
+    records, builds = store.contents()
+    entries = store.entries()
+    lines = matching(values["find"], values["serial"], entries, builds)
+    find = matching if lines else found_by
+    matches = find(values["find"], values["serial"], records, builds)
+    shown = Shown(matches, lines, records, entries, builds)
+    print_records(shown, as_json, f"found in {store.path}")
 
 
 def _result(values: Mapping[str, Any]) -> LabResult:
@@ -195,44 +378,70 @@ FACTORS = {"height_mm": ("--press-factor", 1.0), "force_n": ("--contact-factor",
 """Options of ``sbafab predict`` for a measured ratio, and its largest value."""
 
 
-def print_records(
-    shown: Sequence[Record],
-    every: Sequence[Record],
-    builds: Mapping[str, Build],
-    as_json: bool,
-    action: str,
-) -> None:
-    """Print a line for each record, with its corrections, and their count with ``action``."""
-    newer = {record.corrects: record.id for record in every if record.corrects is not None}
+class Shown(NamedTuple):
+    """Records and entries to print, all those among which corrections are looked for, designs."""
+
+    records: Sequence[Record]
+    entries: Sequence[StoredEntry]
+    all_records: Sequence[Record]
+    all_entries: Sequence[StoredEntry]
+    builds: Mapping[str, Build]
+
+    def newer(self) -> dict[str, str]:
+        """Return the number of the row that corrects another, by the number of that."""
+        return {
+            row_number(row, row.corrects): row_number(row)
+            for row in all_rows(self.all_records, self.all_entries)
+            if row.corrects is not None
+        }
+
+
+def print_records(shown: Shown, as_json: bool, action: str) -> None:
+    """Print a line for each record and entry, and their count with ``action``."""
+    newer = shown.newer()
     if as_json:
-        rows = [
-            {**record.as_dict(), "design": builds[record.design_sha256].name}
-            | {"corrected_by": newer.get(record.id)}
-            | {"actuator_sha256": builds[record.design_sha256].actuator}
-            for record in shown
-        ]
-        print_json({"schema": RECORDS_SCHEMA, "records": rows})
+        print_json({"schema": RECORDS_SCHEMA, **_rows(shown, newer)})
         return
-    for record in shown:
-        click.echo(_line(record, builds[record.design_sha256].name, newer.get(record.id)))
-    count = "1 record" if len(shown) == 1 else f"{len(shown)} records"
-    print_verdict(f"{count} {action}")
+    for row in all_rows(shown.records, shown.entries):
+        click.echo(_line(row, shown.builds[row.design_sha256].name, newer.get(row_number(row))))
+    for entry in shown.entries:
+        if entry.is_expired and not entry.withdrawn:
+            click.echo(
+                f"warning: entry e{entry.id}: {entry.item} lot {entry.lot} expired on "
+                f"{entry.expires}, before {entry.day}"
+            )
+    counts = [(len(shown.records), "record", "records"), (len(shown.entries), "entry", "entries")]
+    words = [f"{n} {name if n == 1 else names}" for n, name, names in counts if n]
+    print_verdict(f"{' and '.join(words)} {action}")
 
 
-def _line(record: Record, design: str, newer: int | None) -> str:
-    parts = [f"{name} {value}" for name, value in record.once.items()]
-    parts += [
-        f"{name} {' '.join(f'{v:g}' for v in errors)}" for name, errors in record.errors.items()
-    ]
-    parts += [record.note] if record.note else []
-    parts += [f"attempt {record.attempt}"] if record.attempt > 1 else []
-    parts += [f"corrects {record.corrects}"] if record.corrects is not None else []
-    parts += ["withdrawn"] if record.withdrawn else []
+def _rows(shown: Shown, newer: Mapping[str, str]) -> dict[str, Any]:
+    def row(stored: Row) -> dict[str, Any]:
+        build = shown.builds[stored.design_sha256]
+        number = newer.get(row_number(stored), "").removeprefix("e")
+        return {
+            **stored.as_dict(),
+            "design": build.name,
+            "corrected_by": int(number) if number else None,
+            "actuator_sha256": build.actuator,
+        }
+
+    return {
+        "records": [row(record) for record in shown.records],
+        "entries": [row(entry) for entry in shown.entries],
+    }
+
+
+def _line(row: Row, design: str, newer: str | None) -> str:
+    parts = [row_words(row)]
+    parts += [f"attempt {row.attempt}"] if row.attempt > 1 else []
+    parts += [f"corrects {row_number(row, row.corrects)}"] if row.corrects is not None else []
+    parts += ["withdrawn"] if row.withdrawn else []
     parts += [f"corrected by {newer}"] if newer is not None else []
-    name = f"{design} {record.design_sha256[:8]}"
-    return (
-        f"record {record.id}, {record.recorded}: {name}, serial {record.serial}: {', '.join(parts)}"
-    )
+    kind = "entry" if isinstance(row, StoredEntry) else "record"
+    name = f"{design} {row.design_sha256[:8]}"
+    words = ", ".join(part for part in parts if part)
+    return f"{kind} {row_number(row)}, {row.recorded}: {name}, serial {row.serial}: {words}"
 
 
 def print_report(report: Report, as_json: bool) -> None:

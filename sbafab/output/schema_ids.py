@@ -5,6 +5,8 @@ from __future__ import annotations
 RUN_SCHEMA = "sbafab/run@1"
 NESTED_SCHEMA = "sbafab/nested@1"
 RECORDS_SCHEMA = "sbafab/records@1"
+HISTORY_SCHEMA = "sbafab/history@1"
+CHAIN_SCHEMA = "sbafab/chain@1"
 REPORT_SCHEMA = "sbafab/report@1"
 SWEEP_SCHEMA = "sbafab/sweep@1"
 MAP_SCHEMA = "sbafab/balloon-map@1"

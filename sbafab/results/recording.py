@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.files import assembly_sha256, load
@@ -16,6 +16,7 @@ from sbafab.design.files import Change
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
+from sbafab.results.history import Entry, StoredEntry
 from sbafab.results.records import (
     COLUMNS,
     ERRORS,
@@ -54,15 +55,29 @@ def record(
     DesignError.
     """
     if isinstance(built, Design):
-        sha256, kit = design_sha256(built), kit_name(built)
+        kit = kit_name(built)
     else:
-        sha256 = assembly_sha256(built)
         kit = ", ".join(dict.fromkeys(kit_name(part.design) for part in built.designs))
     results = [replace(result, kit=result.kit or kit) for result in results]
-    if lab.knows(sha256, GENERATOR):
-        return lab.add(sha256, None, results, is_again)
-    promise = promised(built) if isinstance(built, Design) else promised_assembly(built)
+    sha256, promise = _promise(lab, built)
     return lab.add(sha256, promise, results, is_again)
+
+
+def record_history(
+    lab: Lab, built: Design | Assembled, entries: Sequence[Entry], is_again: bool = False
+) -> list[StoredEntry]:
+    """Store lines of the history of devices of a built design; all or none. Raises DesignError."""
+    sha256, promise = _promise(lab, built)
+    return lab.add_entries(sha256, promise, entries, is_again)
+
+
+def _promise(lab: Lab, built: Design | Assembled) -> tuple[str, Build | None]:
+    """Return the hash of what was built, and its promises where the lab does not know them yet."""
+    if isinstance(built, Design):
+        sha256 = design_sha256(built)
+        return sha256, None if lab.knows(sha256, GENERATOR) else promised(built)
+    sha256 = assembly_sha256(built)
+    return sha256, None if lab.knows(sha256, GENERATOR) else promised_assembly(built)
 
 
 def results_of(values: Mapping[str, Any], table: str | Path | None = None) -> list[LabResult]:
@@ -188,14 +203,38 @@ def _number(text: str, column: str, where: str) -> float:
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
 
 
+Row = Record | StoredEntry
+"""What is stored of a device."""
+Stored = TypeVar("Stored", Record, StoredEntry)
+
+
+def all_rows(records: Sequence[Record], entries: Sequence[StoredEntry]) -> list[Row]:
+    """Return entries and records in one list, entries first, as the work goes."""
+    return [*entries, *records]
+
+
 def found_by(
     text: str, serial: str, records: Sequence[Record], builds: Mapping[str, Build]
 ) -> list[Record]:
-    """Return the records of the design whose hash (eight digits or more of it) the text holds.
+    """Return the records that ``matching`` returns. Raises DesignError where there are none."""
+    matches = matching(text, serial, records, builds)
+    if not matches:
+        query = " ".join([*text.split(), serial]).strip()[:60]
+        raise DesignError(
+            f"no record goes with {query!r}; give a serial, a design's name, 8 "
+            "digits or more of its sha256, or what the traveller's code says"
+        )
+    return matches
+
+
+def matching(
+    text: str, serial: str, stored: Sequence[Stored], builds: Mapping[str, Build]
+) -> list[Stored]:
+    """Return the rows of the design whose hash (eight digits or more of it) the text holds.
 
     With them come those of other designs that build the same actuator. Else those of a serial or of
     a design of that name, or the one of that number; of these only those of ``serial``, if one is
-    given. Raises DesignError where there are none.
+    given.
     """
     text = text.strip()
     hashes = _HASH.findall(text.lower())
@@ -204,18 +243,42 @@ def found_by(
         for build in builds.values()
         if any(h.startswith(part) for part in hashes for h in (build.sha256, build.actuator))
     }
-    matches = [record for record in records if builds[record.design_sha256].actuator in actuators]
+    matches = [row for row in stored if builds[row.design_sha256].actuator in actuators]
     if not matches:
         matches = [
-            record
-            for record in records
-            if text in (record.serial, builds[record.design_sha256].name, str(record.id))
+            row
+            for row in stored
+            if text in (row.serial, builds[row.design_sha256].name, row_number(row))
         ]
-    matches = [record for record in matches if serial in ("", record.serial)]
-    if not matches:
-        query = " ".join([*text.split(), serial]).strip()[:60]
-        raise DesignError(
-            f"no record goes with {query!r}; give a serial, a design's name, 8 "
-            "digits or more of its sha256, or what the traveller's code says"
-        )
-    return matches
+    return [row for row in matches if serial in ("", row.serial)]
+
+
+def row_number(row: Row, number: int | None = None) -> str:
+    """Return the number of a record, such as 3, or of an entry of history, such as e3.
+
+    ``number`` is that of another row of its kind.
+    """
+    sign = "e" if isinstance(row, StoredEntry) else ""
+    return f"{sign}{row.id if number is None else number}"
+
+
+def row_words(row: Row) -> str:
+    """Return what a row states, in one line; units stand in the names."""
+    if isinstance(row, Record):
+        parts = [f"{name} {value}" for name, value in row.once.items()]
+        parts += [
+            f"{name} {' '.join(f'{v:g}' for v in sizes)}" for name, sizes in row.errors.items()
+        ]
+        return ", ".join([*parts, *([row.note] if row.note else [])])
+    parts = [
+        row.day,
+        f"step {row.step}" if row.step else "",
+        f"{row.item} lot {row.lot}" if row.lot else row.item,
+        f"expires {row.expires}" if row.expires else "",
+        *(f"{name} {value:g}" for name, value in row.readings.items()),
+        f"{row.decision}: {row.reason}" if row.reason else row.decision,
+        f"photograph {row.photograph[:12]}" if row.photograph else "",
+        row.note,
+        f"initials {row.initials}" if row.initials else "",
+    ]
+    return ", ".join(part for part in parts if part)

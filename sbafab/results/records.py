@@ -25,7 +25,7 @@ from sbafab.version import GENERATOR
 PASS, FAIL = "pass", "fail"
 LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
 """Characters of a text."""
-_UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class Measurand(NamedTuple):
@@ -154,20 +154,21 @@ def checked(result: LabResult, where: str = "") -> LabResult:
             raise DesignError(
                 f"{place}{name} has {len(text)} characters; at most {LONGEST[name]} are kept"
             )
-        if _UNWRITABLE.search(text):
+        if UNWRITABLE.search(text):
             raise DesignError(f"{place}{name} must be plain text in one line")
     if result.leak not in ("", PASS, FAIL):
         raise DesignError(f"{place}leak is {result.leak[:40]!r}; write {PASS} or {FAIL}")
     for quantity in NUMBERS:
         if quantity.name in result.numbers:
-            _check(quantity, result.numbers[quantity.name], place, "above 0")
+            check_number(quantity, result.numbers[quantity.name], place, "above 0")
     for quantity in ERRORS:
         for value in result.errors.get(quantity.name, ()):
-            _check(quantity, value, place, "0 or more, without sign")
+            check_number(quantity, value, place, "0 or more, without sign")
     return replace(result, **texts)
 
 
-def _check(quantity: Measurand, value: float, place: str, least: str) -> None:
+def check_number(quantity: Measurand, value: float, place: str, least: str) -> None:
+    """Raise DesignError for a number that is not ``least`` or is over the quantity's largest."""
     is_low = value < 0 or (value == 0 and least == "above 0")
     if not math.isfinite(value) or is_low or value > quantity.most:
         raise DesignError(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import sqlite3
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -24,11 +24,29 @@ from sbafab.design.identity import actuator_sha256
 from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.output.checked import limits
+from sbafab.results.history import (
+    CHAINED,
+    ENTRY_TEXTS,
+    READING_NAMES,
+    ChainCheck,
+    Entry,
+    Link,
+    StoredEntry,
+    add_links,
+    chain_links,
+    check_chain,
+    checked_entry,
+    is_stored_photograph,
+    lost_photographs,
+    photograph_folder,
+    standing_entries,
+    with_photograph,
+)
 from sbafab.results.records import ERRORS, NUMBERS, Build, LabResult, Record, checked
 from sbafab.rules.registration_yield import Share, simulate
 
 APPLICATION = 0x5BAFAB
-VERSION = 2
+VERSION = 3
 PATIENCE = 10.0
 """Seconds that a writer waits for others."""
 
@@ -64,12 +82,41 @@ CREATE TABLE result (
 );
 CREATE INDEX item ON result (design_sha256, serial);
 """
-_ADDED = (
-    "ALTER TABLE design ADD COLUMN actuator_sha256 TEXT NOT NULL DEFAULT ''",
-    "ALTER TABLE result ADD COLUMN attempt INTEGER NOT NULL DEFAULT 1",
-    "ALTER TABLE result ADD COLUMN proof_kpa REAL",
+_ENTRY = (
+    *("id", "recorded", "design_sha256", "corrects", "withdrawn", "attempt"),
+    *(*ENTRY_TEXTS, *READING_NAMES),
 )
-"""What version 2 added to version 1."""
+_ADDED = {
+    2: (
+        "ALTER TABLE design ADD COLUMN actuator_sha256 TEXT NOT NULL DEFAULT ''",
+        "ALTER TABLE result ADD COLUMN attempt INTEGER NOT NULL DEFAULT 1",
+        "ALTER TABLE result ADD COLUMN proof_kpa REAL",
+    ),
+    3: (
+        f"""CREATE TABLE entry (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    recorded TEXT NOT NULL,
+    design_sha256 TEXT NOT NULL,
+    corrects INTEGER UNIQUE REFERENCES entry (id),
+    withdrawn INTEGER NOT NULL,
+    attempt INTEGER NOT NULL,
+    {", ".join(f"{name} TEXT NOT NULL" for name in ENTRY_TEXTS)},
+    {", ".join(f"{name} REAL" for name in READING_NAMES)}
+)""",
+        "CREATE INDEX device ON entry (design_sha256, serial)",
+        """CREATE TABLE chain (
+    id INTEGER PRIMARY KEY,
+    source TEXT NOT NULL,
+    row TEXT NOT NULL,
+    adopted INTEGER NOT NULL,
+    content_sha256 TEXT NOT NULL,
+    previous TEXT NOT NULL UNIQUE,
+    sha256 TEXT NOT NULL,
+    UNIQUE (source, row)
+)""",
+    ),
+}
+"""What each version added to the one before."""
 _KEPT = """
 CREATE TRIGGER {name} BEFORE {what} BEGIN
     SELECT RAISE(ABORT, 'records are never changed; add one that corrects');
@@ -87,6 +134,18 @@ _TRIGGERS = {
     "result_twice": "INSERT ON result WHEN EXISTS "
     "(SELECT 1 FROM result WHERE id = NEW.id OR corrects = NEW.corrects)",
 }
+_TRIGGERS_ADDED = {
+    **{
+        f"{table}_{verb}": f"{verb} ON {table}"
+        for table in ("entry", "chain")
+        for verb in ("UPDATE", "DELETE")
+    },
+    "entry_twice": "INSERT ON entry WHEN EXISTS "
+    "(SELECT 1 FROM entry WHERE id = NEW.id OR corrects = NEW.corrects)",
+    "chain_twice": "INSERT ON chain WHEN EXISTS (SELECT 1 FROM chain WHERE id = NEW.id "
+    "OR previous = NEW.previous OR (source = NEW.source AND row = NEW.row))",
+}
+"""Of version 3."""
 
 Clock = Callable[[], datetime]
 
@@ -131,15 +190,81 @@ class Lab:
             added = []
             for result in map(checked, results):
                 live = _live(rows, sha256, result.serial)
-                attempt = max((record.attempt for record in live), default=0)
-                if is_again and not live:
-                    raise DesignError(
-                        f"serial {result.serial} has no record yet, so there is no attempt before "
-                        "this one; leave out --again, or see: sbafab record --find"
-                    )
-                attempt = attempt + 1 if is_again else max(attempt, 1)
+                attempt = _attempt(rows, sha256, result.serial, is_again)
                 added.append(self._put(rows, sha256, result, None, attempt, live))
             return added
+
+    def add_entries(
+        self,
+        sha256: str,
+        build: Build | None,
+        entries: Sequence[Entry],
+        is_again: bool = False,
+    ) -> list[StoredEntry]:
+        """Store lines of the history of devices of a design, all or none, as ``add`` does.
+
+        Photographs are copied into the folder beside the lab's file first.
+        """
+        if is_again and not self.path.exists():
+            raise OutputError(f"{self.path} does not exist, so there is no attempt before this one")
+        entries = [with_photograph(self.path, checked_entry(entry)) for entry in entries]
+        with self._writing() as rows:
+            if build is not None and not _is_known(rows, build.sha256, build.generator):
+                _put_build(rows, build)
+            serials = dict.fromkeys(entry.serial for entry in entries)
+            attempts = {serial: _attempt(rows, sha256, serial, is_again) for serial in serials}
+            return [
+                self._put_entry(rows, sha256, entry, None, attempts[entry.serial])
+                for entry in entries
+            ]
+
+    def correct_entry(self, number: int, change: Entry) -> StoredEntry:
+        """Store an entry that repeats ``number`` but for what ``change`` states."""
+        if not self.path.exists():
+            raise OutputError(f"{self.path} does not exist, so there is no entry to correct")
+        with self._writing() as rows:
+            stored = {entry.id: entry for entry in _entries(rows)}
+            if number not in stored:
+                raise DesignError(f"{self.path} holds no entry {number}; see: sbafab record --find")
+            newer = [entry.id for entry in stored.values() if entry.corrects == number]
+            if newer:
+                raise DesignError(
+                    f"entry e{number} is corrected by e{newer[0]} already; correct that one"
+                )
+            old = stored[number]
+            entry = with_photograph(self.path, checked_entry(old.changed(change)))
+            return self._put_entry(rows, old.design_sha256, entry, number, old.attempt)
+
+    def entries(self) -> list[StoredEntry]:
+        """All lines of history, those that were corrected too; none in a file of version 2."""
+        with self._reading() as (rows, version):
+            return _entries(rows) if version >= 3 else []
+
+    def links(self) -> list[Link]:
+        """The links of the chain in their order; none in a file of version 2."""
+        with self._reading() as (rows, version):
+            return chain_links(rows) if version >= 3 else []
+
+    def check(self, head: str = "") -> ChainCheck:
+        """Compute the hash chain again, and look for every photograph.
+
+        ``head`` is a hash that was noted earlier, or its first digits. Raises OutputError for a
+        file of version 2, which has no chain until something is recorded in it.
+        """
+        with self._reading() as (rows, version):
+            if version < 3:
+                raise OutputError(
+                    f"{self.path} is older than the hash chain and has none; the next record adds "
+                    "one, which covers the rows from then on"
+                )
+            # A text that is none any more is an edit, not an error.
+            rows.text_factory = lambda raw: raw.decode("utf-8", "backslashreplace")
+            checked_chain = check_chain(rows, head)
+        if not checked_chain.broken:
+            for name in lost_photographs(self.path, self.entries()):
+                lost = photograph_folder(self.path) / name
+                return replace(checked_chain, broken=f"photograph {lost} is missing or was changed")
+        return checked_chain
 
     def correct(self, number: int, change: LabResult) -> Record:
         """Store a record that repeats ``number`` but for what ``change`` states."""
@@ -198,8 +323,33 @@ class Lab:
             f"INSERT INTO result ({', '.join(_RESULT)}) VALUES ({marks})", values
         ).lastrowid
         assert added is not None
+        add_links(rows, "result", str(added))
         stored = _record_numbered(rows, added)
         assert stored is not None
+        return stored
+
+    def _put_entry(
+        self,
+        rows: sqlite3.Connection,
+        sha256: str,
+        entry: Entry,
+        corrects: int | None,
+        attempt: int,
+    ) -> StoredEntry:
+        if corrects is None:
+            _refuse_repeat(rows, entry, attempt)
+        values = (
+            *(self.clock().strftime("%Y-%m-%dT%H:%M:%SZ"), sha256, corrects),
+            *(int(entry.withdrawn), attempt),
+            *(getattr(entry, name) for name in ENTRY_TEXTS),
+            *(entry.readings.get(name) for name in READING_NAMES),
+        )
+        marks = ", ".join("?" * len(values))
+        added = rows.execute(
+            f"INSERT INTO entry ({', '.join(_ENTRY[1:])}) VALUES ({marks})", values
+        ).lastrowid
+        add_links(rows, "entry", str(added))
+        [stored] = _entries(rows, "WHERE id = ?", (added,))
         return stored
 
     @contextmanager
@@ -286,7 +436,7 @@ def _select(version: int = VERSION) -> str:
 
 def _columns(names: Sequence[str], version: int) -> Sequence[str]:
     """The columns to ask for, with what an older file lacks as a constant."""
-    return names if version == VERSION else [_BEFORE.get(name, name) for name in names]
+    return names if version >= 2 else [_BEFORE.get(name, name) for name in names]
 
 
 def _shape(rows: sqlite3.Connection) -> set[tuple[object, ...]]:
@@ -299,8 +449,7 @@ def _shape_of(version: int) -> set[tuple[object, ...]]:
     """Return the tables, indices and triggers of a new file of a version."""
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as rows:
         _make(rows)
-        if version > 1:
-            _bring_up_to_date(rows, 1)
+        _bring_up_to_date(rows, 1, version)
         return _shape(rows)
 
 
@@ -326,14 +475,22 @@ def _reason(error: sqlite3.Error) -> str:
     return _REASONS.get(code, f"cannot be used as a file of records: {error}")
 
 
-def _bring_up_to_date(rows: sqlite3.Connection, version: int) -> None:
-    """Makes tables in an empty file, of version 0, and adds what later versions have."""
+def _bring_up_to_date(rows: sqlite3.Connection, version: int, wanted: int = VERSION) -> None:
+    """Make tables in an empty file, of version 0, and add what later versions have.
+
+    Rows that are older than the hash chain are linked as they stand, as adopted.
+    """
     if version == 0:
         _make(rows)
-    if version < VERSION:
-        for statement in _ADDED:
+    for later in range(max(version, 1) + 1, wanted + 1):
+        for statement in _ADDED[later]:
             rows.execute(statement)
-        rows.execute(f"PRAGMA user_version = {VERSION}")
+        if later == 3:
+            for name, event in _TRIGGERS_ADDED.items():
+                rows.execute(_KEPT.format(name=name, what=event))
+            for source in CHAINED:
+                add_links(rows, source, adopted=True)
+        rows.execute(f"PRAGMA user_version = {later}")
 
 
 def _make(rows: sqlite3.Connection) -> None:
@@ -360,6 +517,7 @@ def _put_build(rows: sqlite3.Connection, build: Build) -> None:
     marks = ", ".join("?" * len(_BUILD))
     values = [*plain, *tables, build.actuator_sha256]
     rows.execute(f"INSERT INTO design ({', '.join(_BUILD)}) VALUES ({marks})", values)
+    add_links(rows, "design", f"{build.sha256} {build.generator}")
 
 
 def _builds(
@@ -379,9 +537,69 @@ def _live(rows: sqlite3.Connection, sha256: str, serial: str) -> list[Record]:
         "AND id NOT IN (SELECT corrects FROM result WHERE corrects IS NOT NULL) ORDER BY id"
     )
     records = [_record(row) for row in rows.execute(standing, (serial,))]
-    hashes = {sha256, *(record.design_sha256 for record in records)}
-    actuators = {build.sha256: build.actuator for build in _builds(rows, VERSION, sorted(hashes))}
+    actuators = _actuators(rows, {sha256, *(record.design_sha256 for record in records)})
     return [r for r in records if actuators[r.design_sha256] == actuators[sha256]]
+
+
+def _attempt(rows: sqlite3.Connection, sha256: str, serial: str, is_again: bool) -> int:
+    """Return the attempt that a record or an entry of a device belongs to."""
+    live = _live(rows, sha256, serial)
+    entries = standing_entries(_entries(rows, "WHERE serial = ?", (serial,)))
+    actuators = _actuators(rows, {sha256, *(entry.design_sha256 for entry in entries)})
+    attempts = [record.attempt for record in live] + [
+        entry.attempt for entry in entries if actuators[entry.design_sha256] == actuators[sha256]
+    ]
+    if is_again and not attempts:
+        raise DesignError(
+            f"serial {serial} has no record yet, so there is no attempt before this one; leave "
+            "out --again, or see: sbafab record --find"
+        )
+    return max(attempts, default=1) + is_again
+
+
+def _actuators(rows: sqlite3.Connection, hashes: Iterable[str]) -> dict[str, str]:
+    """Return the hash that actuators are grouped by, of each design."""
+    return {build.sha256: build.actuator for build in _builds(rows, VERSION, sorted(hashes))}
+
+
+def _entries(
+    rows: sqlite3.Connection, where: str = "", values: Sequence[object] = ()
+) -> list[StoredEntry]:
+    query = f"SELECT {', '.join(_ENTRY)} FROM entry {where} ORDER BY id"
+    return [_entry(row) for row in rows.execute(query, values)]
+
+
+def _entry(row: Sequence[object]) -> StoredEntry:
+    """A row as an entry. Raises _DamagedError."""
+    cells = dict(zip(_ENTRY, row, strict=True))
+    corrects = cells["corrects"]
+    try:
+        entry = StoredEntry(
+            **{name: str(cells[name]) for name in (*ENTRY_TEXTS, "recorded", "design_sha256")},
+            id=int(str(cells["id"])),
+            corrects=None if corrects is None else int(str(corrects)),
+            withdrawn=bool(int(str(cells["withdrawn"]))),
+            attempt=int(str(cells["attempt"])),
+            readings={
+                name: float(str(cells[name])) for name in READING_NAMES if cells[name] is not None
+            },
+        )
+        checked_entry(entry)
+        if entry.photograph and not is_stored_photograph(entry.photograph):
+            raise ValueError(entry.photograph)
+    except _UNLIKELY as error:
+        raise _DamagedError from error
+    return entry
+
+
+def _refuse_repeat(rows: sqlite3.Connection, entry: Entry, attempt: int) -> None:
+    """Raise DesignError for a line that stands already, as of a form that was sent twice."""
+    for stored in standing_entries(_entries(rows, "WHERE serial = ?", (entry.serial,))):
+        if stored.attempt == attempt and stored.states_the_same(entry):
+            raise DesignError(
+                f"serial {entry.serial} has this line already, entry e{stored.id}; leave it out, "
+                "or add a date or a note that tells them apart"
+            )
 
 
 def _build(row: Sequence[str]) -> Build:

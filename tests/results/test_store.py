@@ -144,7 +144,7 @@ def other_program(path: Path) -> None:
 
 def newer(path: Path) -> None:
     with closing(sqlite3.connect(path)) as rows:
-        rows.execute("PRAGMA user_version = 3")
+        rows.execute("PRAGMA user_version = 4")
 
 
 def damaged(path: Path) -> None:
@@ -159,7 +159,7 @@ def damaged(path: Path) -> None:
         (other_program, "is a database of another program"),
         (lambda path: path.write_text("serial,leak\nA1,pass\n" * 50), "is no file of records"),
         (lambda path: path.mkdir(), "cannot be opened"),
-        (newer, r"was written by a newer sbafab \(records of version 3, this one knows 2\)"),
+        (newer, r"was written by a newer sbafab \(records of version 4, this one knows 3\)"),
         (damaged, "is damaged"),
     ],
 )

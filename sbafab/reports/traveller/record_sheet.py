@@ -1,0 +1,102 @@
+"""The fields of a device's history, and the tables of a design's record page: paper and form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from sbafab.design.records import Design
+from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.schedule import Schedule, SeamStep, Step
+
+ADHESIVE = "adhesive"
+DECISIONS = ("accept", "reject", "rework")
+TESTS = ("leak test", "proof test", "device")
+"""Steps after the press; the last decides on the whole device."""
+
+
+class HistoryField(NamedTuple):
+    """A blank of the record page: key, label with unit, characters to write, explanation."""
+
+    name: str
+    label: str
+    width: int
+    says: str
+
+
+HISTORY_FIELDS = (
+    HistoryField("date", "Date", 10, "Day on which it was done: 2026-05-04."),
+    HistoryField("serial", "Serial no.", 12, "Device, or several with commas between them."),
+    HistoryField("step", "Step", 8, "Number of the press step, or a name such as leak test."),
+    HistoryField("item", "Material", 10, "Film or adhesive."),
+    HistoryField("lot", "Lot", 12, "Lot of the film or adhesive."),
+    HistoryField("expires", "Expires", 10, "Last day of the lot: 2027-01-31."),
+    HistoryField("kerf_mm", "Kerf, mm", 6, "Kerf measured on this film."),
+    HistoryField("temperature_c", "Temperature, °C", 6, "Temperature that was read."),
+    HistoryField("press_force_n", "Force, N", 7, "Force on the whole platen that was read."),
+    HistoryField("minutes", "Time, min", 6, "Minutes in the press."),
+    HistoryField("decision", "Decision", 8, "accept, reject or rework."),
+    HistoryField("reason", "Reason", 18, "Reason of a reject or rework."),
+    HistoryField("photograph", "Photograph", 12, "File of a photograph: JPEG, PNG or WebP."),
+    HistoryField("note", "Note", 18, "Free text."),
+    HistoryField("initials", "Initials", 5, "Who did it."),
+)
+"""In the order of the page, of the form and of a table's columns."""
+MATERIAL_FIELDS = ("item", "lot", "expires", "kerf_mm", "initials")
+PRESS_FIELDS = (
+    *("step", "temperature_c", "press_force_n", "minutes"),
+    *("decision", "reason", "initials"),
+)
+DEVICE_FIELDS = ("step", "decision", "reason", "photograph", "note", "initials")
+
+
+class RecordTable(NamedTuple):
+    """A table of the record page: title, fields, and rows with what is printed in them.
+
+    ``rows`` have the words of each row by field; ``nominal`` the set values of a row.
+    """
+
+    title: str
+    fields: tuple[HistoryField, ...]
+    rows: tuple[Mapping[str, str], ...]
+    nominal: tuple[str, ...]
+
+
+def record_tables(
+    design: Design, laminate: Laminate, schedule: Schedule
+) -> tuple[RecordTable, ...]:
+    """Return the tables of a design's record page: materials, press steps, tests."""
+    films = list(dict.fromkeys(layer.film.material for layer in laminate.layers))
+    items = [*films, *([ADHESIVE] if laminate.tube_count else [])]
+    glue = design.inlet.adhesive
+    unsorted: list[Step | SeamStep] = [*schedule.steps, *schedule.seams]
+    steps = sorted(unsorted, key=lambda step: step.step)
+    tables = (
+        _table("Materials", MATERIAL_FIELDS, "item", items, ["" for _ in films] + [glue]),
+        _table(
+            "Steps",
+            PRESS_FIELDS,
+            "step",
+            [str(step.step) for step in steps],
+            [_nominal(step) for step in steps],
+        ),
+        _table("Tests", DEVICE_FIELDS, "step", TESTS, ["" for _ in TESTS]),
+    )
+    return tuple(table for table in tables if table.rows)
+
+
+def _table(
+    title: str, names: Sequence[str], key: str, values: Sequence[str], nominal: Sequence[str]
+) -> RecordTable:
+    fields = {field.name: field for field in HISTORY_FIELDS}
+    rows = tuple({key: value} for value in values)
+    return RecordTable(title, tuple(fields[n] for n in names), rows, tuple(nominal[: len(rows)]))
+
+
+def _nominal(step: Step | SeamStep) -> str:
+    """Return the values that the schedule sets, in words."""
+    heat = "" if step.temperature_c is None else f"{step.temperature_c:g} °C"
+    if isinstance(step, SeamStep):
+        return heat
+    time = "" if step.minutes is None else f", {step.minutes:g} min"
+    return f"{heat}, {step.force_n:.0f} N{time}"
