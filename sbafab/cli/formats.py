@@ -34,6 +34,7 @@ from sbafab.reports.assembly_prediction import (
     BentTouch,
     Touch,
 )
+from sbafab.results.history import ChainCheck, StoredEntry
 from sbafab.results.records import Record
 from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tolerance
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -115,21 +116,46 @@ def _nested() -> dict[str, Any]:
     )
 
 
+UTC = {**TEXT, "description": "UTC"}
+NUMBERS = {
+    "type": "object",
+    "additionalProperties": number(),
+    "description": "units stand in the keys",
+}
+RECORD = {"numbers": NUMBERS, "recorded": UTC}
+ENTRY = {"readings": NUMBERS, "recorded": UTC, "expired": YES}
+
+
 def _records() -> dict[str, Any]:
-    numbers = {
-        "type": "object",
-        "additionalProperties": number(),
-        "description": "units stand in the keys",
+    more = {
+        "actuator_sha256": {**TEXT, "description": "equal for all designs that build this"},
+        "design": TEXT,
+        "corrected_by": {"type": ["integer", "null"]},
     }
-    record = of(
-        Record,
-        numbers=numbers,
-        recorded={**TEXT, "description": "UTC"},
-        actuator_sha256={**TEXT, "description": "equal for all designs that build this"},
-        design=TEXT,
-        corrected_by={"type": ["integer", "null"]},
+    return table(
+        schema={"const": ids.RECORDS_SCHEMA},
+        records=array(of(Record, **RECORD, **more)),
+        entries=array(of(StoredEntry, **ENTRY, **more)),
     )
-    return table(schema={"const": ids.RECORDS_SCHEMA}, records=array(record))
+
+
+def _history() -> dict[str, Any]:
+    device = table(
+        serial=TEXT,
+        design=TEXT,
+        actuator_sha256=TEXT,
+        records=array(of(Record, **RECORD)),
+        entries=array(of(StoredEntry, **ENTRY)),
+    )
+    return table(
+        schema={"const": ids.HISTORY_SCHEMA},
+        head={**TEXT, "description": "hash of the last link of the chain"},
+        devices=array(device),
+    )
+
+
+def _chain() -> dict[str, Any]:
+    return table(schema={"const": ids.CHAIN_SCHEMA}, holds=YES, **of(ChainCheck)["properties"])
 
 
 def _report() -> dict[str, Any]:
@@ -685,6 +711,8 @@ FORMATS: Mapping[str, Format] = {
     ),
     "nested": Format(ids.NESTED_SCHEMA, "what `nest --json` prints", _nested),
     "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
+    "history": Format(ids.HISTORY_SCHEMA, "what `record --export FILE.json` writes", _history),
+    "chain": Format(ids.CHAIN_SCHEMA, "what `record --verify --json` prints", _chain),
     "report": Format(ids.REPORT_SCHEMA, "what `record --report --json` prints", _report),
     "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
     "simulate": Format(

@@ -296,7 +296,7 @@ def _verify(store: Lab, head: str, as_json: bool) -> None:
     else:
         click.echo(f"head {chain.head}")
         if head:
-            click.echo(f"the noted head is in the chain; {chain.later} rows were added since")
+            click.echo(f"the noted head is in the chain; rows added since: {chain.later}")
         if chain.adopted:
             click.echo(
                 f"{chain.adopted} rows are older than the chain: it covers them from the day on "

@@ -240,6 +240,7 @@ def _lines(history: LabHistory, device: DeviceHistory) -> Iterator[tuple[str, bo
             number = row_number(row)
             words = [f"{number}: {row_words(row)}"]
             words += ["EXPIRED"] if isinstance(row, StoredEntry) and row.is_expired else []
+            words += [f"corrects {row_number(row, row.corrects)}"] if row.corrects else []
             words += [f"corrected by {newer[number]}"] if number in newer else []
             words += ["withdrawn"] if row.withdrawn else []
             words += [f"recorded {row.recorded}"]

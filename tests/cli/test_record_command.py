@@ -130,14 +130,23 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
         ([], "give the DESIGN that was built, --find or --report"),
         (["1dof-5mm"], "give --serial"),
         (["1dof-5mm", "--serial", "A1"], "give a result"),
-        (["1dof-5mm", "--report"], "give only one of DESIGN, --correct, --find and --report"),
-        (["--report", "--find", "A1"], "give only one of DESIGN, --correct, --find and --report"),
+        (["1dof-5mm", "--report"], "give only one of DESIGN, --correct"),
+        (["--report", "--find", "A1"], "give only one of DESIGN, --correct"),
         (["--report", "--leak", "pass"], "--report only shows records"),
         (["1dof-5mm", "--serial", "A1", "--withdraw"], "--withdraw goes with --correct"),
         (["1dof-5mm", "--table", "x.csv", "--leak", "pass"], "--table holds serials"),
         (["1dof-5mm", "--table", "x.csv"], "x.csv cannot be read"),
         (["--correct", "1"], "give the correct result"),
         (["--correct", "1", "--again"], "--again goes with DESIGN"),
+        (["--correct", "x1", "--leak", "pass"], "no record such as 3 and no entry such as e3"),
+        (["--correct", "e1"], "give one --entry"),
+        (["--head", "ab", "--report"], "--head goes with --verify"),
+        (["--verify"], "lab.sqlite is no file of records"),
+        (["1dof-5mm", "--serial", "A1", "--entry", "step"], "must be fields such as step=1"),
+        (["1dof-5mm", "--serial", "A1", "--entry", "note='x"], "a quotation mark without"),
+        (["1dof-5mm", "--entry", "note=x"], "an entry needs its serial"),
+        (["1dof-5mm", "--history", "x.doc"], "ends in none of .csv, .toml, .json"),
+        (["1dof-5mm", "--serial", "A1", "--entry", "note=x", "--leak", "pass"], "one after"),
         (["1dof-5mm", "--serial", "A1", "--leak", "pass", "--again"], "no attempt before this"),
         (["--correct", "1", "--leak", "fail"], "lab.sqlite does not exist"),
         (["--report"], "lab.sqlite is no file of records; record something first"),
@@ -170,3 +179,32 @@ def test_a_file_of_another_program_is_one_sentence(capsys: pytest.CaptureFixture
         "sbafab: lab.sqlite is a database of another program; name the lab's file with --lab\n"
     )
     assert run(["record", "--find", "A1", "--serial", "B"], capsys)[0] == 2
+
+
+def test_history_is_recorded_verified_and_exported(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = ["--entry", "item=TPE lot=L7 expires=2026-01-31 date=2026-05-04", "--entry"]
+    arguments = ["record", "1dof-5mm", "--serial", "A1, A2", *lines, "step=1 temperature_c=134,5"]
+    code, out, err = run(arguments, capsys)
+    assert (code, err) == (0, "")
+    assert "warning: entry e1: TPE lot L7 expired on 2026-01-31, before 2026-05-04" in out
+    assert out.endswith("4 entries added to lab.sqlite\n")
+    noted = json.loads(run(["record", "--verify", "--json"], capsys)[1])
+    hold("chain", noted)
+    change = ["record", "--correct", "e3", "--entry", "temperature_c=135", "--json"]
+    document = json.loads(run(change, capsys)[1])
+    hold("records", document)
+    [entry] = document["entries"]
+    assert (entry["corrects"], entry["readings"], entry["step"]) == (
+        3,
+        {"temperature_c": 135.0},
+        "1",
+    )
+    code, out, _ = run(["record", "--verify", "--head", noted["head"]], capsys)
+    assert code == 0
+    assert "the noted head is in the chain; rows added since: 1" in out
+    assert run(["record", "--find", "A1", "--export", "a.pdf"], capsys)[:2] == (
+        0,
+        "a.pdf: 1 device\n",
+    )
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF")
+    assert run(["record", "--verify", "--head", "abcdef"], capsys)[0] == 1
