@@ -28,6 +28,7 @@ from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.schedule_files import PRESS_SCHEMA
+from sbafab.pressing.work_plan import TaskName
 from sbafab.reports.assembly_prediction import (
     AssemblyFigure,
     AssemblyPrediction,
@@ -489,16 +490,20 @@ def _batch() -> dict[str, Any]:
         day=COUNT,
         start_minutes={**number(), "description": "after the start of the shift"},
         minutes=number(),
-        task={"enum": ["cut", "press", "finish"]},
+        task={"enum": [*get_args(TaskName)]},
         cycle=perhaps,
         step=perhaps,
         copies={**array(COUNT), "minItems": 2, "maxItems": 2, "description": "first and last"},
+        technician={**perhaps, "description": "null where no hands are needed"},
+        press=perhaps,
+        base_plate=perhaps,
     )
     return table(
         copies=COUNT,
         at_once=COUNT,
         at_once_at_most=COUNT,
         cycles={**array(COUNT), "description": "copies pressed in each cycle"},
+        serials={**array(TEXT), "description": "of each copy: cycle and place"},
         places_mm=array(place),
         **{name: number() if name == "hands_minutes" else number("null") for name in times},
         a_day_one_by_one=count_or_null,

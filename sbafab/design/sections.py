@@ -47,6 +47,19 @@ class Order(Section):
     """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
     shift_hours: float = Field(default=8.0, ge=1, le=24)
     """A working day of one person at one press: no press cycle takes more copies than fit in it."""
+    batch: str | None = Field(default=None, pattern=r"^[A-Za-z0-9][A-Za-z0-9.]{0,11}$")
+    """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". By default none; take
+    one where a design is made again, as records know an actuator by design and serial."""
+    technicians: int | None = Field(default=None, ge=1, le=20)
+    """How many people work on the batch at once; by default 1."""
+    presses: int | None = Field(default=None, ge=1, le=20)
+    """Heat presses of the size in [press]; by default 1."""
+    base_plates: int | None = Field(default=None, ge=1, le=40)
+    """Base plates with the holes of all places; by default 1. With more, the next lay-up need not
+    wait until a plate has cooled."""
+    cure_hours: float | None = Field(default=None, gt=0, le=168)
+    """Hours in which the adhesive of the tubes cures, by its package; by default the plan takes 24
+    (ours)."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)
@@ -386,6 +399,9 @@ class Press(Section):
     time_constant: TimeConstant = NOT_MEASURED
     """Minutes in which the edge of the base plate, laid cold between the hot platens under the
     pad, makes 63 % of its way; measured once at the bench."""
+    cool_minutes: float | None = Field(default=None, gt=0, le=600)
+    """Minutes in which the base plate cools beside the press until it can be touched; measured once
+    at the bench. By default the plan of a batch takes a first-order estimate."""
 
 
 class Acceptance(Section):

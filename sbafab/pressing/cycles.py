@@ -1,16 +1,14 @@
-"""Several copies of one laminate: their places in the press, its cycles, and the working days."""
+"""Several copies of one laminate: their places in the press, its cycles, and their serials."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
 
 from sbafab.design.records import Design
 from sbafab.design.sections import named_film
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.laminate.assembly import PLATE_MARGIN, AssemblyStep, assembly
+from sbafab.laminate.assembly import PLATE_MARGIN, assembly
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import (
     HANDLING_MINUTES,
@@ -49,6 +47,35 @@ class Runs:
     @property
     def count(self) -> int:
         return len(self.cycles)
+
+    def copies_in(self, cycle: int) -> tuple[int, int]:
+        """Return the first and the last copy of a cycle; all count from 1."""
+        first = (cycle - 1) * self.together + 1
+        return first, first + self.cycles[cycle - 1] - 1
+
+    def position(self, copy: int) -> tuple[int, int]:
+        """Return the cycle and the place in which a copy is pressed; all count from 1."""
+        cycle, place = divmod(copy - 1, self.together)
+        return cycle + 1, place + 1
+
+
+def serial(runs: Runs, copy: int, batch: str | None = None) -> str:
+    """Return the identity of a laminate from tray to tube: cycle and place, "A-03".
+
+    The name of the batch, if it has one, stands before them: "24-A-03".
+    """
+    cycle, place = runs.position(copy)
+    width = max(2, len(str(runs.together)))
+    return f"{f'{batch}-' if batch else ''}{cycle_name(cycle)}-{place:0{width}d}"
+
+
+def cycle_name(cycle: int) -> str:
+    """Return the letters of a cycle as of a spreadsheet's column: A, B, ... Z, AA."""
+    letters = ""
+    while cycle:
+        cycle, digit = divmod(cycle - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
 
 
 def press_runs(
@@ -171,20 +198,6 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
     )
 
 
-def working_days(
-    design: Design, laminate: Laminate, plan: Schedule, copies: int | None = None
-) -> tuple[Entry, ...]:
-    """Return all work on ``copies``, by default on the order, by working day.
-
-    Empty where the minutes in the press are not stated.
-    """
-    if plan.total_press_minutes is None:
-        return ()
-    runs = design_runs(design, laminate, copies)
-    work = tasks(laminate, plan, runs.cycles, plan.hands_minutes)
-    return by_day(work, 60 * design.order.shift_hours)
-
-
 def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
     """Return the number of actuators that one person makes in a shift with one press, ``together``
     at once.
@@ -204,147 +217,3 @@ def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
 def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
     """Return the largest number of copies in one cycle."""
     return runs_of(laminate, 10_000, platen).together
-
-
-def batch_json(design: Design, laminate: Laminate, plan: Schedule) -> dict[str, Any]:
-    """Return the entry of ``press.json`` for a batch of several copies."""
-    runs, shift = design_runs(design, laminate), 60 * design.order.shift_hours
-    times = batch_times(runs, plan)
-    most = most_together(laminate, (design.press.platen_width, design.press.platen_length))
-    return {
-        "copies": runs.copies,
-        "at_once": runs.together,
-        "at_once_at_most": most,
-        "cycles": list(runs.cycles),
-        "places_mm": [list(place) for place in runs.places],
-        "press_minutes": times.press,
-        "hands_minutes": times.hands,
-        "total_minutes": times.total,
-        "a_day_one_by_one": copies_a_day(plan, 1, shift),
-        "a_day_in_batches": copies_a_day(plan, most, shift),
-        "shift_minutes": shift,
-        "plan": [
-            {
-                "day": entry.day,
-                "start_minutes": entry.start,
-                "minutes": entry.minutes,
-                "task": entry.task,
-                "cycle": entry.cycle or None,
-                "step": entry.step or None,
-                "copies": list(entry.copies),
-            }
-            for entry in working_days(design, laminate, plan)
-        ],
-        "patterns": [
-            {
-                "pattern": pattern,
-                "each": len(layers),
-                "cycles": [len(layers) * count for count in runs.cycles],
-            }
-            for pattern, layers in laminate.patterns.items()
-        ],
-    }
-
-
-# A batch spread over working days: its tasks, and the places where the work may pause.
-#
-# The paper leaves an hour for all hand work on one actuator and does not divide it: the shares
-# below are ours. Warming and cooling of the base plate, which is ours too, are not in it.
-
-
-TaskName = Literal["cut", "press", "finish"]
-CUT_SHARE, FINISH_SHARE = 0.25, 0.25
-"""Shares of the hour: cutting, wiping and sorting; trimming and fitting the tubes. The rest is for
-laying up, shared over the press steps by the number of parts that each lays."""
-HOUR_ROUNDING = 1e-6
-
-
-@dataclass(frozen=True)
-class Task:
-    """Work on ``copies``, first and last.
-
-    A press step must not be left half done; other tasks may pause after every copy, or sheet.
-    ``cycle`` and ``step`` are 0 where a task has none.
-    """
-
-    task: TaskName
-    copies: tuple[int, int]
-    minutes: float
-    cycle: int = 0
-    step: int = 0
-
-    @property
-    def count(self) -> int:
-        """Number of copies."""
-        return self.copies[1] - self.copies[0] + 1
-
-
-@dataclass(frozen=True)
-class Entry(Task):
-    """A task, or a part of one, on its ``day`` (from 1), ``start`` minutes into the shift."""
-
-    day: int = 1
-    start: float = 0.0
-
-
-def tasks(laminate: Laminate, plan: Schedule, cycles: Sequence[int], hands: float) -> list[Task]:
-    """Return the work on a batch in its order; ``hands`` minutes are those of one copy.
-
-    All sheets are cut first, for the parts of all cycles lie on them.
-    """
-    parts = [_parts_laid(laminate, part) for part in assembly(laminate)]
-    laying = hands * (1 - CUT_SHARE - FINISH_SHARE)
-    work = [Task("cut", (1, sum(cycles)), sum(cycles) * hands * CUT_SHARE)]
-    last = 0
-    for cycle, size in enumerate(cycles, 1):
-        copies = last + 1, last + size
-        for step, laid in zip(plan.steps, parts, strict=True):
-            minutes = size * laying * laid / sum(parts) + (step.minutes or 0.0)
-            work.append(Task("press", copies, minutes, cycle, step.step))
-        work.append(Task("finish", copies, size * hands * FINISH_SHARE, cycle))
-        last += size
-    return work
-
-
-def _parts_laid(laminate: Laminate, part: AssemblyStep) -> int:
-    """Return the number of pieces and bonded stacks that a step lays down."""
-    pieces = sum(len(laminate.layer(index).profile.pieces) for index in part.adds)
-    return pieces + sum(set(stack).isdisjoint(part.adds) for stack in part.stacks if stack)
-
-
-def by_day(work: Sequence[Task], shift: float) -> tuple[Entry, ...]:
-    """Return the tasks with the day and minute when each begins, in a shift of so many minutes.
-
-    The press steps of a cycle all end on the day on which they begin, where a shift is long enough
-    for them; else each step does. One that is longer than a shift begins a day and ends after it.
-    """
-    return tuple(_entries(work, shift))
-
-
-def _entries(work: Sequence[Task], shift: float) -> Iterator[Entry]:
-    day, start = 1, 0.0
-    for task in work:
-        if task.task == "press":
-            rest = sum(t.minutes for t in work if t.cycle == task.cycle and t.step >= task.step > 0)
-            together = rest if rest <= shift and task.step == 1 else task.minutes
-            if start and start + together > shift + HOUR_ROUNDING:
-                day, start = day + 1, 0.0
-            yield _entry(task, task.copies, day, start)
-            start += task.minutes
-            continue
-        first, each = task.copies[0], task.minutes / task.count
-        while first <= task.copies[1]:
-            remaining = task.copies[1] - first + 1
-            count = max(0, min(remaining, math.floor((shift - start + HOUR_ROUNDING) / each)))
-            if not count and start:
-                day, start = day + 1, 0.0
-                continue
-            last = first + max(count, 1) - 1
-            yield _entry(task, (first, last), day, start)
-            start += (last - first + 1) * each
-            first = last + 1
-
-
-def _entry(task: Task, copies: tuple[int, int], day: int, start: float) -> Entry:
-    minutes = task.minutes * (copies[1] - copies[0] + 1) / task.count
-    return Entry(task.task, copies, round(minutes, 1), task.cycle, task.step, day, round(start, 1))

@@ -151,6 +151,20 @@ class Tacking:
         return self.sheets * self.each_minutes
 
 
+def warm_minutes(plate: float, platen_c: float) -> float:
+    """Return the estimated minutes in which a cold plate, ``plate`` mm thick, comes near the
+    platen's temperature.
+    """
+    heat = STEEL * plate / 1000
+    return round(heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60, 1)
+
+
+def cool_minutes(plate: float, platen_c: float) -> float:
+    """Return the estimated minutes in which a plate, hot as the platen, can be touched again."""
+    heat = STEEL * plate / 1000
+    return round(heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60, 1)
+
+
 def tack_stack(laminate: Laminate) -> float:
     """Return the largest height in mm of a film with its mask, the transfer film left out."""
     masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
@@ -165,14 +179,11 @@ def tacking_of(
 
     First order: a plate that heat reaches through one face, and leaves through both.
     """
-    heat = STEEL * plate / 1000
-    warm = heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60
-    cool = heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60
     return Tacking(
         sheets=sum(layer.is_mask for layer in laminate.layers),
-        warm_minutes=round(warm, 1),
+        warm_minutes=warm_minutes(plate, platen_c),
         press_minutes=minutes,
-        cool_minutes=round(cool, 1),
+        cool_minutes=cool_minutes(plate, platen_c),
         stack_mm=tack_stack(laminate),
         pins=pins,
         basis=(

@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.region import coord
-from sbafab.pressing.cycles import (
+from sbafab.pressing.cycles import Runs, batch_times, cycle_name, most_together, serial
+from sbafab.pressing.work_plan import (
+    CONNECT_MINUTES,
+    CURE_HOURS,
     CUT_SHARE,
-    FINISH_SHARE,
+    OPEN_SHARE,
+    SORT_SHARE,
+    TUBES_SHARE,
+    UNPIN_SHARE,
     Entry,
-    Runs,
-    batch_times,
-    most_together,
-    working_days,
+    clock,
+    plan_times,
+    serials,
+    shop_of,
+    work_plan,
 )
 from sbafab.reports import drawing as draw
+from sbafab.reports.plan_svg import WIDTH, day_strips, legend
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
 """mm of the page that the platen takes."""
+MOST_DAYS = 15
+"""Days whose charts are drawn on the page; plan.svg has them all."""
 
 
 PAUSES = (
-    "The work may pause between any two rows, within cutting after any sheet, and within the tubes "
-    "after any laminate. It may not pause from the first layer of a step to the end of its "
-    "pressing: loose films move."
+    "The work may pause between any two rows, and after each laminate of a row of cutting, sorting, "
+    "tubes or tests. It may not pause from the first layer of a step until the press is opened: "
+    "loose films move. Only cooling and curing go on after the shift."
 )
 
 
@@ -43,10 +54,11 @@ class PatternRow:
 
 @dataclass(frozen=True)
 class CopyRow:
-    """The cycle and the place in which a copy is pressed; all numbers count from 1."""
+    """The serial of a copy, and the cycle and the place in which it is pressed, from 1."""
 
     copy: int
-    cycle: int
+    serial: str
+    cycle: str
     place: int
 
 
@@ -58,8 +70,9 @@ class PlanRow:
     span: int
     start: str
     end: str
+    who: str
     work: str
-    copies: str
+    laminates: str
     minutes: str
 
 
@@ -72,6 +85,7 @@ class BatchPage:
     summary: str
     why: str
     picture: str
+    charts: tuple[str, ...]
     plan: tuple[PlanRow, ...]
     plan_basis: str
     pauses: str
@@ -92,6 +106,7 @@ def batch_page(work: Work) -> BatchPage | None:
         else ""
     )
     sizes = tuple(dict.fromkeys(runs.cycles))
+    entries = work_plan(work.design, work.laminate, work.schedule, work.job.copies)
     return BatchPage(
         runs.together,
         runs.count,
@@ -99,7 +114,8 @@ def batch_page(work: Work) -> BatchPage | None:
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
         f"say how many it pressed at once).{lesser}",
         _picture(work, runs),
-        _plan(work),
+        tuple(_charts(work, entries)),
+        _plan(work, entries),
         _plan_basis(work),
         PAUSES,
         _identity(work),
@@ -114,8 +130,13 @@ def batch_page(work: Work) -> BatchPage | None:
             for pattern, layers in work.laminate.patterns.items()
         ),
         tuple(
-            CopyRow(n + 1, n // runs.together + 1, n % runs.together + 1)
-            for n in range(runs.copies)
+            CopyRow(
+                copy,
+                serial(runs, copy, work.design.order.batch),
+                cycle_name(runs.position(copy)[0]),
+                runs.position(copy)[1],
+            )
+            for copy in range(1, runs.copies + 1)
         ),
     )
 
@@ -131,36 +152,59 @@ def _summary(work: Work, runs: Runs) -> str:
     )
 
 
-def _plan(work: Work) -> tuple[PlanRow, ...]:
-    """Return the work of every day, in its order."""
-    entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
-    days = [entry.day for entry in entries]
+def _charts(work: Work, entries: Sequence[Entry]) -> Iterator[str]:
+    """Yield a chart of each day; none for a plan of more days than a reader turns pages for."""
+    days = max((entry.day for entry in entries), default=0)
+    if not entries or days > MOST_DAYS:
+        return
+    strips = [*day_strips(entries, shop_of(work.design))]
+    for day, height, elements in strips:
+        room = 4.0 if day == strips[-1][0] else 0.0
+        words = f"day {day}: who and what is busy when"
+        picture = Picture(f"plan-day-{day}", WIDTH, height + room, words)
+        picture.add(*elements)
+        if room:
+            picture.add(*legend(entries, (1.0, height + 0.5)))
+        yield picture.svg()
+
+
+def _plan(work: Work, entries: Sequence[Entry]) -> tuple[PlanRow, ...]:
+    """Return the work of every day that takes hands, in its order."""
+    hands = [entry for entry in entries if entry.technician]
+    closings = {(e.cycle, e.step): e for e in entries if e.task == "press"}
+    days = [entry.day for entry in hands]
     return tuple(
         PlanRow(
             entry.day,
             days.count(entry.day) if number == days.index(entry.day) else 0,
-            units.clock(entry.start),
-            units.clock(entry.start + entry.minutes),
-            _task(work, entry),
-            _copies(entry),
+            clock(entry.start),
+            clock(entry.end),
+            str(entry.technician),
+            _task(work, entry, closings.get((entry.cycle, entry.step))),
+            serials(work.runs, entry.copies, work.design.order.batch),
             f"{entry.minutes:.0f}",
         )
-        for number, entry in enumerate(entries)
+        for number, entry in enumerate(hands)
     )
 
 
-def _task(work: Work, entry: Entry) -> str:
-    if entry.task == "cut":
-        return "Cut all sheets, wipe and sort the parts"
-    if entry.task == "finish":
-        trim = "trim, " if work.laminate.registration == "ears" else ""
-        return f"Cycle {entry.cycle}: {trim}fit the tubes"
-    return f"Cycle {entry.cycle}: lay up and press step {entry.step}"
-
-
-def _copies(entry: Entry) -> str:
-    first, last = entry.copies
-    return str(first) if first == last else f"{first} to {last}"
+def _task(work: Work, entry: Entry, closing: Entry | None) -> str:
+    """Return what a row of the plan is, with press and plate where there are several."""
+    shop = shop_of(work.design)
+    plate = f" {entry.plate}" if shop.plates > 1 else ""
+    press = f" {closing.press}" if closing is not None and shop.presses > 1 else ""
+    trim = "trim, " if work.laminate.registration == "ears" else ""
+    words = {
+        "cut": "Cut: this share of all sheets",
+        "sort": "Wipe and sort the parts: this share",
+        "lay": f"lay up on plate{plate}, close press{press}",
+        "open": f"open press{press}, plate{plate} out to cool",
+        "unpin": f"take down from plate{plate}, each to its place in the tray",
+        "tubes": f"{trim}fit the tubes",
+        "test": "leak and proof tests",
+    }[entry.task]
+    step = f", step {entry.step}" if entry.step else ""
+    return f"{cycle_name(entry.cycle)}{step}: {words}" if entry.cycle else words
 
 
 def _platen(work: Work) -> tuple[float, float]:
@@ -176,22 +220,29 @@ def _plan_basis(work: Work) -> str:
         )
     if not work.schedule.steps:
         return "No plan: nothing is pressed, and nobody stated how fast the seams are made."
-    by_hand, hours = work.schedule.hands_minutes, work.design.order.shift_hours
-    platen = _platen(work)
-    holds = most_together(work.laminate, platen)
-    entries = working_days(work.design, work.laminate, work.schedule, work.job.copies)
-    pressing = {entry.day for entry in entries if entry.task == "press"}
-    spare = 60 * hours - max(e.start + e.minutes for e in entries if e.day in pressing)
+    order, shop = work.design.order, shop_of(work.design)
+    times = plan_times(work.design, work.laminate, work.schedule)
+    holds = most_together(work.laminate, _platen(work))
+    at_press = 1 - CUT_SHARE - SORT_SHARE - TUBES_SHARE
+    cure = (
+        "order.cure_hours" if order.cure_hours else f"{CURE_HOURS:g} h are ours: read its package"
+    )
+    cool = "measured" if work.design.press.cool_minutes else "an estimate: set press.cool_minutes"
+    warm = "measured" if work.schedule.heating.time_constant_minutes else "an estimate"
     return (
-        f"One person, one press, shifts of {hours:g} h (order.shift_hours); a cycle takes no more "
-        f"copies than such a shift makes (the plate has room for {holds}), and its press steps end "
-        "on the day on which they begin, where they fit into one. The minutes are estimates: "
-        f"{by_hand:g} of handling for each copy, the paper's total less its time in the press; of "
-        f"these {CUT_SHARE:.0%} for cutting, {FINISH_SHARE:.0%} for the tubes and the rest for the "
-        "steps, in proportion to the parts that each lays (ours). Not included: warming and "
-        "cooling the plate in every press step (blanks in Before the day), for which the fullest "
-        f"day with a press step has {units.clock(max(0.0, spare))} left, curing, leak and proof "
-        "tests. Write the actual minutes beside each row."
+        f"{units.count(shop.technicians, 'technician')}, {units.count(shop.presses, 'press', 'presses')}"
+        f", {units.count(shop.plates, 'base plate')}, one laser, shifts of {order.shift_hours:g} h "
+        "(order.technicians, presses, base_plates, shift_hours). A cycle takes no more copies than "
+        f"one person makes in such a shift (the plate has room for {holds}). All sheets are cut and "
+        "sorted first, as the parts of all cycles lie on them. The minutes are estimates: "
+        f"{times.hands:g} of handling for each copy, the paper's total less its time in the press; "
+        f"of these {CUT_SHARE:.1%} at the laser, {SORT_SHARE:.1%} to wipe and sort, "
+        f"{TUBES_SHARE:.0%} for the tubes, {at_press:.0%} at the press ({OPEN_SHARE:.0%} of that to "
+        f"open it, {UNPIN_SHARE:.0%} to take down, the rest to lay up, in proportion to the parts "
+        f"of each step; all shares ours). Each step warms {times.warm:g} min before its clock "
+        f"({warm}) and cools {times.cool:g} min ({cool}). Adhesive: {times.cure / 60:g} h ({cure}). "
+        f"Tests: {times.test:g} min a copy, of which {CONNECT_MINUTES:g} a tube to connect (ours). "
+        "Weekends are not in it. Write the actual minutes beside each row."
     )
 
 
@@ -200,16 +251,19 @@ def _identity(work: Work) -> tuple[Action, ...]:
     lining = "a drawing of the places above, with their numbers"
     if work.job.underlay is not None:
         lining = f"one more print of {work.job.underlay}, which has the places' numbers"
+    first, last = (serial(work.runs, n, work.design.order.batch) for n in (1, work.runs.copies))
     return (
         Action(
-            "A laminate is identified by its cycle and its place; the table below gives its copy "
-            "number. Nothing that is pressed carries a label: at the press temperature ink and "
-            "paper would go into the bond."
+            f"A laminate has one serial from tray to tube: the letter of its cycle and the number of "
+            f"its place, {first} to {last}. Its place is the same on the plate, in the tray and at "
+            "the test bench, and sbafab record takes the serial. Nothing that is pressed carries a "
+            "label: at the press temperature ink and paper would go into the bond."
         ),
         Action(
-            f"Line a flat tray with {lining}. After every step take the laminates off the plate "
-            "one at a time, each straight to its number in the tray, the same side up. Stacks of "
-            "one number that are not yet bonded lie on each other with paper between."
+            f"Line a flat tray with {lining}, and write the cycle's letter on it. After every step "
+            "take the laminates off the plate one at a time, each straight to its number in the "
+            "tray, the same side up. Stacks of one number that are not yet bonded lie on each other "
+            "with paper between."
         ),
         Action(
             "In the next step each goes back to the place of its number. One whose number is lost "
@@ -217,17 +271,17 @@ def _identity(work: Work) -> tuple[Action, ...]:
         ),
         Action(
             "After the last step they stay in the tray until their tubes are fitted. Then put a "
-            "flag of tape with the copy number round a tube, and write the serial number in the "
-            "table."
+            "flag of tape with the serial round a tube: it stays on at the test bench and after."
         ),
     )
 
 
 def _name(runs: Runs, size: int) -> str:
     numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
+    first, last = cycle_name(numbers[0]), cycle_name(numbers[-1])
     if len(numbers) == 1:
-        return f"Cycle {numbers[0]} ({size})"
-    return f"Cycles {numbers[0]} to {numbers[-1]}, each ({size})"
+        return f"Cycle {first} ({size})"
+    return f"Cycles {first} to {last}, each ({size})"
 
 
 def _picture(work: Work, runs: Runs) -> str:

@@ -15,7 +15,7 @@ from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY
-from sbafab.pressing.cycles import Runs
+from sbafab.pressing.cycles import Runs, cycle_name, serial
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
@@ -203,7 +203,7 @@ def _actions(
         + (", every pin reaches through the highest layer with its hole." if part.pins else ".")
     )
     yield Action(COVER)
-    cycles = tuple(f"cycle {n}" for n in range(1, runs.count + 1))
+    cycles = tuple(f"cycle {cycle_name(n)}" for n in range(1, runs.count + 1))
     yield closing(step, work.schedule.heating, cycles if 1 < len(cycles) <= MOST_LINES else ())
 
 
@@ -433,7 +433,8 @@ def _each_copy(work: Work, task: str) -> list[Action]:
     count = work.job.copies
     if count == 1 or work.laminate.panel is not None:
         return []
-    numbers = tuple(str(copy) for copy in range(1, count + 1)) if count <= MOST_COPIES else ()
+    copies = range(1, count + 1) if count <= MOST_COPIES else ()
+    numbers = tuple(serial(work.runs, copy, work.design.order.batch) for copy in copies)
     return [Action(f"{task} of all {count} copies, one after the other, as follows.", (), numbers)]
 
 

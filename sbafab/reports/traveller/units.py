@@ -58,12 +58,6 @@ def plain(value: float | None) -> str:
     return BLANK if value is None else f"{value:g}"
 
 
-def clock(minutes: float) -> str:
-    """Return hours and minutes: 0:05, 7:45."""
-    whole = round(round(minutes, 6))
-    return f"{whole // 60}:{whole % 60:02d}"
-
-
 def hours(value: float | None) -> str:
     """Return minutes as hours, "1.75 h"; a blank for None."""
     return f"{BLANK} h" if value is None else f"{value / 60:.2f} h"
