@@ -17,12 +17,13 @@ from sbafab.reports import drawing as draw
 
 WIDTH = 180.0
 """mm of a page's width that a strip takes."""
-LABELS, ROW, BAR = 21.0, 5.0, 4.2
-"""mm: the names of the rows, and the height of a row and of a bar in it."""
+LABELS, ROW, BAR, RIM = 21.0, 5.0, 4.2, 4.0
+"""mm: the names of the rows, the height of a row and of a bar in it, and the right rim."""
 HEAD, FOOT = 6.0, 5.0
 AFTER = 60.0
 """Minutes after the shift that are drawn where something goes on."""
 DAY = 1440.0
+MOST_DAYS = 100
 FILLS: dict[TaskName, tuple[str, str]] = {
     "cut": ("#cfd8dc", "cut"),
     "sort": ("#eceff1", "sort"),
@@ -39,9 +40,10 @@ FILLS: dict[TaskName, tuple[str, str]] = {
 
 
 def plan_svg(design: Design, laminate: Laminate, schedule: Schedule) -> str | None:
-    """Return the chart of all days; None for one copy, or where it has no plan."""
+    """Return the chart of all days; None for one copy, no plan, or more days than one can read."""
     entries = work_plan(design, laminate, schedule)
-    if design_runs(design, laminate).copies == 1 or not entries:
+    days = max((entry.day for entry in entries), default=0)
+    if design_runs(design, laminate).copies == 1 or not 0 < days <= MOST_DAYS:
         return None
     title = f"{design.name}: plan of {design.order.quantity} copies"
     y, drawn = 10.0, [draw.text((1.0, 6.0), title, bold=True)]
@@ -113,7 +115,7 @@ def _united(spans: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float
     """Yield spans of which those that touch are one."""
     first, last = math.inf, -math.inf
     for start, end in spans:
-        if start > last and last > first:
+        if start > last > first:
             yield first, last
             first = start
         first, last = min(first, start), max(last, end)
@@ -123,7 +125,7 @@ def _united(spans: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float
 
 def _strip(day: int, rows: Sequence[_Row], shop: Shop, axis: float) -> list[str]:
     """Return the elements of one day: hours, rows, bars, and the end of the shift."""
-    scale = (WIDTH - LABELS - 1) / axis
+    scale = (WIDTH - LABELS - RIM) / axis
     foot = HEAD + ROW * len(rows)
     drawn = [draw.text((1.0, 4.0), f"Day {day}", size=2.8, bold=True)]
     for hour in range(math.floor(axis / 60) + 1):

@@ -11,13 +11,13 @@ from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     Runs,
     are_apart,
-    batch_json,
     batch_times,
     copies_a_day,
     press_runs,
     runs_of,
 )
 from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.work_plan import batch_json
 
 INCH = 25.4
 

@@ -156,8 +156,13 @@ def hot_prints(work: Work) -> int:
 
 
 def prints(work: Work) -> int:
-    """Return the prints of the underlay that are needed: one a hot closing, one for the tray."""
-    return hot_prints(work) + (work.runs.together > 1)
+    """Return the prints of the underlay that are needed: one a hot closing, one a tray."""
+    return hot_prints(work) + trays(work)
+
+
+def trays(work: Work) -> int:
+    """Return the trays that films rest in between steps: one a cycle of several laminates."""
+    return work.runs.count if work.runs.together > 1 else 0
 
 
 def release_films(work: Work) -> int:

@@ -10,7 +10,6 @@ from sbafab.geometry.region import coord
 from sbafab.pressing.cycles import Runs, batch_times, cycle_name, most_together, serial
 from sbafab.pressing.work_plan import (
     CONNECT_MINUTES,
-    CURE_HOURS,
     CUT_SHARE,
     OPEN_SHARE,
     SORT_SHARE,
@@ -36,9 +35,9 @@ MOST_DAYS = 15
 
 
 PAUSES = (
-    "The work may pause between any two rows, and after each laminate of a row of cutting, sorting, "
-    "tubes or tests. It may not pause from the first layer of a step until the press is opened: "
-    "loose films move. Only cooling and curing go on after the shift."
+    "The work may pause between any two rows, and after each laminate of a row of cutting, "
+    "sorting, tubes or tests. It may not pause from the first layer of a step until the press is "
+    "opened: loose films move. Only cooling and curing go on after the shift."
 )
 
 
@@ -224,24 +223,27 @@ def _plan_basis(work: Work) -> str:
     times = plan_times(work.design, work.laminate, work.schedule)
     holds = most_together(work.laminate, _platen(work))
     at_press = 1 - CUT_SHARE - SORT_SHARE - TUBES_SHARE
-    cure = (
-        "order.cure_hours" if order.cure_hours else f"{CURE_HOURS:g} h are ours: read its package"
-    )
+    cure = "order.cure_hours" if order.cure_hours else "ours, read its package: order.cure_hours"
     cool = "measured" if work.design.press.cool_minutes else "an estimate: set press.cool_minutes"
     warm = "measured" if work.schedule.heating.time_constant_minutes else "an estimate"
+    resources = (
+        units.count(shop.technicians, "technician"),
+        units.count(shop.presses, "press", "presses"),
+        units.count(shop.plates, "base plate"),
+        "one laser",
+    )
     return (
-        f"{units.count(shop.technicians, 'technician')}, {units.count(shop.presses, 'press', 'presses')}"
-        f", {units.count(shop.plates, 'base plate')}, one laser, shifts of {order.shift_hours:g} h "
-        "(order.technicians, presses, base_plates, shift_hours). A cycle takes no more copies than "
-        f"one person makes in such a shift (the plate has room for {holds}). All sheets are cut and "
-        "sorted first, as the parts of all cycles lie on them. The minutes are estimates: "
-        f"{times.hands:g} of handling for each copy, the paper's total less its time in the press; "
-        f"of these {CUT_SHARE:.1%} at the laser, {SORT_SHARE:.1%} to wipe and sort, "
-        f"{TUBES_SHARE:.0%} for the tubes, {at_press:.0%} at the press ({OPEN_SHARE:.0%} of that to "
-        f"open it, {UNPIN_SHARE:.0%} to take down, the rest to lay up, in proportion to the parts "
-        f"of each step; all shares ours). Each step warms {times.warm:g} min before its clock "
-        f"({warm}) and cools {times.cool:g} min ({cool}). Adhesive: {times.cure / 60:g} h ({cure}). "
-        f"Tests: {times.test:g} min a copy, of which {CONNECT_MINUTES:g} a tube to connect (ours). "
+        f"{', '.join(resources)}, shifts of {order.shift_hours:g} h (order.technicians, presses, "
+        "base_plates, shift_hours). A cycle takes no more copies than one person makes in such a "
+        f"shift (the plate has room for {holds}). All sheets are cut and sorted first, as the "
+        f"parts of all cycles lie on them. The minutes are estimates: {times.hands:g} of handling "
+        "for each copy, the paper's total less its time in the press; of these "
+        f"{CUT_SHARE:.1%} at the laser, {SORT_SHARE:.1%} to wipe and sort, {TUBES_SHARE:.0%} for "
+        f"the tubes, {at_press:.0%} at the press ({OPEN_SHARE:.0%} of that to open it, "
+        f"{UNPIN_SHARE:.0%} to take down, the rest to lay up, in proportion to the parts of each "
+        f"step; all shares ours). Each step warms {times.warm:g} min before its clock ({warm}) and "
+        f"cools {times.cool:g} min ({cool}). Adhesive: {times.cure / 60:g} h ({cure}). Tests: "
+        f"{times.test:g} min a copy, {CONNECT_MINUTES:g} of them a tube to connect it (ours). "
         "Weekends are not in it. Write the actual minutes beside each row."
     )
 
@@ -254,16 +256,16 @@ def _identity(work: Work) -> tuple[Action, ...]:
     first, last = (serial(work.runs, n, work.design.order.batch) for n in (1, work.runs.copies))
     return (
         Action(
-            f"A laminate has one serial from tray to tube: the letter of its cycle and the number of "
-            f"its place, {first} to {last}. Its place is the same on the plate, in the tray and at "
-            "the test bench, and sbafab record takes the serial. Nothing that is pressed carries a "
+            "A laminate has one serial from tray to tube: the letter of its cycle and the number "
+            f"of its place, {first} to {last}. Its place is the same on the plate and in the tray; "
+            "the test bench and sbafab record take the serial. Nothing that is pressed carries a "
             "label: at the press temperature ink and paper would go into the bond."
         ),
         Action(
-            f"Line a flat tray with {lining}, and write the cycle's letter on it. After every step "
-            "take the laminates off the plate one at a time, each straight to its number in the "
-            "tray, the same side up. Stacks of one number that are not yet bonded lie on each other "
-            "with paper between."
+            f"Line a flat tray for each cycle with {lining}, and write the cycle's letter on it. "
+            "After every step take the laminates off the plate one at a time, each straight to its "
+            "number in the tray, the same side up. Stacks of one number that are not yet bonded "
+            "lie on each other with paper between."
         ),
         Action(
             "In the next step each goes back to the place of its number. One whose number is lost "

@@ -66,7 +66,7 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Tape", words, "as needed"))
     if work.runs.together > 1:
         words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
-        items.append(Item("Tray", words, "1"))
+        items.append(Item("Tray", words, str(base_plate.trays(work))))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
@@ -81,7 +81,8 @@ def _underlay(work: Work, path: str) -> Item:
     join = "; cut out along their dotted frames and laid edge to edge" if len(spread) > 1 else ""
     thick = units.millimetres(work.design.press.underlay_thickness)
     closings, prints = base_plate.hot_prints(work), base_plate.prints(work)
-    tray = ", and one to line the tray" if prints > closings else ""
+    linings = prints - closings
+    tray = f", and one to line {'the tray' if linings == 1 else 'each tray'}" if linings else ""
     words = (
         f"{path} printed at 100 % on plain paper {thick} thick, {paper}; its bars must measure 100 "
         f"mm{join}. A fresh print for each of {units.count(closings, 'closing')} of the press, as "
