@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 
 import pytest
@@ -38,31 +39,36 @@ def test_two_cycles_make_five_copies_on_one_plate(run: Run) -> None:
     assert not has_failed(check_folder(run.folder))
 
 
-def test_the_traveller_has_a_serial_number_for_each_copy(run: Run) -> None:
+SERIALS = ["A-01", "A-02", "A-03", "B-01", "B-02"]
+
+
+def test_a_laminate_has_one_serial_on_the_page_in_the_plan_and_for_programs(run: Run) -> None:
     page = lxml_html.fromstring((run.folder / "traveller.html").read_text())
-    serials = page.xpath("//input[starts-with(@id, 'serial')]/@id")
-    assert serials == [f"serial-{n}" for n in range(1, COPIES + 1)]
     rows = page.xpath("//table[@class='serials']/tbody/tr")
-    assert [[cell.text_content() for cell in row[:3]] for row in rows] == [
-        ["1", "1", "1"],
-        ["2", "1", "2"],
-        ["3", "1", "3"],
-        ["4", "2", "1"],
-        ["5", "2", "2"],
+    assert [[cell.text_content() for cell in row[:4]] for row in rows] == [
+        [serial, str(copy), serial[0], str(int(serial[2:]))]
+        for copy, serial in enumerate(SERIALS, 1)
     ]
+    assert json.loads((run.folder / "press.json").read_text())["batch"]["serials"] == SERIALS
+    with (run.folder / "plan.csv").open(newline="") as file:
+        plan = list(csv.DictReader(file))
+    for row in plan:
+        first, last = SERIALS[int(row["first_copy"]) - 1], SERIALS[int(row["last_copy"]) - 1]
+        assert row["laminates"] == (first if first == last else f"{first} to {last}")
+    tubed = page.xpath("//label[span[starts-with(., 'A-') or starts-with(., 'B-')]]")
+    assert {label.text_content().strip() for label in tubed} == set(SERIALS)
     words = " ".join(page.text_content().split())
     assert "5 copies in 2 press cycles of 3, 2 at once: 90 min in the press instead of 225" in words
     assert "390 min" in words
     days = page.xpath("//table[@class='days']/tbody/tr")
-    # Cutting, two cycles of four steps, each cycle's tubes: 390 min fit into one day of 8 h.
-    assert len(days) == 1 + 2 * (4 + 1)
-    assert [row.find("th").text_content() for row in days if row.find("th") is not None] == ["1"]
-    assert "Cycle 2: lay up and press step 4 4 to 5" in " ".join(
-        " ".join(cell.text_content() for cell in row) for row in days
-    )
-    assert "It may not pause from the first layer of a step to the end of its pressing" in words
+    by_hand = [row for row in plan if row["needs_hands"] == "yes"]
+    assert len(days) == len(by_hand)
+    texts = [" ".join(cell.text_content() for cell in row) for row in days]
+    assert any("B, step 4: lay up on plate, close press B-01 to B-02" in text for text in texts)
+    assert all(row["laminates"] in text for row, text in zip(by_hand, texts, strict=True))
+    assert "It may not pause from the first layer of a step until the press is opened" in words
     assert "each straight to its number in the tray" in words
-    closings = page.xpath("//label[contains(., 'cycle 2')]")
+    closings = page.xpath("//label[contains(., 'cycle B')]")
     assert len(closings) == 4
 
 
