@@ -92,6 +92,7 @@ EXTRAS = {
     "optuna": ("optuna", "find --optuna"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "quality": ("scipy", "record --charts, record --gauge"),
     "studio": ("starlette", "sbafab studio"),
     "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),
 }

@@ -35,7 +35,9 @@ from sbafab.reports.assembly_prediction import (
     BentTouch,
     Touch,
 )
+from sbafab.results.gauge_study import VarianceRow
 from sbafab.results.history import ChainCheck, StoredEntry
+from sbafab.results.process_control import Suspect
 from sbafab.results.records import Record
 from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tolerance
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -157,6 +159,59 @@ def _history() -> dict[str, Any]:
 
 def _chain() -> dict[str, Any]:
     return table(schema={"const": ids.CHAIN_SCHEMA}, holds=YES, **of(ChainCheck)["properties"])
+
+
+def _control() -> dict[str, Any]:
+    signal = table(point=COUNT, rule=COUNT, words=TEXT)
+    numbers = array(number())
+    chart = table(
+        kind=TEXT,
+        values=numbers,
+        centre=numbers,
+        lower=numbers,
+        upper=numbers,
+        signals=array(signal),
+    )
+    state = table(
+        low=number("null"),
+        high=number("null"),
+        count=COUNT,
+        mean=number(),
+        sigma=number(),
+        within={**number(), "description": "deviation by moving range"},
+        cp=number("null"),
+        cp_interval={**numbers, "type": ["array", "null"]},
+        cpk=number(),
+        cpk_interval=numbers,
+    )
+    chart_set = table(
+        name=TEXT,
+        points=array(TEXT),
+        charts=array(chart),
+        changes=array(table(point=COUNT, what=TEXT)),
+        capability={**state, "type": ["object", "null"]},
+    )
+    return table(
+        schema={"const": ids.CONTROL_SCHEMA},
+        charts=array(chart_set),
+        changes=array(table(day=TEXT, what=TEXT, before=TEXT, after=TEXT)),
+        failures=array(table(step=TEXT, reason=TEXT, count=COUNT)),
+        suspects=array(of(Suspect)),
+        advice=array(TEXT),
+    )
+
+
+def _gauge() -> dict[str, Any]:
+    deviations = ("repeatability", "operators", "interaction", "gauge", "parts", "total", "share")
+    return table(
+        schema={"const": ids.GAUGE_SCHEMA},
+        anova=array(of(VarianceRow)),
+        pooled=YES,
+        **{name: number() for name in deviations},
+        of_tolerance=number("null"),
+        categories=COUNT,
+        verdict=TEXT,
+    )
 
 
 def _report() -> dict[str, Any]:
@@ -718,6 +773,8 @@ FORMATS: Mapping[str, Format] = {
     "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
     "history": Format(ids.HISTORY_SCHEMA, "what `record --export FILE.json` writes", _history),
     "chain": Format(ids.CHAIN_SCHEMA, "what `record --verify --json` prints", _chain),
+    "control": Format(ids.CONTROL_SCHEMA, "`charts.json` of `record --charts`", _control),
+    "gauge": Format(ids.GAUGE_SCHEMA, "what `record --gauge --json` prints", _gauge),
     "report": Format(ids.REPORT_SCHEMA, "what `record --report --json` prints", _report),
     "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
     "simulate": Format(

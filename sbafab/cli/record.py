@@ -11,7 +11,13 @@ import click
 
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
 from sbafab.cli.printing import console, print_json, print_verdict
-from sbafab.output.schema_ids import CHAIN_SCHEMA, RECORDS_SCHEMA, REPORT_SCHEMA
+from sbafab.output.schema_ids import (
+    CHAIN_SCHEMA,
+    GAUGE_SCHEMA,
+    RECORDS_SCHEMA,
+    REPORT_SCHEMA,
+)
+from sbafab.results.control_charts import Limits
 from sbafab.results.history import (
     ENTRY_FIELDS,
     Entry,
@@ -120,6 +126,24 @@ def _history_options(command: Command) -> Command:
             metavar="FILE",
             help="Write the history of all devices, or of --find or --serial: CSV, JSON or PDF.",
         ),
+        click.option(
+            "--charts",
+            type=click.Path(path_type=Path, file_okay=False),
+            metavar="FOLDER",
+            help="Write control charts of all records, and which step to look at first.",
+        ),
+        click.option(
+            "--gauge",
+            type=click.Path(path_type=Path),
+            metavar="CSV",
+            help="Repeatability and reproducibility of readings: part, operator, trial, reading.",
+        ),
+        click.option(
+            "--limit",
+            multiple=True,
+            metavar="NAME=LOW:HIGH",
+            help="With --charts, limits of a quantity; with --gauge, of the reading. Repeatable.",
+        ),
     )
     for option in reversed(options):
         command = option(command)
@@ -187,13 +211,17 @@ def record(
         _verify(store, values["head"], as_json)
     elif values["export"] is not None:
         _export(store, values)
+    elif values["charts"] is not None:
+        _write_charts(store, values, as_json)
+    elif values["gauge"] is not None:
+        _print_gauge(values, as_json)
     elif values["find"] is not None:
         _find(store, values, as_json)
     else:
         _store(store, design, assignments, values, as_json)
 
 
-TASKS = ("report", "find", "correct", "verify", "export")
+TASKS = ("report", "find", "correct", "verify", "export", "charts", "gauge")
 
 
 def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
@@ -213,6 +241,8 @@ def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
         raise click.UsageError("--withdraw goes with --correct N")
     if values["head"] and not values["verify"]:
         raise click.UsageError("--head goes with --verify")
+    if values["limit"] and tasks not in (["charts"], ["gauge"]):
+        raise click.UsageError("--limit goes with --charts and --gauge")
     _one_kind(tasks, values)
 
 
@@ -316,6 +346,89 @@ def _export(store: Lab, values: Mapping[str, Any]) -> None:
     write_history(history, values["export"])
     count = len(history.devices)
     print_verdict(f"{values['export']}: {count} device{'s' if count != 1 else ''}")
+
+
+def _limits(texts: Sequence[str]) -> dict[str, Limits]:
+    """Return limits by quantity, of texts such as ``stroke_mm=16:18``; a side may be empty."""
+    limits = {}
+    for text in texts:
+        name, _, span = text.partition("=")
+        low, colon, high = span.partition(":")
+        try:
+            pair = Limits(*(float(side) if side else None for side in (low, high)))
+        except ValueError:
+            colon = ""
+        if not name or not colon or pair == Limits(None, None):
+            raise click.UsageError(
+                f"--limit {text!r} must be such as stroke_mm=16:18 or force_n=4:"
+            )
+        if None not in pair and float(low) >= float(high):
+            raise click.UsageError(f"--limit {text!r} has a low limit that is not below the high")
+        limits[name.strip()] = pair
+    return limits
+
+
+def _write_charts(store: Lab, values: Mapping[str, Any], as_json: bool) -> None:
+    from sbafab.results.process_control import PAGE, process_control, write_charts
+
+    control = process_control(store, _limits(values["limit"]))
+    write_charts(control, values["charts"])
+    if as_json:
+        print_json(control.as_dict())
+        return
+    for chart_set in control.sets:
+        for kind, words, points in chart_set.signals:
+            more = f" and at {len(points) - 1} more" if len(points) > 1 else ""
+            click.echo(f"{chart_set.name}, {kind} chart: {words} at {points[0]}{more}")
+    for sentence in control.advice:
+        click.echo(sentence)
+    print_verdict(f"Charts: {len(control.sets)}, in {values['charts'] / PAGE}")
+
+
+def _print_gauge(values: Mapping[str, Any], as_json: bool) -> None:
+    from sbafab.results.gauge_study import gauge_study, read_readings
+
+    limits = _limits(values["limit"])
+    if set(limits) - {"reading"} or any(None in pair for pair in limits.values()):
+        raise click.UsageError("with --gauge give --limit reading=LOW:HIGH")
+    study = gauge_study(read_readings(values["gauge"]), _width(limits.get("reading")))
+    if as_json:
+        print_json({"schema": GAUGE_SCHEMA, **study.as_dict()})
+        return
+    _print_table(
+        "Analysis of variance",
+        ("source", "degrees", "sum of squares", "mean square", "F", "p"),
+        (
+            (row.source, str(row.degrees), *(_figure(value) for value in row[2:]))
+            for row in study.rows
+        ),
+    )
+    names = ("repeatability", "operators", "interaction", "gauge", "parts", "total")
+    _print_table(
+        "Standard deviations" + (", interaction pooled" if study.is_pooled else ""),
+        ("of", "deviation", "of the total"),
+        ((n, _figure(getattr(study, n)), _share(getattr(study, n), study.total)) for n in names),
+    )
+    if study.of_tolerance is not None:
+        click.echo(f"6 deviations of the gauge take {study.of_tolerance:.1%} of the limits' width")
+    print_verdict(
+        f"The gauge takes {study.share:.1%} of the total deviation and tells {study.categories} "
+        f"classes apart: {study.verdict}"
+    )
+
+
+def _width(limits: Limits | None) -> float | None:
+    if limits is None or limits.low is None or limits.high is None:
+        return None
+    return limits.high - limits.low
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
+
+
+def _share(value: float, total: float) -> str:
+    return f"{value / total:.1%}" if total else ""
 
 
 def _find(store: Lab, values: Mapping[str, Any], as_json: bool) -> None:

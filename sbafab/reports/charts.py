@@ -66,6 +66,8 @@ class Panel(NamedTuple):
     y_label: str
     curves: Sequence[ChartCurve]
     points: Sequence[ChartPoints] = ()
+    from_zero: bool = True
+    """Axes begin at 0 where nothing is negative."""
 
 
 def chart_svg(title: str, panels: Sequence[Panel]) -> str:
@@ -115,7 +117,8 @@ def _draw(axes: Axes, panel: Panel, place: int) -> None:
             label=_plain(points.label),
             zorder=5,
         )
-    _begin_at_zero(axes, panel)
+    if panel.from_zero:
+        _begin_at_zero(axes, panel)
     if any(item.label for item in _items(panel)):
         axes.legend(loc="best")
 

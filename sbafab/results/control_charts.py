@@ -8,7 +8,7 @@ once in 92 points of a stable process (Champ and Woodall, Technometrics 29, 1987
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist, fmean, stdev
 from typing import Any, Literal, NamedTuple
@@ -65,13 +65,12 @@ class ControlChart:
         }
 
 
-def western_electric(z: Sequence[float], rules: Sequence[int] = tuple(RULES)) -> list[Signal]:
-    """Return the signals of standardised points, a rule at most once a point, at its last point.
+def western_electric(z: Sequence[float], rules: Sequence[int] = tuple(RULES)) -> Iterator[Signal]:
+    """Yield the signals of standardised points, a rule at most once a point, at its last point.
 
     ``z`` are distances from the centre in standard deviations.
     """
     windows = {1: (1, 1, 3.0), 2: (2, 3, 2.0), 3: (4, 5, 1.0), 4: (8, 8, 0.0)}
-    signals = []
     for last in range(len(z)):
         for rule in rules:
             least, length, beyond = windows[rule]
@@ -79,8 +78,7 @@ def western_electric(z: Sequence[float], rules: Sequence[int] = tuple(RULES)) ->
             for side in (1, -1):
                 # The newest point is among those that count: the rule speaks once for each.
                 if side * z[last] > beyond and sum(side * x > beyond for x in points) >= least:
-                    signals.append(Signal(last, rule))
-    return signals
+                    yield Signal(last, rule)
 
 
 def proportions_chart(failures: Sequence[int], sizes: Sequence[int]) -> ControlChart:

@@ -202,6 +202,11 @@ def _study(sums: _Sums, sizes: tuple[int, int, int], width: float | None) -> Gau
             sums.row("error", "error"),
         ),
         is_pooled,
-        *(math.sqrt(v) for v in (error, by_operator, crossed, gauge, by_part, gauge + by_part)),
-        None if width is None else 6 * math.sqrt(gauge) / width,
+        repeatability=math.sqrt(error),
+        operators=math.sqrt(by_operator),
+        interaction=math.sqrt(crossed),
+        gauge=math.sqrt(gauge),
+        parts=math.sqrt(by_part),
+        total=math.sqrt(gauge + by_part),
+        of_tolerance=None if width is None else 6 * math.sqrt(gauge) / width,
     )

@@ -140,6 +140,12 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
         (["--correct", "1", "--again"], "--again goes with DESIGN"),
         (["--correct", "x1", "--leak", "pass"], "no record such as 3 and no entry such as e3"),
         (["--correct", "e1"], "give one --entry"),
+        (["--limit", "stroke_mm=1:2", "--report"], "--limit goes with --charts and --gauge"),
+        (["--charts", "c", "--limit", "stroke_mm"], "must be such as stroke_mm=16:18"),
+        (["--charts", "c", "--limit", "stroke_mm=2:1"], "not below the high"),
+        (["--charts", "c"], "lab.sqlite is no file of records"),
+        (["--gauge", "x.csv"], "x.csv cannot be read"),
+        (["--gauge", "x.csv", "--limit", "reading=1:"], "give --limit reading=LOW:HIGH"),
         (["--head", "ab", "--report"], "--head goes with --verify"),
         (["--verify"], "lab.sqlite is no file of records"),
         (["1dof-5mm", "--serial", "A1", "--entry", "step"], "must be fields such as step=1"),
@@ -208,3 +214,22 @@ def test_history_is_recorded_verified_and_exported(capsys: pytest.CaptureFixture
     )
     assert Path("a.pdf").read_bytes().startswith(b"%PDF")
     assert run(["record", "--verify", "--head", "abcdef"], capsys)[0] == 1
+
+
+def test_charts_and_gauge_studies_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    for number, stroke in enumerate((16.8, 16.9, 16.7), start=1):
+        told = ["--serial", f"A{number}", "--stroke", str(stroke)]
+        assert run(["record", "1dof-5mm", *told], capsys)[0] == 0
+    code, out, _ = run(["record", "--charts", "c", "--limit", "stroke_mm=16:18"], capsys)
+    assert (code, out) == (0, "Charts: 1, in c/charts.html\n")
+    hold("control", json.loads(Path("c/charts.json").read_text()))
+    rows = [f"{p},{o},{t},{p + o + t / 100}" for p in (1, 2, 3) for o in (0, 0.1) for t in (1, 2)]
+    Path("g.csv").write_text("part,operator,trial,reading\n" + "\n".join(rows))
+    arguments = ["record", "--gauge", "g.csv", "--limit", "reading=0:4"]
+    code, out, _ = run(arguments, capsys)
+    assert code == 0
+    assert "classes apart" in out
+    document = json.loads(run([*arguments, "--json"], capsys)[1])
+    hold("gauge", document)
+    # Two trials 0.01 apart: their variance is 0.00005.
+    assert document["anova"][-1]["mean_square"] == pytest.approx(5e-5)
