@@ -351,6 +351,16 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
 # Pages, findings and the design.
 
 
+def _bill(folder: DesignFolder) -> str | None:
+    # The pages for the bench take as long to load as all the rules.
+    from sbafab.reports.traveller.bill import bill_csv
+    from sbafab.reports.traveller.job import Work
+
+    assert folder.plan.pressing is not None
+    job = order_of(folder.checked)
+    return bill_csv(Work(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job))
+
+
 def _traveller(folder: DesignFolder) -> str:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.page import traveller_html
@@ -471,6 +481,14 @@ ARTEFACTS: tuple[Artefact, ...] = (
             SIMULATE_SCHEMA,
         )
         for name in SIMULATORS
+    ),
+    Artefact(
+        "bill.csv",
+        "cut",
+        "of a batch: the bill of materials",
+        _bill,
+        needs=frozenset(("press",)),
+        is_page=True,
     ),
     Artefact(
         TRAVELLER,

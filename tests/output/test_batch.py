@@ -72,6 +72,23 @@ def test_a_laminate_has_one_serial_on_the_page_in_the_plan_and_for_programs(run:
     assert len(closings) == 4
 
 
+def test_the_bill_counts_what_the_batch_takes(run: Run) -> None:
+    with (run.folder / "bill.csv").open(newline="") as file:
+        bill = {row["item"]: row for row in csv.DictReader(file)}
+    needed = {name: int(row["needed"] or 0) for name, row in bill.items()}
+    # A tube and a drop a copy; two release films each time that a cycle is pressed in a step.
+    assert (needed["Tube"], needed["Adhesive"]) == (COPIES, COPIES)
+    assert (needed["Release film"], needed["Tray"], needed["Base plate"]) == (2 * 2 * 4, 2, 1)
+    # 42 x 32 mm each.
+    assert float(bill["Release film"]["area_m2"]) == pytest.approx(16 * 42 * 32 / 1e6, abs=5e-5)
+    for material in ("TPE", "PTFE"):
+        files = [*(run.folder / "sheets").glob(f"{material}_*.dxf")]
+        assert needed[f"{material} film"] == len(files)
+        # 6 x 6 in.
+        area = len(files) * 0.1524**2
+        assert float(bill[f"{material} film"]["area_m2"]) == pytest.approx(area, abs=5e-5)
+
+
 @pytest.fixture
 def doctor(run: Run) -> Doctor:
     return Doctor(run.folder)

@@ -15,6 +15,7 @@ from sbafab.pressing.schedule import (
     Step,
     joined_words,
 )
+from sbafab.pressing.work_plan import shop_of
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
 
@@ -212,11 +213,15 @@ def build_up_again(work: Work) -> tuple[str, ...]:
     )
 
 
-def items(work: Work) -> list[tuple[str, str, str]]:
-    """Return rows of the bill of materials: name, specification, quantity."""
+RELEASE_FILM = "Release film"
+
+
+def items(work: Work) -> list[tuple[str, str, str, int]]:
+    """Return rows of the bill of materials: name, specification, quantity in words and number."""
     laminate, plan = work.laminate, work.schedule
     if not plan.steps:
         return []
+    shop = shop_of(work.design)
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}
     size = units.size(*first.platen_mm)
@@ -230,29 +235,36 @@ def items(work: Work) -> list[tuple[str, str, str]]:
     )
     return [
         *_pin_items(
-            laminate.pins * work.runs.together, plan, work.design.registration.pin_standard
+            laminate.pins * work.runs.together * shop.plates,
+            plan,
+            work.design.registration.pin_standard,
         ),
         (
             "Base plate",
             f"{plate.material}, {units.millimetres(plate.thickness_mm)}, {size}{holes}",
-            "1",
+            str(shop.plates),
+            shop.plates,
         ),
         (
-            "Release film",
+            RELEASE_FILM,
             f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; TPE must not "
             "stick to it at press temperature (our advice; the paper names none)",
             str(release_films(work)),
+            release_films(work),
         ),
         (
             "Press pad",
             f"{pad.material}, {units.millimetres(pad.thickness_mm)}{piled}, {size}, for "
             f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
-            str(sheets),
+            str(sheets * shop.presses),
+            sheets * shop.presses,
         ),
     ]
 
 
-def _pin_items(pins: tuple[Pin, ...], plan: Schedule, standard: str) -> list[tuple[str, str, str]]:
+def _pin_items(
+    pins: tuple[Pin, ...], plan: Schedule, standard: str
+) -> list[tuple[str, str, str, int]]:
     holes = _pin_holes(plan)
     sizes = Counter(
         (pin.diameter, length)
@@ -266,6 +278,7 @@ def _pin_items(pins: tuple[Pin, ...], plan: Schedule, standard: str) -> list[tup
             f"{standard}, ⌀{units.millimetres(diameter)} m6, {units.millimetres(length)} long; "
             "spares to choose from",
             f"{number} + {max(2, number // 2)} spare",
+            number + max(2, number // 2),
         )
         for (diameter, length), number in sorted(sizes.items())
     ]

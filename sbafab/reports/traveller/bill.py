@@ -26,15 +26,43 @@ from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import flat_shape, thumbnail
 from sbafab.reports.underlay import PAPER, leaves
+from sbafab.spreadsheet import csv_text
 
 
 @dataclass(frozen=True)
 class Item:
-    """A row of the bill of materials."""
+    """A row of the bill of materials.
+
+    ``quantity`` is in words, ``number`` what must be at hand, None where it is not counted;
+    ``area`` in m2 is that of all of them, where they are film.
+    """
 
     name: str
     what: str
     quantity: str
+    number: int | None = None
+    area: float | None = None
+
+
+BILL_COLUMNS = ("item", "specification", "needed", "area_m2", "quantity")
+
+
+def bill_csv(work: Work) -> str | None:
+    """Return the bill of a batch as a table; None for one copy."""
+    if work.runs.copies == 1:
+        return None
+    rows: list[Sequence[object]] = [BILL_COLUMNS]
+    rows += [
+        (
+            item.name,
+            item.what,
+            item.number,
+            None if item.area is None else f"{item.area:.4f}",
+            item.quantity,
+        )
+        for item in bill(work)
+    ]
+    return csv_text(rows)
 
 
 def bill(work: Work) -> list[Item]:
@@ -46,18 +74,21 @@ def bill(work: Work) -> list[Item]:
         diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
         tube = tube_name(work.design)
         items.append(
-            Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"))
+            Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"), number)
         )
         drops = units.count(number, "small drop")
-        items.append(Item("Adhesive", work.design.inlet.adhesive, drops))
+        items.append(Item("Adhesive", work.design.inlet.adhesive, drops, number))
     wrap = work.design.form.wrap
     if wrap is not None:
         diameter = units.millimetres(wrap.tube_diameter)
         words = f"to wrap the sheet round, outer diameter {diameter}"
-        items.append(Item("Tube to wrap", words, str(job.copies)))
+        items.append(Item("Tube to wrap", words, str(job.copies), job.copies))
         words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
         items.append(Item("Adhesive of the wrap", words, "as needed"))
-    items += [Item(*row) for row in base_plate.items(work)]
+    width, length = work.design.press.platen_width, work.design.press.platen_length
+    for name, what, quantity, count in base_plate.items(work):
+        area = count * width * length / 1e6 if name == base_plate.RELEASE_FILM else None
+        items.append(Item(name, what, quantity, count, area))
     if job.underlay is not None:
         items.append(_underlay(work, job.underlay))
         words = (
@@ -66,7 +97,8 @@ def bill(work: Work) -> list[Item]:
         items.append(Item("Tape", words, "as needed"))
     if work.runs.together > 1:
         words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
-        items.append(Item("Tray", words, str(base_plate.trays(work))))
+        count = base_plate.trays(work)
+        items.append(Item("Tray", words, str(count), count))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
@@ -88,7 +120,8 @@ def _underlay(work: Work, path: str) -> Item:
         f"mm{join}. A fresh print for each of {units.count(closings, 'closing')} of the press, as "
         f"paper dries there and shrinks{tray}"
     )
-    return Item("Underlay", words, units.count(len(spread) * prints, "page"))
+    pages = len(spread) * prints
+    return Item("Underlay", words, units.count(pages, "page"), pages)
 
 
 def _films(work: Work) -> list[Item]:
@@ -105,6 +138,8 @@ def _films(work: Work) -> list[Item]:
                 f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of "
                 f"parts in {len(layers) * work.job.copies} layers",
                 ", ".join(needed) or "see the cut files",
+                len(sheets) or None,
+                sum(sheet.width * sheet.length for sheet in sheets) / 1e6 if sheets else None,
             )
         )
     return items
