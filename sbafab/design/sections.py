@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Literal
 
 from pydantic import (
@@ -47,7 +48,7 @@ class Order(Section):
     """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
     shift_hours: float = Field(default=8.0, ge=1, le=24)
     """A working day of one person at one press: no press cycle takes more copies than fit in it."""
-    batch: str | None = Field(default=None, pattern=r"^[A-Za-z0-9][A-Za-z0-9.]{0,11}$")
+    batch: str | None = Field(default=None, max_length=12)
     """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". By default none; take
     one where a design is made again, as records know an actuator by design and serial."""
     technicians: int | None = Field(default=None, ge=1, le=20)
@@ -57,6 +58,9 @@ class Order(Section):
     base_plates: int | None = Field(default=None, ge=1, le=40)
     """Base plates with the holes of all places; by default 1. With more, the next lay-up need not
     wait until a plate has cooled."""
+    tray: bool | None = None
+    """Whether a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
+    by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
     """Hours in which the adhesive of the tubes cures, by its package; by default the plan takes 24
     (ours)."""
@@ -64,6 +68,16 @@ class Order(Section):
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)
     """Printed on the traveller."""
+
+    @field_validator("batch", mode="before")
+    @classmethod
+    def _is_short_name(cls, batch: object) -> object:
+        text = str(batch) if type(batch) is int else batch
+        if isinstance(text, str) and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.]{0,11}", text):
+            raise ValueError(
+                "must be 1 to 12 letters, digits or dots, beginning with a letter or digit"
+            )
+        return text
 
     @field_validator("good")
     @classmethod

@@ -351,6 +351,34 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
 # Pages, findings and the design.
 
 
+def _tray_pdf(folder: DesignFolder) -> bytes | None:
+    # Only a batch, or a design that asks for it, has a tray plan.
+    from sbafab.reports.tray_plan import tray_pdf
+
+    if not _has_tray(folder):
+        return None
+    runs = design_runs(folder.design, folder.laminate)
+    sha256 = design_sha256(folder.design)
+    return tray_pdf(folder.laminate, runs, sha256, folder.design.order.batch)
+
+
+def _tray_html(folder: DesignFolder) -> str | None:
+    # Only a batch, or a design that asks for it, has a page for the phone.
+    from sbafab.reports.traveller.job import Work
+    from sbafab.reports.traveller.tray_page import tray_html
+
+    assert folder.plan.pressing is not None
+    if not _has_tray(folder):
+        return None
+    job = order_of(folder.checked)
+    return tray_html(Work(folder.design, folder.laminate, folder.plan.pressing, (), job))
+
+
+def _has_tray(folder: DesignFolder) -> bool:
+    asked = folder.design.order.tray
+    return design_runs(folder.design, folder.laminate).copies > 1 if asked is None else asked
+
+
 def _bill(folder: DesignFolder) -> str | None:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.bill import bill_csv
@@ -459,6 +487,8 @@ ARTEFACTS: tuple[Artefact, ...] = (
         "plan.csv", "press", "of a batch: who does what when, with press and base plate", _plan_csv
     ),
     Artefact("plan.svg", "press", "of a batch: the same, drawn a day a strip", _plan_svg),
+    Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
+    Artefact("tray.html", "press", "of a batch: patterns and counts for a phone", _tray_html),
     Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
     Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),
     Artefact("preview/layers.svg", "preview", "every pattern", _layers_svg),

@@ -349,10 +349,13 @@ BLACK: Rgb = (0.0, 0.0, 0.0)
 
 
 class PdfPage:
-    """A page, its lower left corner at (0, 0); what is drawn later covers what was earlier."""
+    """A page, its lower left corner at (0, 0); what is drawn later covers what was earlier.
 
-    def __init__(self, width: float, height: float) -> None:
-        self.width, self.height = width, height
+    Below it lies what is drawn on the page ``under``, which several pages share.
+    """
+
+    def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
+        self.width, self.height, self.under = width, height, under
         self._drawn: list[str] = [f"{POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
 
     def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
@@ -374,21 +377,32 @@ class PdfPage:
         font = "F2" if bold else "F1"
         self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
-    def objects(self, number: int) -> tuple[bytes, bytes]:
-        """The page and what is drawn on it, as objects of a file; the latter has this number."""
-        content = "\n".join(self._drawn).encode(ENCODING, "replace")
+    def objects(self, number: int, under: int | None = None) -> tuple[bytes, bytes]:
+        """The page and what is drawn on it, as objects of a file; the latter has this number, and
+        what is under it that one.
+        """
         box = f"[0 0 {self.width * POINTS:.4f} {self.height * POINTS:.4f}]"
+        contents = f"{number} 0 R" if under is None else f"[{under} 0 R {number} 0 R]"
         return (
-            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents {number} 0 R /Resources "
+            f"<< /Type /Page /Parent 2 0 R /MediaBox {box} /Contents {contents} /Resources "
             "<< /Font << /F1 3 0 R /F2 4 0 R >> >> >>".encode(),
-            b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content),
+            _stream(self._drawn),
         )
+
+    def beneath(self) -> bytes:
+        """What is drawn, as an object that leaves the scale of the page as it was."""
+        return _stream(["q", *self._drawn, "Q"])
 
 
 def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
     """The whole file; a printer that obeys it prints at actual size."""
     font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
-    drawn = [page.objects(6 + 2 * place) for place, page in enumerate(pages)]
+    unders = list(dict.fromkeys(page.under for page in pages if page.under is not None))
+    numbers = {under: 5 + 2 * len(pages) + n for n, under in enumerate(unders)}
+    drawn = [
+        page.objects(6 + 2 * place, None if page.under is None else numbers[page.under])
+        for place, page in enumerate(pages)
+    ]
     kids = " ".join(f"{5 + 2 * place} 0 R" for place in range(len(pages)))
     return _file(
         [
@@ -397,9 +411,15 @@ def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
             (font % "Helvetica").encode(),
             (font % "Helvetica-Bold").encode(),
             *(part for pair in drawn for part in pair),
+            *(under.beneath() for under in unders),
             f"<< /Title {_string(title)} >>".encode(ENCODING, "replace"),
         ]
     )
+
+
+def _stream(drawn: Sequence[str]) -> bytes:
+    content = "\n".join(drawn).encode(ENCODING, "replace")
+    return b"<< /Length %d >>\nstream\n%s\nendstream" % (len(content), content)
 
 
 def _file(objects: Iterable[bytes]) -> bytes:

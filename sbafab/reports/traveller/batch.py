@@ -41,6 +41,13 @@ PAUSES = (
 )
 
 
+SORTING = (
+    "tray.pdf, printed at 100 %, has an outline for every part of each place, in the order of "
+    "laying: lay the parts out on it before a cycle, and a wrong or missing one shows. tray.html "
+    "has this table with pictures, for a phone beside the tray."
+)
+
+
 @dataclass(frozen=True)
 class PatternRow:
     """The count of a pattern at one place, and in each kind of cycle."""
@@ -89,6 +96,7 @@ class BatchPage:
     plan_basis: str
     pauses: str
     identity: tuple[Action, ...]
+    sorting: str
     cycle_names: tuple[str, ...]
     patterns: tuple[PatternRow, ...]
     copies: tuple[CopyRow, ...]
@@ -118,7 +126,8 @@ def batch_page(work: Work) -> BatchPage | None:
         _plan_basis(work),
         PAUSES,
         _identity(work),
-        tuple(_name(runs, size) for size in sizes),
+        SORTING if work.design.order.tray is not False else "",
+        tuple(cycles_of(runs, size) for size in sizes),
         tuple(
             PatternRow(
                 pattern,
@@ -278,7 +287,8 @@ def _identity(work: Work) -> tuple[Action, ...]:
     )
 
 
-def _name(runs: Runs, size: int) -> str:
+def cycles_of(runs: Runs, size: int) -> str:
+    """Return the names of the cycles of a size, in words."""
     numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
     first, last = cycle_name(numbers[0]), cycle_name(numbers[-1])
     if len(numbers) == 1:

@@ -25,6 +25,7 @@ from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import flat_shape, thumbnail
+from sbafab.reports.tray_plan import tray_sheets
 from sbafab.reports.underlay import PAPER, leaves
 from sbafab.spreadsheet import csv_text
 
@@ -99,6 +100,10 @@ def bill(work: Work) -> list[Item]:
         words = "flat, with a lid, lined as section Batch says; tape for flags round the tubes"
         count = base_plate.trays(work)
         items.append(Item("Tray", words, str(count), count))
+        if work.design.order.tray is not False:
+            pages = len(tray_sheets(laminate)) * work.runs.together
+            words = "tray.pdf printed at 100 % on plain paper; its bars must measure 100 mm"
+            items.append(Item("Tray plan", words, units.count(pages, "page"), pages))
     items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
