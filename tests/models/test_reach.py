@@ -70,8 +70,8 @@ def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("load", LOADS)
-def test_a_thousand_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    assert missed(three, 1000, LOADS[load]) == 0
+def test_many_random_reachable_targets_are_met(three: Stack, load: str) -> None:
+    assert missed(three, 300, LOADS[load]) == 0
 
 
 @pytest.mark.parametrize("count", [2, 4])

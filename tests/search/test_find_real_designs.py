@@ -76,19 +76,19 @@ def test_a_tip_with_lumen_stroke_and_force() -> None:
     [({"stroke@10kPa": 10}, "mass"), ({"stroke@10kPa": 8, "force@4mm@20kPa": 0.4}, "height")],
 )
 def test_no_real_design_is_better(least: dict[str, float], best: str) -> None:
-    free = (Free("chamber.diameter", 4.0, 9.0, 0.1), Free("stack.balloons", 2, 12, 1))
+    free = (Free("chamber.diameter", 4.0, 9.0, 0.2), Free("stack.balloons", 2, 12, 1))
     found = sbafab.find("1dof-5mm", least=least, best=best, free=free)
     asked = [f"{name}={value}" for name, value in least.items()]
     requirements, goal = read_all(asked, [], best)
     wanted = SearchProblem(sbafab.load("1dof-5mm"), requirements, goal)
     every = (
-        evaluated(wanted, {"chamber.diameter": round(4 + step / 10, 1), "stack.balloons": n})
-        for step, n in itertools.product(range(51), range(2, 13))
+        evaluated(wanted, {"chamber.diameter": round(4 + step / 5, 1), "stack.balloons": n})
+        for step, n in itertools.product(range(26), range(2, 13))
     )
     lightest = min(trial.rank for trial in every)
     assert found.holds
     assert found.best.rank == lightest
-    assert found.tries < 51 * 11
+    assert found.tries < 26 * 11
 
 
 @pytest.mark.long
