@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
@@ -11,15 +10,12 @@ import pytest
 from sbafab.as_built.cut_files import CutPart
 from tests.faults.catalogue import Goods, good_folders
 from tests.faults.once import remembering
+from tests.shared import shared_folder
 
 
 @pytest.fixture(scope="session")
 def goods(tmp_path_factory: pytest.TempPathFactory) -> Goods:
-    root = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        # All workers have folders of their own in one, and can share what stays unchanged.
-        root = root.parent
-    root = root / "good"
+    root = shared_folder(tmp_path_factory) / "good"
     root.mkdir(exist_ok=True)
     return good_folders(root)
 

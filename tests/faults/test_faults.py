@@ -1,8 +1,7 @@
 """Every fault is caught by the rule named for it, as ``docs/measured/faults.csv`` records it.
 
-The first fault of every rule in each template is put here, and every fifth of the others; of these
-a second of them is drawn for ``1dof-5mm``, a fourth for each other template of the paper's families.
-``python -m tests.faults`` puts all of them into all templates and writes the page; with ``--check``
+A few of them are put here: the first of every rule in each template, and every fifth of a draw.
+``python -m tests.faults`` puts all faults into all templates and writes the page; with ``--check``
 it compares.
 """
 

@@ -25,6 +25,7 @@ from sbafab.models.balloon_map import (
 from sbafab.models.map_range import map_range
 from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
 from tests.quick import few
+from tests.shared import shared
 
 SIZES = {
     "d = 3": Balloon(1.5, neck=0.75, bore=0.3),
@@ -59,8 +60,8 @@ def name(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="module")
-def made(name: str) -> BalloonMap:
-    return balloon_map(SIZES[name], 110.0)
+def made(name: str, tmp_path_factory: pytest.TempPathFactory) -> BalloonMap:
+    return shared(tmp_path_factory, f"map of {name}", lambda: balloon_map(SIZES[name], 110.0))
 
 
 @pytest.mark.parametrize(("least", "most"), [(0.05, 1.0), (1.0, PULLED)], ids=["pressed", "pulled"])

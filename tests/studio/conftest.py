@@ -29,14 +29,20 @@ def chrome() -> Iterator[Any]:
         yield found
 
 
+@pytest.fixture(scope="module")
+def tab(chrome: Any) -> Iterator[Watched]:
+    watched = Watched(chrome, "about:blank")
+    yield watched
+    watched.close()
+
+
 @pytest.fixture
-def seen(chrome: Any, link: str, folder: Path) -> Iterator[Watched]:
+def seen(tab: Watched, link: str, folder: Path) -> Iterator[Watched]:
     """The page with the design as the template has it; afterwards nothing may have complained."""
     (folder / FILE).write_text(DESIGN, encoding="utf-8")
-    watched = Watched(chrome, link)
-    watched.ready()
-    yield watched
-    assert watched.complaints == []
-    assert len(watched.hosts) == 1
-    assert next(iter(watched.hosts)).startswith("127.0.0.1:")
-    watched.close()
+    tab.load(link)
+    tab.ready()
+    yield tab
+    assert tab.complaints == []
+    assert len(tab.hosts) == 1
+    assert next(iter(tab.hosts)).startswith("127.0.0.1:")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,13 +29,12 @@ def served_brace(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str
 
 
 @pytest.fixture
-def brace(chrome: Any, served_brace: tuple[str, Path]) -> Iterator[Watched]:
-    watched = Watched(chrome, served_brace[0])
-    current(watched)
-    yield watched
-    assert watched.complaints == []
-    assert len(watched.hosts) == 1
-    watched.close()
+def brace(tab: Watched, served_brace: tuple[str, Path]) -> Iterator[Watched]:
+    tab.load(served_brace[0])
+    current(tab)
+    yield tab
+    assert tab.complaints == []
+    assert len(tab.hosts) == 1
 
 
 def current(seen: Watched) -> None:

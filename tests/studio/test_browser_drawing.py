@@ -32,17 +32,23 @@ def drawing_link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str
         yield link, folder
 
 
+@pytest.fixture(scope="module")
+def tab(chrome: Any) -> Iterator[Watched]:
+    watched = Watched(chrome, "about:blank", viewport={"width": 1280, "height": 800})
+    yield watched
+    watched.close()
+
+
 @pytest.fixture
-def sketch(chrome: Any, drawing_link: tuple[str, Path]) -> Iterator[Sketch]:
+def sketch(tab: Watched, drawing_link: tuple[str, Path]) -> Iterator[Sketch]:
     """The pouch in the view Draw, as its template has it."""
     link, folder = drawing_link
     (folder / FILE).write_text(POUCH, encoding="utf-8")
-    watched = Watched(chrome, link, viewport={"width": 1280, "height": 800})
-    watched.ready()
-    watched.page.get_by_role("tab", name="Draw").click()
-    yield Sketch(watched, folder / FILE)
-    assert watched.complaints == []
-    watched.close()
+    tab.load(link)
+    tab.ready()
+    tab.page.get_by_role("tab", name="Draw").click()
+    yield Sketch(tab, folder / FILE)
+    assert tab.complaints == []
 
 
 class Sketch:

@@ -68,16 +68,22 @@ def nets_link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         yield link
 
 
-@pytest.fixture
-def nets(chrome: Any, nets_link: str) -> Iterator[Watched]:
-    """The routed laminate in the view Nets."""
-    watched = Watched(chrome, nets_link, viewport={"width": 1280, "height": 800})
-    watched.ready()
-    watched.page.get_by_role("tab", name="Nets").click()
-    opened(watched, ROUTED)
+@pytest.fixture(scope="module")
+def tab(chrome: Any) -> Iterator[Watched]:
+    watched = Watched(chrome, "about:blank", viewport={"width": 1280, "height": 800})
     yield watched
-    assert watched.complaints == []
     watched.close()
+
+
+@pytest.fixture
+def nets(tab: Watched, nets_link: str) -> Iterator[Watched]:
+    """The routed laminate in the view Nets."""
+    tab.load(nets_link)
+    tab.ready()
+    tab.page.get_by_role("tab", name="Nets").click()
+    opened(tab, ROUTED)
+    yield tab
+    assert tab.complaints == []
 
 
 def opened(nets: Watched, text: str) -> None:

@@ -35,6 +35,7 @@ from sbafab.models.pneumatics import seconds
 from sbafab.studio.jobs import elastic
 from sbafab.studio.moving import stack_model
 from tests.cli.test_predict_command import run as run_predict
+from tests.shared import shared
 from tests.studio.worked import job
 from tests.validation.test_validation_table import rows
 
@@ -43,13 +44,19 @@ UNCALIBRATED = "models.calibration=none"
 
 
 @pytest.fixture(scope="module")
-def predictions() -> dict[str, Prediction]:
-    return {name: sbafab.predict(name, UNCALIBRATED) for name in MADE}
+def predictions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Prediction]:
+    return shared(
+        tmp_path_factory,
+        "uncalibrated",
+        lambda: {name: sbafab.predict(name, UNCALIBRATED) for name in MADE},
+    )
 
 
 @pytest.fixture(scope="module")
-def calibrated() -> dict[str, Prediction]:
-    return {name: sbafab.predict(name) for name in MADE}
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Prediction]:
+    return shared(
+        tmp_path_factory, "calibrated", lambda: {name: sbafab.predict(name) for name in MADE}
+    )
 
 
 def _model_value(row: Counterpart, found: Prediction) -> float:
