@@ -17,6 +17,7 @@ import numpy as np
 
 import sbafab
 from docs.scripts import measured as tables_of_pages
+from docs.scripts.axisymmetric import MeridianSection, axisymmetric_states
 from docs.scripts.ripple_sector import Sector, sector_states
 from docs.scripts.tables import FOLDER, Table, table
 from sbafab.actuators import load_design
@@ -24,7 +25,6 @@ from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
 from sbafab.models.rippled import free_shapes, resolves_waves, rippled
-from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.calculix.run import simulate
 

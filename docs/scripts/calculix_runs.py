@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 import sbafab
+from docs.scripts.axisymmetric import axisymmetric_strokes
 from docs.scripts.measured import Record, keep, record
 from docs.scripts.tables import Table
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
-from sbafab.simulators.calculix.axisymmetric import axisymmetric_strokes
 from sbafab.simulators.calculix.deck import deck_settings
 from sbafab.simulators.calculix.results import State
 from sbafab.simulators.calculix.run import simulate

@@ -17,9 +17,9 @@ from pathlib import Path
 from unittest import mock
 
 import sbafab
+from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from docs.scripts.measured import Record, keep
 from docs.scripts.tables import Table
-from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.simulators.coarse.shell import CoarseActuator
 from sbafab.simulators.sofa import scenes as scene_files
 from sbafab.simulators.sofa import shell

@@ -16,7 +16,14 @@ from sbafab.as_built.claims import (
     order_problems,
     property_problems,
 )
-from sbafab.as_built.cut_files import CutPart, LayerFile, path_in_folder, read_layers
+from sbafab.as_built.cut_files import (
+    CutPart,
+    LayerFile,
+    path_in_folder,
+    read_layers,
+    read_seams,
+    seam_departures,
+)
 from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, departure, expected_laminate
 from sbafab.as_built.kerf_removed import chords_for_arc
 from sbafab.as_built.measures import (
@@ -41,7 +48,6 @@ from sbafab.as_built.records import (
     read_claims,
     read_job,
 )
-from sbafab.as_built.seams import read_seams, seam_departures
 from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble

@@ -192,6 +192,14 @@ def tube_name(design: Design) -> str:
     return design.inlet.tube
 
 
+def cure_hours(design: Design) -> float | None:
+    """Return the hours in which the tubes' adhesive cures: the order's, the kit's, else None."""
+    if design.order.cure_hours is not None:
+        return design.order.cure_hours
+    adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
+    return None if adhesive is None else adhesive.cure_hours
+
+
 def _values(kit: Kit) -> Iterator[tuple[str, object]]:
     """Every key that a kit gives, and its value as a design would have it."""
     record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})

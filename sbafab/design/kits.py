@@ -90,7 +90,7 @@ class Adhesive(Section):
     use: str = Field(default="", max_length=400)
     """How it is used."""
     cure_hours: float | None = Field(default=None, gt=0, le=1000)
-    """Hours until it holds."""
+    """Hours until it holds, on the traveller and in a batch's plan."""
 
 
 class KitFile(Section):

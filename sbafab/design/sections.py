@@ -62,8 +62,8 @@ class Order(Section):
     """Whether a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
     by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
-    """Hours in which the adhesive of the tubes cures, by its package; by default the plan takes 24
-    (ours)."""
+    """Hours in which the adhesive of the tubes cures, by its package; by default those of
+    the kit's adhesive, else the plan takes 24 (ours)."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)

@@ -18,6 +18,7 @@ from heapq import heappop, heappush
 from itertools import accumulate
 from typing import Any, Literal, NamedTuple
 
+from sbafab.design.identity import cure_hours
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import AssemblyStep, assembly
 from sbafab.laminate.laminate import Laminate
@@ -50,7 +51,7 @@ down. The rest is for laying up, by the number of parts that each step lays."""
 CONNECT_MINUTES = 2.0
 """Minutes to connect one tube to the test bench and free it again: ours."""
 CURE_HOURS = 24.0
-"""Hours in which the adhesive of the tubes cures where ``order.cure_hours`` says nothing: ours."""
+"""Hours in which the adhesive of the tubes cures where neither order nor kit says so: ours."""
 DAY = 24 * 600
 TICKS = 10
 """Of a minute: all times of a plan are tenths of a minute, so that sums are exact."""
@@ -121,7 +122,7 @@ def plan_times(design: Design, laminate: Laminate, schedule: Schedule) -> Times:
         hands=schedule.hands_minutes,
         warm=warm_minutes(plate, press.temperature_c) if measured is None else measured,
         cool=press.cool_minutes or cool_minutes(plate, press.temperature_c),
-        cure=60 * (design.order.cure_hours or CURE_HOURS) if tubes else 0.0,
+        cure=60 * (cure_hours(design) or CURE_HOURS) if tubes else 0.0,
         test=max(1, tubes) * (held + CONNECT_MINUTES),
     )
 

@@ -18,6 +18,9 @@ from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
+from sbafab.output.checked import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.pressing.work_plan import plan_times
 
 SECTIONS = {
     "films": Films(),
@@ -150,6 +153,20 @@ def test_a_tube_of_another_size_does_not_keep_the_name_of_the_kits(lab: Path) ->
         ([f"kit={lab}", "inlet.tube=Fine tube", "inlet.tube_outer_diameter=1"], OTHER_TUBE),
     ):
         assert tube_name(load_design("1dof-5mm", changes)) == name
+
+
+def test_the_plan_of_a_batch_takes_the_cure_of_the_kits_adhesive(lab: Path) -> None:
+    hours = 'cure_hours = { value = 6, source = "its package" }'
+    lab.write_text(lab.read_text().replace('use = "a small drop', f'{hours}\nuse = "a small drop'))
+    for changes, cure in (
+        ([], 24),
+        ([f"kit={lab}"], 6),
+        ([f"kit={lab}", "order.cure_hours=2"], 2),
+    ):
+        design = load_design("1dof-5mm", ["order.copies=4", *changes])
+        laminate = build(design)
+        planned = schedule(laminate, press_settings(design), (4,))
+        assert plan_times(design, laminate, planned).cure == 60 * cure
 
 
 def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:

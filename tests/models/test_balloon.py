@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from docs.scripts.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.errors import DesignError
 from sbafab.models import balloon
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_states
 from tests.quick import few
 
 TPE = Balloon()

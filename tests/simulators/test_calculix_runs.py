@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.actuators import build, load_design
 from sbafab.cli import app
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.simulators.calculix import results
-from sbafab.simulators.calculix.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.run import History, run_ccx, simulate
 from tests.site.formats import hold

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
+from sbafab.design.identity import cure_hours
 from sbafab.geometry.region import coord
 from sbafab.pressing.cycles import Runs, batch_times, cycle_name, most_together, serial
 from sbafab.pressing.work_plan import (
@@ -232,7 +233,8 @@ def _plan_basis(work: Work) -> str:
     times = plan_times(work.design, work.laminate, work.schedule)
     holds = most_together(work.laminate, _platen(work))
     at_press = 1 - CUT_SHARE - SORT_SHARE - TUBES_SHARE
-    cure = "order.cure_hours" if order.cure_hours else "ours, read its package: order.cure_hours"
+    cure = "the kit's" if cure_hours(work.design) else "ours, read its package: order.cure_hours"
+    cure = "order.cure_hours" if order.cure_hours else cure
     cool = "measured" if work.design.press.cool_minutes else "an estimate: set press.cool_minutes"
     warm = "measured" if work.schedule.heating.time_constant_minutes else "an estimate"
     resources = (

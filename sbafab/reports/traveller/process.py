@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import NamedTuple
 
-from sbafab.design.identity import kit_of, tube_name
+from sbafab.design.identity import cure_hours, kit_of, tube_name
+from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, laying, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
@@ -366,8 +367,14 @@ def _on_holes(work: Work) -> list[Action]:
             (),
             names,
         ),
-        Action("Let the adhesive cure as its package says before you pressurise anything."),
+        _cure(work.design),
     ]
+
+
+def _cure(design: Design) -> Action:
+    hours = cure_hours(design)
+    how = "as its package says" if hours is None else f"for {hours:g} h"
+    return Action(f"Let the adhesive cure {how} before you pressurise anything.")
 
 
 def _in_inlets(work: Work) -> list[Action]:
@@ -402,7 +409,7 @@ def _in_inlets(work: Work) -> list[Action]:
             (),
             names,
         ),
-        Action("Let the adhesive cure as its package says before you pressurise anything."),
+        _cure(work.design),
     ]
 
 
