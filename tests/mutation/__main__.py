@@ -3,6 +3,7 @@
 A sample of changes, one at a time, in a copy of the tree: another operator or number, a condition
 turned round. Constants of modules and decorated functions are among them, which mutmut leaves out;
 texts are not. Each change is shown to its room's own tests, and what survives those to neighbours'.
+``rules/nets,voids=12`` draws from these modules alone.
 """
 
 from __future__ import annotations
@@ -112,10 +113,12 @@ def mutants_of(file: Path, source: str) -> Iterator[Mutant]:
             yield Mutant(file, start, end, new, node.lineno)
 
 
-def sampled(home: Path, room: str, count: int, seed: int) -> list[Mutant]:
-    """So many of a room's changes that still are Python, drawn with a seed."""
+def sampled(home: Path, room: str, modules: list[str], count: int, seed: int) -> list[Mutant]:
+    """So many changes of a room, or of some modules, that still are Python, drawn with a seed."""
     every: list[Mutant] = []
     for path in sorted((home / "sbafab" / room).glob("*.py")):
+        if modules and path.stem not in modules:
+            continue
         source = path.read_text(encoding="utf-8")
         found = mutants_of(path.relative_to(home), source)
         every += sorted({*found}, key=lambda m: (m.start, m.new))
@@ -180,9 +183,11 @@ def main() -> int:
         home = Path(place) / "tree"
         shutil.copytree(ROOT, home, ignore=shutil.ignore_patterns(".git", "__pycache__", "out"))
         for said in given.rooms:
-            room, _, count = said.partition("=")
+            where, _, count = said.partition("=")
+            room, _, names = where.partition("/")
+            modules = [name for name in names.split(",") if name]
             survived = []
-            chosen = sampled(home, room, int(count), given.seed)[given.start :]
+            chosen = sampled(home, room, modules, int(count), given.seed)[given.start :]
             for mutant in chosen:
                 target = home / mutant.file
                 source = target.read_text(encoding="utf-8")

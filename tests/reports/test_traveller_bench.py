@@ -245,13 +245,33 @@ def test_the_legend_names_the_cross_only_where_it_is_seen(sheet_files: Any) -> N
     assert all("+ datum" in step for step in steps(eared))
 
 
+def test_a_single_chamber_has_no_others(sheet_files: Any) -> None:
+    one, three = (words_of(page(sheet_files, name)) for name in ("1dof-5mm", "3dof-15mm"))
+    assert "raise the chamber slowly" in one
+    assert "raise the chamber in 10 s to 150 kPa, hold for 60 s (" in one
+    assert "each chamber" not in one
+    assert "raise each chamber in 10 s to 150 kPa, hold for 60 s, the other chambers open" in three
+
+
+def test_paper_counts_in_pin_heights_only_where_it_lies_below_pins(sheet_files: Any) -> None:
+    """Step 3 of a single stack has pins in it and paper; of a tip no step has both."""
+    one, three = (words_of(page(sheet_files, name)) for name in ("1dof-5mm", "3dof-15mm"))
+    allowed = "0.1 mm of paper, which the pin heights allow for"
+    assert allowed in one
+    assert allowed not in three
+    assert "pricks release film and underlay over the pins" in one
+    assert "pricks the release film over the pins" in three
+    assert "The print shows the edges of P04: lay by eye along them what no pin holds" in one
+
+
 def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
     tree = page(sheet_files, "3dof-15mm")
     cut = words_of(tree.get_element_by_id("cut").getparent())
     assert cut.index("lint-free") < cut.index("smooth card") < cut.index("sheets/TPE_1.dxf: TPE")
     assert cut.index("sheets/PTFE_1.dxf: PTFE") < cut.index("Wipe the soot")
     # 15 masks in three pieces, on 15 storeys.
-    assert "45 loose mask pieces: pick them up with antistatic tweezers" in cut
+    # One spare of either pattern, each kind at least one.
+    assert "45 loose mask pieces and 6 spare: pick them up with antistatic tweezers" in cut
     first, second, third, fourth = steps(tree)
     for step, minutes in ((first, 3), (second, 12), (third, 10), (fourth, 20)):
         # One line says when the time begins, and nothing else on the page says otherwise.

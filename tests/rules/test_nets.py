@@ -11,10 +11,12 @@ import pytest
 from sbafab.geometry.region import Region, disc, rectangle, strip, union
 from sbafab.laminate.joints import Fold, Net, Port
 from sbafab.laminate.laminate import Chamber, Laminate
+from sbafab.laminate.netlist import Netlist
 from sbafab.rules import sealing
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
-from sbafab.rules.nets import check, connectivity
+from sbafab.rules.nets import check, connectivity, netlist_findings
+from sbafab.rules.void_axes import Terminal, axis_of, blind_ends
 from tests.quick import few
 from tests.rules import routed
 from tests.rules.conftest import built
@@ -23,6 +25,7 @@ from tests.rules.routed import (
     cut_through,
     groups_by_raster,
     laminate_of,
+    line_of,
     planted,
     straight,
     xy,
@@ -231,6 +234,66 @@ def test_a_chamber_of_no_net_must_reach_its_own_pocket() -> None:
     lost = Chamber("lost", ((2.0, 6.0),))
     faults = connectivity(replace(laminate, chambers=(lost,)), LIMITS).faults
     assert [(fault.kind, fault.nets) for fault in faults] == [("open", ("lost",))]
+
+
+def test_ends_one_above_the_other_come_before_a_crossing() -> None:
+    """Two halves of a net end above each other at x = 16, and cross at x = 8 in a narrow channel:
+    the hole was forgotten at the ends.
+    """
+    ports = {"p": (0, 0, 1), "q": (1, 5, 1)}
+    routes = line_of(ports)
+    routes.nets["a"] = ["p", "q"]
+    routes.nodes |= {(0, x, 1): "a" for x in range(5)} | {(1, 4, 1): "a", (1, 5, 1): "a"}
+    routes.segments |= {((0, x, 1), (0, x + 1, 1)): "a" for x in range(4)}
+    routes.segments[(1, 4, 1), (1, 5, 1)] = "a"
+    ways = ((16, 4), (16, 8)), ((16, 8), (8, 8)), ((8, 8), (8, 0))
+    routes.more += [(1, strip(*way, 0.3)) for way in ways]
+    faults = connectivity(laminate_of(routes), LIMITS).faults
+    (fault,) = [each for each in faults if each.kind == "open"]
+    assert math.dist(fault.at, (16, 4)) < NEAR
+    assert "layer 3 has no hole there" in fault.message
+
+
+def test_an_inlet_that_is_cut_off_is_told_from_its_pocket() -> None:
+    laminate = built("1dof-5mm", "stack.balloons=3")
+    (x, y), (dx, dy) = laminate.inlets[0].mouth, laminate.inlets[0].direction
+    middle = (x - 4 * dx, y - 4 * dy)
+    ends = [(middle[0] - side * dy, middle[1] + side * dx) for side in (-2, 2)]
+    mask = laminate.layer(2)
+    assert mask.profile.contains(middle)
+    layers = list(laminate.layers)
+    layers[1] = replace(mask, profile=mask.profile - strip(*ends, 0.5), pattern="cut")
+    nets = (Net("chamber1", ("chamber1",)),)
+    cut = replace(laminate, layers=tuple(layers), nets=nets)
+    (fault,) = [each for each in connectivity(cut, LIMITS).faults if each.kind == "open"]
+    assert fault.message.startswith(
+        "net chamber1 is open: the pocket of chamber1 is not joined to the inlet of chamber1; "
+    )
+
+
+def test_a_pocket_with_a_hole_at_its_edge_has_no_port_of_its_own() -> None:
+    """A pocket of 14 x 2 mm, fed in the middle of its long side. With its port alone neither half
+    is blind; a hole that opens into it, however far to the side, leaves one half without a port.
+    """
+    pocket = rectangle((0.0, -1.0), (14.0, 1.0)) | strip((7.0, 0.0), (7.0, 5.0), 0.5)
+    axis = axis_of(pocket, 0.0)
+    ways = [Terminal((12.0, 0.0), 0.0, True), Terminal((7.0, 5.0), 0.5, False)]
+    assert blind_ends(axis, ways, 2.0) == []
+    (end,) = blind_ends(axis, [*ways, Terminal((7.0, 1.0), 0.6, False)], 2.0)
+    assert end.at[0] < 3.0
+    # Further up the channel it opens into the channel alone.
+    assert blind_ends(axis, [*ways, Terminal((7.0, 2.2), 0.6, False)], 2.0) == []
+
+
+def test_a_name_that_the_design_lacks_gets_the_nearest_or_what_to_give() -> None:
+    netlist = Netlist({"a": ("p", "q"), "b": ("r", "ss"), "c": ("outlet",)})
+    findings = netlist_findings(laminate_of(straight()), LIMITS, netlist, "nets.json")
+    lacking = [each.message for each in findings if "is no port" in each.message]
+    where = "which is no port or chamber of the design"
+    assert lacking == [
+        f"nets.json names ss, {where}; did you mean s?",
+        f"nets.json names outlet, {where}; give its layers and its place, or correct it",
+    ]
 
 
 def test_random_faults_are_the_same_in_every_run() -> None:

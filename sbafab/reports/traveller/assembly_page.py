@@ -21,7 +21,7 @@ from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import base_plate, bench, bill, units
-from sbafab.reports.traveller.bench import before_the_day, tools
+from sbafab.reports.traveller.bench import Tool, before_the_day, tools
 from sbafab.reports.traveller.bill import Item
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.page import (
@@ -100,8 +100,8 @@ def assembly_html(job: AssemblyJob) -> str:
             tested=[name for build in job.assembled.designs for name in build.parts],
             cautions=_cautions(job),
             bill=_bill(job),
-            before_the_day=before_the_day(works),
-            tools=tools(works),
+            before_the_day=[*before_the_day(works), *_castings(job.assembled)],
+            tools=[*tools(works), *_test_tools(job.assembled)],
             before_cutting=bench.before_cutting(works),
             after_cutting=bench.after_cutting(works),
             sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
@@ -613,6 +613,32 @@ def _leak_pressures(actuators: Sequence[PlacedSba]) -> str:
     """Return the leak tests' pressures, one number where the designs agree."""
     pressures = {actuator.made.design.acceptance.leak_pressure_kpa for actuator in actuators}
     return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
+
+
+def _castings(assembled: Assembled) -> list[Action]:
+    """Return what must have cured before the day on which parts are joined."""
+    names = [placed.name for placed in assembled.parts if isinstance(placed.part, Cup)]
+    cast = f"{joined_words(names)}: cast and cured as its section under Join the parts says."
+    return [Action(cast)] if names else []
+
+
+def _test_tools(assembled: Assembled) -> list[Tool]:
+    """Return what the joining and the tests of the finished assembly take."""
+    deploy = assembled.assembly.deploy
+    kinds = {type(placed.part) for placed in assembled.parts}
+    rows = []
+    if Magnet in kinds:
+        rows.append(Tool("Outer magnet", "finds the face to turn outward; test of the assembly"))
+    if Line in kinds or Cup in kinds:
+        glass = ", glass plate" if Cup in kinds else ""
+        rows.append(Tool(f"Vacuum supply{glass}", "test of the assembly"))
+    if deploy.aperture_diameter is not None:
+        hole = units.millimetres(deploy.aperture_diameter)
+        rows.append(Tool(f"Plate with a hole of {hole}", "test of the assembly"))
+    if deploy.lumen_diameter is not None:
+        lumen = units.millimetres(deploy.lumen_diameter)
+        rows.append(Tool(f"Tube of inner diameter {lumen}", "test of the assembly"))
+    return rows
 
 
 def final_checks(assembled: Assembled) -> list[Action]:

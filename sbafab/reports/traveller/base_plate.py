@@ -133,12 +133,13 @@ def plate_notes(work: Work) -> tuple[str, ...]:
 
 def _underlay_words(work: Work) -> str:
     """Return the sentences on the underlay; empty where no step has one."""
-    steps = [step.step for step in work.schedule.steps if _has_underlay(step)]
+    steps = [step.step for step in work.schedule.steps if has_underlay(step)]
     if not steps:
         return ""
     which = joined_words([str(number) for number in steps])
     thick = units.millimetres(work.design.press.underlay_thickness)
-    pins = ", which the pin heights allow for" if work.laminate.pins else ""
+    pricked = any(has_underlay(step) and step.pin_settings for step in work.schedule.steps)
+    pins = ", which the pin heights allow for" if pricked else ""
     return (
         f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
         f"along its dotted line, lies between plate and release film while the press is closed: "
@@ -147,13 +148,13 @@ def _underlay_words(work: Work) -> str:
     )
 
 
-def _has_underlay(step: Step) -> bool:
+def has_underlay(step: Step) -> bool:
     return any(item.part == UNDERLAY for item in step.build_up)
 
 
 def hot_prints(work: Work) -> int:
     """Return the prints of the underlay that lie in the closed press, all cycles counted."""
-    return work.runs.count * sum(_has_underlay(step) for step in work.schedule.steps)
+    return work.runs.count * sum(has_underlay(step) for step in work.schedule.steps)
 
 
 def prints(work: Work) -> int:
@@ -168,10 +169,18 @@ def trays(work: Work) -> int:
 
 def release_films(work: Work) -> int:
     """Return the release films that all cycles need: two new ones each time the press closes on a
-    step, and two that serve all tacks of a batch of registered sheets.
+    step, one for films that are turned over, and two that serve all tacks of a batch of registered
+    sheets.
     """
     panel, steps = work.laminate.panel, len(work.schedule.steps)
-    return 2 * work.runs.count * steps if panel is None else 2 * panel.batches * (steps + 1)
+    if panel is not None:
+        return 2 * panel.batches * (steps + 1)
+    return 2 * work.runs.count * steps + turns_over(work)
+
+
+def turns_over(work: Work) -> bool:
+    """Return True if films are turned over, so that their pins can be pushed out."""
+    return work.laminate.panel is None and any(s.pin_settings for s in work.schedule.steps)
 
 
 def build_up_notes(work: Work) -> tuple[str, ...]:
@@ -228,6 +237,7 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
     plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
     sheets = pad_sheets(pad.thickness_mm)
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
+    turned = "; one of them for films that are turned over" if turns_over(work) else ""
     holes = (
         f"; stepped holes from {work.job.fixture} and the hole table"
         if work.job.fixture is not None
@@ -248,7 +258,7 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
         (
             RELEASE_FILM,
             f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; TPE must not "
-            "stick to it at press temperature (our advice; the paper names none)",
+            f"stick to it at press temperature (our advice; the paper names none){turned}",
             str(release_films(work)),
             release_films(work),
         ),

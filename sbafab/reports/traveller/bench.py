@@ -128,12 +128,14 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
         )
     ]
     actions += _threading(works)
-    loose = sum(_loose(work.laminate) * work.job.copies for work in works)
+    loose, spare = (sum(counts) for counts in zip(*map(_loose, works), strict=True))
     if loose:
+        spares = f" and {spare} spare" if spare else ""
         actions.append(
             Action(
-                f"{units.count(loose, 'loose mask piece')}: pick them up with antistatic tweezers "
-                "on an earthed mat, keep them in a dish with a lid. PTFE charges itself and flies."
+                f"{units.count(loose, 'loose mask piece')}{spares}: pick them up with antistatic "
+                "tweezers on an earthed mat, keep them in a dish with a lid. PTFE charges itself "
+                "and flies."
             )
         )
     return actions
@@ -164,10 +166,16 @@ def _threading(works: Sequence[Work]) -> list[Action]:
     ]
 
 
-def _loose(laminate: Laminate) -> int:
-    """Return the number of pieces of masks that fall into several."""
-    pieces = (len(layer.profile.pieces) for layer in laminate.layers if layer.is_mask)
-    return sum(count for count in pieces if count > 1)
+def _loose(work: Work) -> tuple[int, int]:
+    """Return the numbers of needed and spare pieces of masks that fall into several."""
+    loose = spare = 0
+    for layers in work.laminate.patterns.values():
+        pieces = len(layers[0].profile.pieces)
+        if layers[0].is_mask and pieces > 1:
+            needed = len(layers) * work.job.copies
+            loose += pieces * needed
+            spare += pieces * work.design.order.spare_parts(needed)
+    return loose, spare
 
 
 def underlay(work: Work, part: AssemblyStep) -> list[Action]:
@@ -186,7 +194,8 @@ def underlay(work: Work, part: AssemblyStep) -> list[Action]:
     film, over = "a see-through release film", "flush with the plate's edges"
     eye = ": lay by eye along them, as each line says"
     if part.pins:
-        film, over, eye = f"{film}, pricked likewise", "pricked at its grey rings over the pins", ""
+        film, over = f"{film}, pricked likewise", "pricked at its grey rings over the pins"
+        eye = ": lay by eye along them what no pin holds"
     return [
         Action(
             f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
@@ -204,7 +213,7 @@ def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action
     return [
         Action(
             f"Has a mask slipped? Lift what lies over it with tweezers, push it {home}, lay the "
-            "rest back and stroke it flat. After the flash bond it cannot be moved: cut a new one."
+            "rest back and stroke it flat. Once pressed it cannot be moved: cut a new one."
         )
     ]
 
@@ -489,8 +498,12 @@ def tools(works: Sequence[Work]) -> list[Tool]:
     if sizes:
         diameters = joined_words([f"⌀{units.millimetres(size)}" for size in sizes])
         thin = joined_words([f"⌀{units.millimetres(punch(size))}" for size in sizes])
-        has_underlay = any(work.job.underlay is not None for work in works)
-        pricked = "release film and underlay" if has_underlay else "the release film"
+        is_underlaid = any(
+            step.pin_settings and base_plate.has_underlay(step)
+            for work in works
+            for step in work.schedule.steps
+        )
+        pricked = "release film and underlay" if is_underlaid else "the release film"
         rows += [
             Tool(
                 f"Drills, flat cutters, reamers H7 {diameters}",

@@ -15,13 +15,13 @@ from sbafab.laminate.assembly import AssemblyStep, assembly, laying, stack_count
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, UNDERLAY
+from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD
 from sbafab.pressing.cycles import Runs, cycle_name, serial
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import bench, units
-from sbafab.reports.traveller.base_plate import punch
+from sbafab.reports.traveller.base_plate import has_underlay, punch
 from sbafab.reports.traveller.bench import HeatBlank, closing, reseat, underlay
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.lay_up import (
@@ -171,16 +171,16 @@ def _bench_actions(
     return (heat, _plate(part, bool(laid)), *laid, *rest, *down)
 
 
-def _plate(part: AssemblyStep, has_underlay: bool) -> Action:
+def _plate(part: AssemblyStep, is_underlaid: bool) -> Action:
     """Return the laying of base plate and pins, and of the release film unless an underlay comes
     first.
     """
     text = "Lay the base plate down, cold, cut corner at the back right"
     if part.pins:
-        film = "" if has_underlay else " Prick a release film over them."
+        film = "" if is_underlaid else " Prick a release film over them."
         return Action(f"{text}. {SET_PINS}{film}")
-    film = "" if has_underlay else ", and a release film on it"
-    by_eye = " Lay by eye, as each line says." if part.adds and not has_underlay else ""
+    film = "" if is_underlaid else ", and a release film on it"
+    by_eye = " Lay by eye, as each line says." if part.adds and not is_underlaid else ""
     return Action(f"{text}, no pins in it{film}.{by_eye}")
 
 
@@ -450,6 +450,10 @@ def _boxes(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(names) if len(names) > 1 else ()
 
 
+def _each(names: Sequence[str]) -> str:
+    return "each chamber" if names else "the chamber"
+
+
 def leak_test(work: Work) -> list[Action]:
     """Return the paper's way to find leaks, then the proof test; pressures and times are ours."""
     holes = [port.name for port in work.laminate.tube_holes]
@@ -477,7 +481,7 @@ def leak_test(work: Work) -> list[Action]:
         ),
         *_joined_tubes(work),
         Action(
-            f"Under water, or brushed with soapy water, raise each chamber slowly to "
+            f"Under water, or brushed with soapy water, raise {_each(names)} slowly to "
             f"{leak_words(work).replace(' for ', ' and hold for ')}.",
             (),
             names,
@@ -532,9 +536,9 @@ def order_of(steps: Sequence[Step]) -> TakingDown:
     if pinned:
         lines += [
             "In steps with pins: turn plate and films over, films down, onto something soft and "
-            "cool with a clean release film on it. It holds the films against the plate while the "
-            "punch pushes each pin down through its push-out hole, until its seat is free. Turn "
-            "everything back.",
+            "cool with a clean release film on it, the same one in every step. It holds the films "
+            "against the plate while the punch pushes each pin down through its push-out hole, "
+            "until its seat is free. Turn everything back.",
             "Every pin now stands high. Hold the films down on both sides of it with flat tweezers "
             "and draw it straight up with pliers: the way in which the films went on, so that no "
             "edge of a hole folds back.",
@@ -559,10 +563,10 @@ def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
     )
     if step.pin_settings:
         yield Action(
-            f"Turn over onto {_soft(step)} and push the pins out of their seats (3): "
-            f"{_punches(step)}. Turn back, hold the films down and draw the pins (4)."
+            f"Turn over onto a clean release film on {_soft(step)} and push the pins out of their "
+            f"seats (3): {_punches(step)}. Turn back, hold the films down and draw the pins (4)."
         )
-    away = "; underlay off the plate, discard it" if _has_underlay(step) else ""
+    away = "; underlay off the plate, discard it" if has_underlay(step) else ""
     yield Action(f"Lower release film off ({last}){away}. You now hold {product}.")
 
 
@@ -583,12 +587,8 @@ def _soft(step: Step) -> str:
     out = max(pin.stands_mm + pin.tolerance_mm - top + pin.seat_mm for pin in step.pin_settings)
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD)
     if pad > out:
-        return "the press pad"
+        return "the cool press pad"
     return f"soft foam at least {units.millimetres(out + 1)} thick"
-
-
-def _has_underlay(step: Step) -> bool:
-    return any(item.part == UNDERLAY for item in step.build_up)
 
 
 def _picture(is_pinned: bool) -> str:
@@ -765,11 +765,12 @@ def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
     """Return the proof test's actions, ``names`` the chambers that have a box each."""
     seconds = work.design.acceptance.proof_seconds
     target = proof(work)
+    others = ", the other chambers open" if names else ""
     return [
         Action(
             "Proof test, behind a shield, the actuator free to move and dry or full of water: "
-            f"raise each chamber in {RAMP} s to {units.plain(target.kilopascals)} kPa, hold for "
-            f"{seconds:g} s, the other chambers open ({target.basis}).",
+            f"raise {_each(names)} in {RAMP} s to {units.plain(target.kilopascals)} kPa, hold for "
+            f"{seconds:g} s{others} ({target.basis}).",
             (),
             names,
         ),
