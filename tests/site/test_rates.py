@@ -59,6 +59,29 @@ def test_a_statistic_is_called_by_its_name() -> None:
     assert "median" in speed(record_of_medians)
 
 
+def test_factors_on_the_page_are_the_record_s() -> None:
+    """Medians of one run: the other programs' seconds by ours, one process's by that of two."""
+    page = " ".join((ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8").split())
+    plates = {name: recorded("plates", name) for name in ("sbafab", "foldable", "build123d")}
+    others = re.search(r"took ([\d.]+) \(foldable, chords\) and ([\d.]+) times", page)
+    assert others is not None
+    for name, factor in zip(("foldable", "build123d"), others.groups(), strict=True):
+        # Seconds are recorded to two digits.
+        assert float(factor) == pytest.approx(plates[name] / plates["sbafab"], rel=0.02)
+    several = re.search(r"check ([\d.]+) to ([\d.]+) times as many as one", page)
+    assert several is not None
+    gains = [
+        recorded("processes", f"{design}, 1 process")
+        / recorded("processes", f"{design}, 2 processes")
+        for design in ("1dof-5mm", "3dof-15mm")
+    ]
+    assert [*map(float, several.groups())] == [pytest.approx(gain, abs=0.05) for gain in gains]
+    sizes = re.search(r"takes (\d+) MB after 1,250 and (\d+) MB at the end", page)
+    assert sizes is not None
+    first, *_, last = (row[2] for row in TABLES["memory"].rows)
+    assert [f"{size} MB" for size in sizes.groups()] == [first, last]
+
+
 def test_no_rate_stands_in_a_text_by_hand() -> None:
     pages = [page for page in (ROOT / "docs").rglob("*.md") if "_made" not in page.parts]
     for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(pages)):
