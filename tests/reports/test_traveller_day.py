@@ -20,9 +20,9 @@ from tests.reports.bench_pages import EARS, built, page, words_of
 def test_what_must_be_ready_before_the_day(sheet_files: Any, assignments: tuple[str, ...]) -> None:
     tree = page(sheet_files, "3dof-15mm", *assignments)
     section = words_of(tree.get_element_by_id("before").getparent())
-    # Two release films a step; the reamers are those of the hole table.
+    # Two release films a step and one for what is turned over; reamers as in the hole table.
     steps_made = 6 if assignments else 4
-    assert f"{2 * steps_made} release films" in section
+    assert f"{2 * steps_made + 1} release films" in section
     assert f"each of the {steps_made} press steps" in section
     assert ("reamers H7 ⌀1 mm and ⌀1.5 mm" in section) == bool(assignments)
     # The paper has no time for warming or cooling: nothing is made up.
