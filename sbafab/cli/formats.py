@@ -531,6 +531,8 @@ def _press() -> dict[str, Any]:
     body = TypeAdapter(Schedule).json_schema(mode="serialization")
     body["properties"] = {"schema": {"const": PRESS_SCHEMA}, **body["properties"]}
     body["properties"]["batch"] = _batch()
+    body["properties"]["hands_minutes"] = number("null")
+    del body["properties"]["is_timed"]
     body["required"] = ["schema", *body["required"]]
     return body
 
@@ -560,7 +562,7 @@ def _batch() -> dict[str, Any]:
         cycles={**array(COUNT), "description": "copies pressed in each cycle"},
         serials={**array(TEXT), "description": "of each copy: cycle and place"},
         places_mm=array(place),
-        **{name: number() if name == "hands_minutes" else number("null") for name in times},
+        **{name: number("null") for name in times},
         a_day_one_by_one=count_or_null,
         a_day_in_batches=count_or_null,
         shift_minutes=number(),

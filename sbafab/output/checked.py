@@ -185,6 +185,7 @@ def press_settings(design: Design) -> PressSettings:
         minutes_for=tuple(map(named_film, press.minutes_for)),
         time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
         carrier_limit=design.panel.carrier_limit_c,
+        is_timed=not design.form.is_drawn,
     )
 
 

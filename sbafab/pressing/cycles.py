@@ -176,14 +176,16 @@ def are_apart(places: tuple[Point, ...], bounds: Bounds, room: float) -> bool:
 
 @dataclass(frozen=True)
 class BatchTimes:
-    """Minutes of a batch: in the press (None: not stated), by hand, and both in sequence."""
+    """Minutes of a batch: in the press, by hand, and both in sequence; None: nobody stated them."""
 
     press: float | None
-    hands: float
+    hands: float | None
 
     @property
     def total(self) -> float | None:
-        return None if self.press is None else self.press + self.hands
+        if self.press is None or self.hands is None:
+            return None
+        return self.press + self.hands
 
 
 def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
@@ -194,7 +196,8 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
     """
     pressed = plan.total_press_minutes
     return BatchTimes(
-        None if pressed is None else runs.count * pressed, runs.copies * plan.hands_minutes
+        None if pressed is None else runs.count * pressed,
+        runs.copies * plan.hands_minutes if plan.is_timed else None,
     )
 
 
@@ -202,9 +205,9 @@ def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
     """Return the number of actuators that one person makes in a shift with one press, ``together``
     at once.
 
-    None where the minutes in the press are not stated.
+    None where the minutes in the press or by hand are not stated.
     """
-    if plan.total_press_minutes is None:
+    if plan.total_press_minutes is None or not plan.is_timed:
         return None
     copies = 0
     while True:

@@ -189,6 +189,8 @@ class PressSettings:
     time_constant: float | None = None
     """Minutes in which the edge of the cold plate makes 63 % of its way; None: not measured."""
     carrier_limit: float | None = None
+    is_timed: bool = True
+    """Whether the paper's minutes by hand are taken for this laminate; not for drawn layers."""
 
     @property
     def force_n(self) -> float:
@@ -300,7 +302,8 @@ class Schedule:
     """All steps, their time, and the warnings for the technician.
 
     The two totals are None where the minutes of a step are; warming up is not in them.
-    ``hands_minutes`` are the estimate's minutes beside those in the press.
+    ``hands_minutes`` are the estimate's minutes beside those in the press; plans of a batch take
+    them, even where the laminate ``is_timed`` by nobody and no total is stated.
     """
 
     steps: tuple[Step, ...]
@@ -310,6 +313,7 @@ class Schedule:
     warnings: tuple[str, ...]
     heating: Heating
     hands_minutes: float
+    is_timed: bool = True
     tacking: Tacking | None = None
     seams: tuple[SeamStep, ...] = ()
     folds: tuple[FoldStep, ...] = ()
@@ -361,16 +365,22 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         tacking = tacking_of(laminate, press.tack, press.temperature_c, plate, low)
     hands = HANDLING_MINUTES + (0.0 if tacking is None else tacking.total_minutes)
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
+    by_hand = (
+        f"{HANDLING_MINUTES:g} min to cut, lay up, pin and fit the tubing; the latter is assumed "
+        "the same for every design (paper: 1.75 h in all)"
+    )
+    if not press.is_timed:
+        by_hand = "a time by hand that nobody measured for drawn layers: no total"
+    has_total = total is not None and press.is_timed and not laminate.seams
     return Schedule(
         steps,
         total,
-        None if total is None or laminate.seams else total + hands,
-        f"{pressed} in the press{_tacked(tacking)} and {HANDLING_MINUTES:g} min to cut, lay "
-        "up, pin and fit the tubing; the latter is assumed the same for every design (paper: "
-        "1.75 h in all)",
+        (total or 0.0) + hands if has_total else None,
+        f"{pressed} in the press{_tacked(tacking)} and {by_hand}",
         tuple(warnings(laminate, press, parts, steps)),
         warming,
         hands,
+        press.is_timed,
         tacking,
         tuple(seam_steps(laminate)),
         tuple(fold_steps(laminate)),
@@ -449,6 +459,8 @@ def _step(
         press.pressure_kpa, press.platen, press.pad, setting.pad, setting.under
     )
     title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
+    if part.name == "flash_bottom" and len(part.layers) > 2:
+        title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
     words = _instructions(part, count) + after
     if laminate.panel is not None:
         title, words = title_of_sheets(part), instructions(part)

@@ -51,7 +51,7 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
         "heating": asdict(plan.heating),
-        "hands_minutes": plan.hands_minutes,
+        "hands_minutes": plan.hands_minutes if plan.is_timed else None,
         "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
         **{key: steps for key, steps in joints.items() if steps},
     }

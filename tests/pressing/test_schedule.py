@@ -13,6 +13,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import PressSettings, schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 
@@ -242,3 +243,15 @@ def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:
     assert not any("Snip" in words for words in before)
     assert not any("Snip" in step.instructions for step in schedule(stack(2), PAPER).steps)
     assert "Snip off the ears" in press_csv(on_ears)
+
+
+def test_no_time_by_hand_is_claimed_for_drawn_layers() -> None:
+    def times(name: str) -> tuple[object, object, str]:
+        design = load_design(name)
+        table = press_json(schedule(build(design), press_settings(design)))
+        return table["hands_minutes"], table["estimated_build_minutes"], table["estimate_basis"]
+
+    assert times("1dof-5mm")[:2] == (60, 105)
+    hands, total, basis = times("pouch")
+    assert (hands, total) == (None, None)
+    assert "nobody measured" in basis

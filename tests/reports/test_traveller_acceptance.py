@@ -12,10 +12,10 @@ from sbafab.actuators import build, load_design
 from sbafab.models.formulas import burst_pressure
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.acceptance import proof
 from sbafab.reports.traveller.bench import film_classes, pressure_range
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
-from sbafab.reports.traveller.process import proof
 
 SHA = "0123456789abcdef" * 4
 

@@ -65,6 +65,30 @@ def test_the_papers_actuator_is_not_on_other_pages(sheet_files: Any) -> None:
 
 def test_a_flash_bond_that_bonds_nothing_is_said_to_be_needless(sheet_files: Any) -> None:
     first, second = [words_of(step) for step in page(sheet_files, "array").findall(".//article")]
-    assert "nothing bonds here" in first
-    assert "nothing bonds here" not in second
-    assert "nothing bonds here" not in words_of(page(sheet_files, "1dof-5mm"))
+    assert "No bond: one film and masks" in first
+    assert "Leave this step out: nothing bonds in it" in first
+    assert "Flash bond" not in first
+    assert "After the flash bond it cannot be moved" not in first
+    assert "Where step 1 was left out, lay layers 2 and 3 one by one" in second
+    # Textile coated with TPU: there is no TPE film in it.
+    assert "Full bond: films that face each other melt into one" in second
+    assert "nothing bonds" not in words_of(page(sheet_files, "1dof-5mm"))
+
+
+def test_a_tube_goes_between_the_films_of_its_own_chamber(sheet_files: Any) -> None:
+    words = words_of(page(sheet_files, "diode"))
+    # The channel lies between base and wall, the pocket between wall and cap.
+    assert "the tab's end, layers 1 and 3 for in and layers 3 and 5 for out; the PTFE" in words
+
+
+def test_a_folded_part_comes_off_the_sheet_as_one(sheet_files: Any) -> None:
+    words = words_of(page(sheet_files, "folded"))
+    # One part and one spare, of 21.3 cm2 of LDPE 0.1 mm thick, 0.92 mg/mm3: 196 mg each.
+    assert "2 come free, the lightest of 196 mg" in words
+
+
+def test_a_stack_for_vacuum_is_tested_under_vacuum(sheet_files: Any) -> None:
+    words = words_of(page(sheet_files, "vacuum"))
+    assert "Bottom balloon, layers 2 to 10" in words
+    assert "draw the chamber to the vacuum of use" in words
+    assert "vacuum of use" not in words_of(page(sheet_files, "pouch"))

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.base_plate import HOLE_PROCESSES, most_play
+from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import PinHole, pin_holes, push_out
@@ -243,6 +244,7 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
         if work.job.fixture is not None
         else "; no holes"
     )
+    has_no_tpe = all(layer.film.material != FIRST[0] for layer in laminate.layers)
     return [
         *_pin_items(
             laminate.pins * work.runs.together * shop.plates,
@@ -257,8 +259,9 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
         ),
         (
             RELEASE_FILM,
-            f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; TPE must not "
-            f"stick to it at press temperature (our advice; the paper names none){turned}",
+            f"{release.material}, {units.millimetres(release.thickness_mm)}, {size}; "
+            f"{'films' if has_no_tpe else 'TPE'} must not stick to it at press temperature "
+            f"(our advice; the paper names none){turned}",
             str(release_films(work)),
             release_films(work),
         ),

@@ -97,9 +97,13 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
     count, lightest = 0, math.inf
     for work in works:
         for layers in work.laminate.patterns.values():
-            if layers[0].film == film:
-                pieces = layers[0].profile.pieces
-                needed = len(layers) * work.job.copies
+            # Halves of a folded film are one part.
+            cut = [layer for layer in layers if work.laminate.cut_with(layer) == layer.index]
+            if cut and cut[0].film == film:
+                is_folded = bool(work.laminate.folds)
+                shape = work.laminate.first_cut(cut[0]) if is_folded else cut[0].profile
+                pieces = shape.pieces
+                needed = len(cut) * work.job.copies
                 count += len(pieces) * (needed + work.design.order.spare_parts(needed))
                 lightest = min(lightest, *(piece.area for piece in pieces))
     weight = ""
@@ -533,6 +537,8 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         widths = sorted({seam.width_mm for seam in seams if seam.tool == tool})
         wide = joined_words([units.millimetres(width) for width in widths])
         rows.append(Tool(f"{tool.capitalize()}, {wide} wide", "seams, along the paths of layers/"))
+        if tool == "hot-tip":
+            rows.append(Tool("Heat-proof mat; release film of PTFE", "under and over a seam"))
     if works[0].schedule.steps:
         rows += _press_tools(works)
     if any(laminate.tube_count for laminate in laminates):

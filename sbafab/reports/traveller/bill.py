@@ -421,8 +421,8 @@ def times(work: Work) -> list[Time]:
     plan = work.schedule
     # The paper's minutes are those of a stack of balloons.
     is_drawn = work.design.form.is_drawn
-    handling = None if is_drawn else plan.hands_minutes
-    total = None if is_drawn else plan.estimated_build_minutes
+    handling = plan.hands_minutes if plan.is_timed else None
+    total = plan.estimated_build_minutes
     basis = (
         "cutting, lay-up, joining, tubes: nobody has timed this design"
         if is_drawn
@@ -446,6 +446,9 @@ def times(work: Work) -> list[Time]:
                 f"{laser_basis(work)}; all sheets, {copies}",
             )
         )
+    papers = Time(
+        "The paper", f"{PAPER_MINUTES:g} min = {units.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"
+    )
     return [
         *rows,
         *_batch(work),
@@ -460,7 +463,5 @@ def times(work: Work) -> list[Time]:
             "not included: heating the press, warming the plate before each clock starts, curing "
             "the adhesive, leak and proof tests",
         ),
-        Time(
-            "The paper", f"{PAPER_MINUTES:g} min = {units.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"
-        ),
+        *(() if is_drawn else (papers,)),
     ]

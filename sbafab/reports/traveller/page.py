@@ -25,13 +25,14 @@ from sbafab.pressing.schedule import Schedule, joined_words, layers_in_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.html_templates import environment
-from sbafab.reports.traveller import base_plate, bench, bill, panel, process, units
+from sbafab.reports.traveller import acceptance, base_plate, bench, bill, panel, process, units
+from sbafab.reports.traveller.acceptance import wrapping
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.joints import joint_pages
-from sbafab.reports.traveller.process import order_of, wrapping
+from sbafab.reports.traveller.process import order_of
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
 from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
 from sbafab.rules.finding import Finding
@@ -104,12 +105,12 @@ def context(work: Work) -> dict[str, Any]:
         "joint_pages": joint_pages(work),
         "turned": _turned(laminate),
         "taking_down": order_of(work.schedule.steps) if work.schedule.steps else None,
-        "finishing": process.finishing(work),
-        "tubing": process.tubing(work),
-        "leak_test": process.leak_test(work),
+        "finishing": acceptance.finishing(work),
+        "tubing": acceptance.tubing(work),
+        "leak_test": acceptance.leak_test(work),
         "wrapping": wrapping(work),
-        "leak_words": process.leak_words(work),
-        "proof_words": process.proof_words(work),
+        "leak_words": acceptance.leak_words(work),
+        "proof_words": acceptance.proof_words(work),
         "times": bill.times(work),
         "kerf_notes": bill.kerf_notes(work),
         "expected_sizes": bill.expected_sizes(work),

@@ -13,7 +13,7 @@ from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import bench, process, units
+from sbafab.reports.traveller import acceptance, bench, process, units
 from sbafab.reports.traveller.bill import (
     PAPER_MINUTES,
     Cut,
@@ -50,8 +50,8 @@ def chapter(work: Work) -> dict[str, Any]:
         "step_pages": _step_pages(work, panel),
         "taking_down": None,
         "finishing": _cut_free(panel),
-        "tubing": [*_each(panel, "Fit the tubes"), *process.tubing(work)],
-        "leak_test": [*_each(panel, "Test"), *process.leak_test(work)],
+        "tubing": [*_each(panel, "Fit the tubes"), *acceptance.tubing(work)],
+        "leak_test": [*_each(panel, "Test"), *acceptance.leak_test(work)],
         "force_notes": _force_notes(work, panel),
         "bill": _bill(work, panel),
         "cuts": _cuts(work, panel),

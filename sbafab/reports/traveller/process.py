@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import NamedTuple
 
-from sbafab.design.identity import cure_hours, kit_of, tube_name
-from sbafab.design.records import Design
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, laying, stack_count
+from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate, Layer, Pin
-from sbafab.models.formulas import burst_pressure
-from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD
-from sbafab.pressing.cycles import Runs, cycle_name, serial
-from sbafab.pressing.schedule import Step, joined_words
+from sbafab.pressing.cycles import Runs, cycle_name
+from sbafab.pressing.schedule import Step, joined_words, layers_in_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import bench, units
@@ -33,14 +28,12 @@ from sbafab.reports.traveller.lay_up import (
     places,
 )
 from sbafab.reports.traveller.shapes import (
-    STATION,
     Bed,
     Picture,
     Round,
     beds,
     inlets_in,
     rounds,
-    straight_run,
 )
 from sbafab.reports.traveller.step_pictures import INKS, build_up_svg, exploded, pin_lines, plan
 
@@ -54,12 +47,13 @@ SET_PINS = (
 )
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
-MOST_COPIES = 36
-"""Copies up to which each has a box."""
+
 BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
     "full": "Full bond: all TPE that touches melts into one.",
 }
+FULL_OF_OTHERS = "Full bond: films that face each other melt into one, but where a mask lies."
+LOOSE = "No bond: one film and masks, which nothing holds together."
 
 
 @dataclass(frozen=True)
@@ -94,12 +88,12 @@ def step_pages(work: Work) -> list[StepPage]:
         pages.append(
             StepPage(
                 step,
-                BONDS[step.bond],
+                _bond(work, part),
                 _dials(step, runs.together),
                 tuple(bench.heat_blanks(step, work.schedule.heating)),
                 build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
-                (*_place_notes(runs), *_loose_notes(work, part)),
+                (*_notes_of_design(work, part), *_place_notes(runs), *_loose_notes(work, part)),
                 placed,
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
@@ -147,16 +141,45 @@ def _place_notes(runs: Runs) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
-    """Return a note on a flash bond of one drawn film and masks that no pin holds."""
-    layers = [work.laminate.layer(index) for index in part.layers]
-    films = [layer for layer in layers if not layer.is_mask]
-    is_loose = part.bond == "flash" and not part.pins and len(films) < 2
-    if not is_loose or not work.design.form.is_drawn:
+def _bond(work: Work, part: AssemblyStep) -> str:
+    """Return the sentence on what a step bonds."""
+    if _is_loose(work, part):
+        return LOOSE
+    films = [work.laminate.layer(index).film for index in part.layers]
+    has_tpe = any(film.material == FIRST[0] for film in films)
+    if part.bond == "full" and work.design.form.is_drawn and not has_tpe:
+        return FULL_OF_OTHERS
+    return BONDS[part.bond]
+
+
+def _notes_of_design(work: Work, part: AssemblyStep) -> tuple[str, ...]:
+    """Return what a drawn design has to say of its lay-up, in the first press step."""
+    first = assembly(work.laminate)[0]
+    if not work.design.form.is_drawn or part.number != first.number:
         return ()
-    return (
-        "One film and masks, no pin: nothing bonds here, and masks may come off. You may leave "
-        "this step out and lay its layers in the next step, lowest first. (Our advice, not tried.)",
+    return tuple(f"Note: {note}" for note in work.laminate.notes)
+
+
+def _is_loose(work: Work, part: AssemblyStep) -> bool:
+    """Return True for a flash bond of one drawn film and masks that no pin holds."""
+    films = [index for index in part.layers if not work.laminate.layer(index).is_mask]
+    is_held = part.bond != "flash" or bool(part.pins) or len(films) > 1
+    return work.design.form.is_drawn and not is_held
+
+
+def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
+    """Return notes on a step that bonds nothing, and on what the step after it lays instead."""
+    loose = {p.layers: p.number for p in assembly(work.laminate) if _is_loose(work, p)}
+    if part.layers in loose:
+        return (
+            "Leave this step out: nothing bonds in it, and masks may come off. Lay its layers in "
+            "the step that takes the stack, one by one, lowest first. (Our advice, not tried.)",
+        )
+    stacks = [stack for stack in part.stacks if stack in loose]
+    return tuple(
+        f"Where step {loose[stack]} was left out, lay {layers_in_words(stack)} one by one in place "
+        "of its stack."
+        for stack in stacks
     )
 
 
@@ -195,7 +218,8 @@ def _actions(
     )
     for bed in lying:
         yield from _lay(things, bed, part.pins)
-    yield from reseat(laminate, part.adds, bool(part.pins))
+    if not _is_loose(work, part):
+        yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
@@ -322,189 +346,6 @@ def _product(laminate: Laminate, part: AssemblyStep) -> str:
     keep = "keep it" if many == 1 else "keep them"
     stack = f"the {units.stacks(many)} from step {part.number}, layers {numbers}"
     return f"{stack}; {keep} this side up"
-
-
-def finishing(work: Work) -> list[Action]:
-    """Return the trimming after the last press step; empty where nothing is to be cut off."""
-    if work.laminate.registration != "ears":
-        return []
-    return [
-        Action("Snip off every ear along the outline, not into the bond."),
-        Action("Cut the tails of the inlet strips flush with the tab's end."),
-        Action("Leave the masks in their pockets."),
-    ]
-
-
-def tubing(work: Work) -> list[Action]:
-    """Return the paper's step 5, one box an inlet where it is done for each of them.
-
-    Tubes on holes of an outer film are glued on after that, which the paper has not.
-    """
-    return [*_in_inlets(work), *_on_holes(work)]
-
-
-def _on_holes(work: Work) -> list[Action]:
-    """Return the gluing of tubes on holes of an outer film; empty without one."""
-    holes = work.laminate.tube_holes
-    if not holes:
-        return []
-    names = _boxes([port.name for port in holes])
-    diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
-    at = f"the {'hole' if len(holes) == 1 else 'holes'} of {joined_words([p.name for p in holes])}"
-    return [
-        *_each_copy(work, "Glue the tubes on their holes"),
-        Action(f"Mark {at} with a pen beside each, on the face that it opens to."),
-        Action(
-            f"Cut {units.count(len(holes), 'piece')} of {tube_name(work.design)}, outer diameter "
-            f"{diameter}, square and without burr, as long as your rig needs."
-        ),
-        Action("Wipe the film round the hole with isopropanol and let it dry.", (), names),
-        Action(
-            f"Stand the tube, or a flange with the tube in it, on the hole, its bore over the "
-            f"opening, and seal its foot all round with {work.design.inlet.adhesive}, at least "
-            f"{units.millimetres(work.design.rules.bond_width)} wide on the film; keep it out of "
-            "the hole.",
-            (),
-            names,
-        ),
-        _cure(work.design),
-    ]
-
-
-def _cure(design: Design) -> Action:
-    hours = cure_hours(design)
-    how = "as its package says" if hours is None else f"for {hours:g} h"
-    return Action(f"Let the adhesive cure {how} before you pressurise anything.")
-
-
-def _in_inlets(work: Work) -> list[Action]:
-    """Return the fitting of tubes between two films; empty without an inlet."""
-    inlets = work.laminate.inlets
-    if not inlets:
-        return []
-    names = _boxes([inlet.chamber for inlet in inlets])
-    diameter = units.millimetres(inlets[0].tube_diameter)
-    deep = f"up to {units.millimetres(min(inlet.length for inlet in inlets))} deep: "
-    deep += "the length of the tab's straight run"
-    if work.design.form.is_drawn:
-        deep = _depth(work.laminate)
-    masks = [mask for gap in work.laminate.interfaces for mask in gap.masks]
-    strip = f"the {masks[-1].film.material} strip lies" if masks else "nothing lies"
-    end = [Action("Snip the strip off flush with the tab's end.", (), names)] if masks else []
-    beside = " beside the strip" if masks else " between them"
-    first = f"the tab of {inlets[0].chamber}" if len(inlets) > 1 else "the tab"
-    return [
-        *_each_copy(work, "Fit the tubes"),
-        Action(f"Mark {first} with a pen, on {_upper_side(work)}."),
-        Action(
-            f"Cut {units.count(len(inlets), 'piece')} of {tube_name(work.design)}, outer diameter "
-            f"{diameter}, square and without burr, as long as your rig needs."
-        ),
-        Action(f"Part the two films at the tab's end; {strip} between them.", (), names),
-        Action(f"Push the tube in{beside}, {deep}.", (), names),
-        *end,
-        Action(
-            f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
-            "out of the tube.",
-            (),
-            names,
-        ),
-        _cure(work.design),
-    ]
-
-
-def _upper_side(work: Work) -> str:
-    """Return words for the side of a tab that is marked."""
-    if not work.schedule.steps:
-        return "the upper side, on which the highest layer lies"
-    below = "the base is below"
-    if work.design.form.is_drawn:
-        below = f"layer {work.laminate.layers[0].index} is below"
-    return f"the side that faced up in the press: {below}"
-
-
-def _depth(laminate: Laminate) -> str:
-    """Return how deep a tube goes into drawn tabs, and how far the shortest runs straight."""
-    length = min(inlet.length for inlet in laminate.inlets)
-    run = math.floor(min(straight_run(laminate, inlet) for inlet in laminate.inlets) + STATION)
-    if run < length:
-        return f"up to {units.millimetres(length)} deep, the inlet's length in the design"
-    return (
-        f"up to {units.millimetres(length)} deep, the inlet's length in the design; the channel "
-        f"runs straight for {run} mm"
-    )
-
-
-def _each_copy(work: Work, task: str) -> list[Action]:
-    """Return a box for each copy of a batch; empty for one copy."""
-    count = work.job.copies
-    if count == 1 or work.laminate.panel is not None:
-        return []
-    copies = range(1, count + 1) if count <= MOST_COPIES else ()
-    numbers = tuple(serial(work.runs, copy, work.design.order.batch) for copy in copies)
-    return [Action(f"{task} of all {count} copies, one after the other, as follows.", (), numbers)]
-
-
-def _boxes(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of boxes for each of several; a single one needs no name."""
-    return tuple(names) if len(names) > 1 else ()
-
-
-def _each(names: Sequence[str]) -> str:
-    return "each chamber" if names else "the chamber"
-
-
-def leak_test(work: Work) -> list[Action]:
-    """Return the paper's way to find leaks, then the proof test; pressures and times are ours."""
-    holes = [port.name for port in work.laminate.tube_holes]
-    names = _boxes([*[chamber.name for chamber in work.laminate.chambers], *holes])
-    lumen = ["lumen"] if work.laminate.lumen else []
-    tab = ["tab"] if work.laminate.inlets or not holes else []
-    alone = work.job.copies == 1
-    where = "at the head of this traveller" if alone else "beside its serial number"
-    places = joined_words(["outline", *tab, "tube", "cap", *lumen])
-    several = (
-        [
-            Action(
-                "While one chamber is full, watch the open tubes of the others: bubbles there mean "
-                "a leak between chambers.",
-            )
-        ]
-        if work.laminate.tube_count > 1
-        else []
-    )
-    return [
-        *_each_copy(work, "Test the chambers"),
-        Action(
-            f"Fit to each tube: {fitting(work)}; push it in by 5 mm or more. Connect a "
-            "regulator or a syringe with a gauge. Wear eye protection."
-        ),
-        *_joined_tubes(work),
-        Action(
-            f"Under water, or brushed with soapy water, raise {_each(names)} slowly to "
-            f"{leak_words(work).replace(' for ', ' and hold for ')}.",
-            (),
-            names,
-        ),
-        Action("All balloons open evenly. One that stays shut was over-melted."),
-        Action(f"No stream of bubbles anywhere; look at {places}."),
-        *several,
-        Action("Release the pressure; dry the actuator."),
-        *proof_test(work, names, where),
-    ]
-
-
-def _joined_tubes(work: Work) -> Iterator[Action]:
-    """Yield which tubes to close, for each net with a tube on a hole and one more tube."""
-    holes = {port.name for port in work.laminate.tube_holes}
-    tubes = holes | {inlet.chamber for inlet in work.laminate.inlets}
-    for net in work.laminate.nets:
-        joined = [name for name in net.ports if name in tubes]
-        if len(joined) > 1 and holes.intersection(joined):
-            yield Action(
-                f"Tubes of {joined_words(joined)} lead into the same channels (net {net.name}): "
-                "close all of them but one, and fill by that."
-            )
 
 
 # Taking down, after the press has opened. The order is ours; the paper gives none.
@@ -689,136 +530,4 @@ def _peeled(x0: float, is_pinned: bool) -> list[str]:
         _box(x0, (10.0, 10.9), (24.5, 13.3), LAMINATE),
         *_to(x0, (11.5, 20.0), (7.0, 20.9)),
         *_to(x0, (25.5, 12.1), (30.0, 12.1)),
-    ]
-
-
-# Acceptance: leak test and proof test.
-#
-# The paper looks for leaks under water and bursts three actuators (Sec. 2, 7). Pressures, times and
-# fitting are ours: keys of ``acceptance``, which a kit gives.
-
-
-SHARE = 0.6
-"""Of the estimated burst pressure, above which nothing is proved: ours."""
-STEP = 5.0
-"""kPa to which a lowered proof pressure is rounded down."""
-RAMP = 10
-"""Seconds in which the proof pressure is raised: ours."""
-
-
-class Proof(NamedTuple):
-    """The proof test's pressure in kPa (None: nobody can say), and where it comes from."""
-
-    kilopascals: float | None
-    basis: str
-
-
-def proof(work: Work) -> Proof:
-    """Return the pressure of the proof test: the kit's, or less for what would burst near it."""
-    kit_pressure = work.design.acceptance.proof_pressure_kpa
-    burst = burst_pressure(work.design.form, work.laminate)
-    forces = (
-        f"the paper gives forces at {FORCE_KPA:g} kPa and burst three actuators with pockets of "
-        f"5 mm at {BURST.value:g} ± {BURST.error:g} kPa"
-    )
-    if burst is None:
-        return Proof(
-            None,
-            f"{forces}; nobody has burst this film or this pocket. Burst one actuator, write down "
-            f"the pressure, ________ kPa, and proof test the others at {SHARE:.0%} of it",
-        )
-    most = math.floor(SHARE * burst / STEP) * STEP
-    if kit_pressure <= most:
-        return Proof(
-            kit_pressure, f"{forces}; this one is estimated to burst at about {burst:.0f} kPa"
-        )
-    return Proof(
-        most,
-        f"{forces}; this one is estimated to burst at about {burst:.0f} kPa (film stress in "
-        f"proportion, ours), so its proof pressure is {SHARE:.0%} of that and not {kit_pressure:g} "
-        "kPa" + ("" if most >= FORCE_KPA else f"; do not count on forces at {FORCE_KPA:g} kPa"),
-    )
-
-
-def leak_words(work: Work) -> str:
-    """Return pressure and time of the leak test: "5 kPa for 60 s"."""
-    acceptance = work.design.acceptance
-    return f"{acceptance.leak_pressure_kpa:g} kPa for {acceptance.leak_seconds:g} s"
-
-
-def proof_words(work: Work) -> str:
-    """Return pressure and time of the proof test, a blank where nobody can say."""
-    return (
-        f"{units.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
-    )
-
-
-def fitting(work: Work) -> str:
-    """Return what joins tube and supply, with the bore of the tube where the kit knows it."""
-    tube = kit_of(work.design).tubes.get(tube_name(work.design))
-    bore = None if tube is None else tube.inner_diameter
-    of = "" if bore is None else f" of {units.millimetres(bore)}"
-    return f"{work.design.acceptance.fitting}, in the tube's bore{of}"
-
-
-def proof_test(work: Work, names: tuple[str, ...], where: str) -> list[Action]:
-    """Return the proof test's actions, ``names`` the chambers that have a box each."""
-    seconds = work.design.acceptance.proof_seconds
-    target = proof(work)
-    others = ", the other chambers open" if names else ""
-    return [
-        Action(
-            "Proof test, behind a shield, the actuator free to move and dry or full of water: "
-            f"raise {_each(names)} in {RAMP} s to {units.plain(target.kilopascals)} kPa, hold for "
-            f"{seconds:g} s{others} ({target.basis}).",
-            (),
-            names,
-        ),
-        Action("Passed: no bang, no hiss, no balloon that swells more than its neighbours."),
-        Action(
-            f"Leak test again, as above, at {work.design.acceptance.leak_pressure_kpa:g} kPa: a "
-            "bond that began to peel shows now.",
-            (),
-            names,
-        ),
-        Action(
-            f"Accepted: no leak at {leak_words(work)}, {proof_words(work)} held, no leak after "
-            f"it. Write both results {where}; reject an actuator that fails either."
-        ),
-    ]
-
-
-def wrapping(work: Work) -> list[Action]:
-    """Return the wrapping of a laminate round its tube; empty for others."""
-    wrap = work.design.form.wrap
-    if wrap is None:
-        return []
-    closed = (
-        f"overlapping by {units.millimetres(wrap.overlap)}"
-        if wrap.overlap
-        else "meeting edge to edge"
-    )
-    return [
-        Action("Wipe the tube and the sheet's under side with isopropanol, let them dry."),
-        Action(
-            f"Try it dry. Wrap the sheet round its tube, outer diameter "
-            f"{units.millimetres(wrap.tube_diameter)}, balloons outward, its straight edges "
-            f"along the tube, {closed}."
-        ),
-        Action(
-            f"Glue: {wrap.glue}, a thin, even film on the tube below the sheet. Keep it off "
-            "inlets, tabs and balloons. What holds the sheet is ours: the paper does not say."
-        ),
-        Action(
-            "Wrap it again, stroke it on from the middle to both edges, and bind it with tape over "
-            "release film, the balloons empty, until the adhesive has cured as its package says."
-        ),
-        Action(
-            "Lead the supply tubes along the tube, the way the tabs point, and tie them to it with "
-            "a turn of thread behind the tabs, so that no pull reaches them."
-        ),
-        Action(
-            f"Raise each chamber to {work.design.acceptance.leak_pressure_kpa:g} kPa once more: "
-            "balloons open evenly round the tube, and no edge of the sheet lifts."
-        ),
     ]
