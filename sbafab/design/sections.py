@@ -282,6 +282,9 @@ class Registration(Section):
     hand_turn: float = Field(default=0.4, ge=0, le=10)
     """Degrees: the most by which what fewer than two pins hold is turned. Calibrated together with
     hand_placement."""
+    seam_error: Annotated[float, Millimetres(0, 5)] | None = None
+    """The most by which a seam lies off its path, whatever its tool; by default cutting_error for a
+    laser, which the same machine moves, and 0.3 for other tools: ours, nobody measured it."""
 
     @field_validator("experimental")
     @classmethod

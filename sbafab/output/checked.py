@@ -131,6 +131,7 @@ def limits(design: Design) -> Limits:
             turn=design.registration.hand_turn,
             sheet=design.panel.sheet_error,
             second_cut=design.panel.second_cut_error,
+            seam=design.registration.seam_error,
         ),
         unknown_kerf=design.laser.unknown_kerf,
         pin_stretch=design.registration.pin_stretch,

@@ -17,6 +17,7 @@ from sbafab.geometry.edges import Point, distance_to
 from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.assembly import AssemblyStep, assembly, laying
+from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
@@ -40,7 +41,8 @@ class Freedom(NamedTuple):
 
     The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
     same ``step``. ``pins`` are those that hold it. ``in_sheet``: it is what a registered sheet
-    stretches, or what moves while it is transferred.
+    stretches, or what moves while it is transferred. ``seam``: the name of the seam that it is the
+    path of.
     """
 
     step: int
@@ -51,10 +53,15 @@ class Freedom(NamedTuple):
     most: float
     centre: Point | None = None
     in_sheet: bool = False
+    seam: str = ""
 
     @property
     def by_hand(self) -> bool:
-        """True if the hand decides it: every turn, and the place of a body without pins."""
+        """True if the hand decides it: every turn, and the place of a body without pins. A seam's
+        place is its tool's, as a cut edge's is the laser's.
+        """
+        if self.seam:
+            return False
         return self.centre is not None or self.pins == 0 or self.in_sheet
 
     def lever(self, p: Point, normal: Point) -> float:
@@ -66,7 +73,7 @@ class Freedom(NamedTuple):
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
         centre = self.centre and (nanometres(self.centre[0]), nanometres(self.centre[1]))
-        return self.most, centre, self.pins, self.in_sheet
+        return self.most, centre, self.pins, self.in_sheet, bool(self.seam)
 
 
 class Freedoms(dict[Part, tuple[Freedom, ...]]):
@@ -155,7 +162,29 @@ def freedoms(
             ways = (*by_part[item.under], *ways)
         for part in item.body:
             by_part[part] += ways
+    for seam in laminate.seams:
+        by_part |= _of_seam(laminate, seam, by_part, tolerances)
     return Freedoms(by_part)
+
+
+def seam_part(seam: Seam, piece: int = 0) -> Part:
+    """Return a seam's region as a part: its layer is below 0, so that none of the films has it."""
+    return Part(-seam.order, piece)
+
+
+def _of_seam(
+    laminate: Laminate, seam: Seam, by_part: Mapping[Part, Sequence[Freedom]], tools: Tolerances
+) -> dict[Part, tuple[Freedom, ...]]:
+    """Freedoms of a seam: those of the film above, on which its path is laid, and its tool's."""
+    films = laminate.layer(seam.above).profile.pieces
+    under = next((n for n, film in enumerate(films) if not (film & seam.region).is_empty), 0)
+    step = next(
+        (s.number for s in laying(laminate) if s.joining and s.joining.seam is seam), seam.order
+    )
+    most, (layer, _) = tools.of_seam(seam.tool), seam_part(seam)
+    off = Freedom(step, layer, seam.below, seam.above, 0, most, seam=seam.name)
+    ways = (*by_part[Part(seam.above, under)], *((off,) if most > 0 else ()))
+    return {seam_part(seam, piece): ways for piece in range(len(seam.region.pieces))}
 
 
 def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:

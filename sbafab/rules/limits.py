@@ -9,8 +9,11 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
+from sbafab.laminate.joints import SeamTool
 from sbafab.laminate.laminate import Laminate
 
+GUIDED_TOOL = 0.3
+"""mm: error of place of a seam's tool other than a laser; ours, nobody measured it."""
 TOLERANCE = 0.001
 """mm by which a value may miss its limit and still pass: the resolution of the cut files."""
 
@@ -24,7 +27,8 @@ class Tolerances:
     is calibrated on its success rate (``docs/scripts/hand.py``).
     ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     ``lone_pin``: mm, a layer on the plate's only pin, whose own place does not count (None: as on
-    several).
+    several). ``seam``: mm, a seam off its path (None: as cut edges for a laser, ``GUIDED_TOOL``
+    for other tools).
     """
 
     cutting: float = 0.1
@@ -34,6 +38,13 @@ class Tolerances:
     sheet: float = 0.05
     second_cut: float = 0.2
     lone_pin: float | None = None
+    seam: float | None = None
+
+    def of_seam(self, tool: SeamTool) -> float:
+        """Return the most by which a seam of a tool lies off its path, mm."""
+        if self.seam is not None:
+            return self.seam
+        return self.cutting if tool == "laser" else GUIDED_TOOL
 
     def on_pins(self, laminate: Laminate) -> float:
         """Return the most by which a layer of a laminate lies off its place on its pins, mm."""
@@ -127,6 +138,12 @@ KEYS = (
     _Key("pin_error", WORST, lambda lim: lim.tolerances.pin),
     _Key("hand_placement", WORST, lambda lim: lim.tolerances.placement, "default"),
     _Key("hand_turn", WORST, lambda lim: lim.tolerances.turn, "default"),
+    _Key(
+        "seam_error",
+        (*WORST, "sealing"),
+        lambda lim: lim.tolerances.of_seam("hot-tip"),
+        "default",
+    ),
     _Key("sheet_error", WORST, lambda lim: lim.tolerances.sheet, "default"),
     _Key("opening_pressure_kpa", ("nets",), lambda lim: lim.opening_pressure, "default", True),
     _Key("dead_end", ("nets",), lambda lim: lim.dead_end, "default", True),

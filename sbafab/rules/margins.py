@@ -27,9 +27,10 @@ from sbafab.geometry.facing_places import facing_places_of, sampled
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width
+from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
-from sbafab.rules.freedoms import Freedom, Freedoms, Part
+from sbafab.rules.freedoms import Freedom, Freedoms, Part, seam_part
 from sbafab.rules.limits import TOLERANCE, Limits, holds
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ ROOM: Final = 1e-6
 class Owner(NamedTuple):
     """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
 
-    Seats are 0 below, 1 above, then the masks.
+    Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles.
     """
 
     seat: int
@@ -115,12 +116,18 @@ class InterfaceMargins:
 
 
 def seated(interface: Interface) -> tuple[int, ...]:
-    """Return layer indices by seat."""
+    """Return layer indices by seat; those of seams as ``seam_part`` numbers them."""
     return (
         interface.below.index,
         interface.above.index,
         *(mask.index for mask in interface.masks),
+        *(seam_part(seam).layer for seam in bonding_seams(interface)),
     )
+
+
+def bonding_seams(interface: Interface) -> tuple[Seam, ...]:
+    """Return the seams whose edges end a bond: where films are pressed none does."""
+    return () if interface.pressed else interface.seams
 
 
 def relative_freedoms(
@@ -224,8 +231,7 @@ def _cost_without(shared: Mapping[int, float], costs: Mapping[int, float]) -> fl
 
 def _parts(interface: Interface) -> list[Region]:
     """The pieces of an interface's layers, by seat."""
-    layers = (interface.below, interface.above, *interface.masks)
-    return [piece for layer in layers for piece in layer.profile.pieces]
+    return [piece for profile in profiles_of(interface) for piece in profile.pieces]
 
 
 def _farthest(freedom: Freedom, box: Bounds) -> float:
@@ -291,7 +297,8 @@ def narrow_places(
         if free:
             least = min(reach.value for _, reach in free)
             farther = group.loss.slack(least, flush, limits.worst_mask_overhang)
-            overhang = OverhangQuery(interface.mask, free, farther, profiles)
+            films_and_masks = profiles[: 2 + len(interface.masks)]
+            overhang = OverhangQuery(interface.mask, free, farther, films_and_masks)
             queries.append((number, "overhang", overhang))
     by_group: list[dict[Quantity, Places]] = [{} for _ in groups]
     results = places_of([query for *_, query in queries])
@@ -375,8 +382,12 @@ PlacesQuery = BondQuery | OverhangQuery
 
 
 def profiles_of(interface: Interface) -> tuple[Region, ...]:
-    """Return an interface's layer profiles by seat."""
-    return tuple([layer.profile for layer in (interface.below, interface.above, *interface.masks)])
+    """Return an interface's layer profiles by seat, and the regions of its seams."""
+    layers = (interface.below, interface.above, *interface.masks)
+    return (
+        *(layer.profile for layer in layers),
+        *(seam.region for seam in bonding_seams(interface)),
+    )
 
 
 @cached_batch

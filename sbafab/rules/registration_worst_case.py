@@ -1,7 +1,8 @@
 """registration-worst-case: bond and overhang that remain with every error at its worst.
 
 Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
-without pins by the hand's placement and turn.
+without pins by the hand's placement and turn, and seams by their tool's error of place. A seam's
+width is taken to be as exact as a cut edge.
 """
 
 from __future__ import annotations
@@ -142,6 +143,7 @@ def _finding(
         message += (
             f"; even without what is laid by hand {_mm(least_pinned.pinned)} is left at "
             f"{interface_name(least_pinned.interfaces[0])}, and it needs {limit:g}: make "
+            f"{'seam or ' if any(freedom.seam for freedom, _ in dearest) else ''}"
             f"{REMEDY[quantity]} larger"
         )
     elif verdict == "warn":
@@ -192,6 +194,8 @@ def _moved(freedom: Freedom) -> str:
 def _source(freedom: Freedom) -> str:
     """Cause of a displacement, its layers and its press step in words."""
     layers = _moved(freedom)
+    if freedom.seam:
+        return f"place of seam {freedom.seam}"
     if freedom.in_sheet:
         return f"stretch or transfer of {layers} in its sheet"
     cause = {0: "hand placement", 1: "turn about the only pin"}.get(
@@ -208,7 +212,7 @@ def _why(pinned: float) -> str:
 
 def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> str:
     """Remedy for the hand's errors."""
-    loose = next((freedom for freedom, _ in dearest if freedom.pins < 2), None)
+    loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:
         return f"make {REMEDY[quantity]} larger"
     where = f"{_moved(loose)} in step {loose.step}"

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from tests.reports.bench_pages import page, words_of
+from sbafab.output.checked import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.bench import before_cutting
+from sbafab.reports.traveller.job import Job, Work
+from tests.reports.bench_pages import SHA, built, page, words_of
 
 
 def test_a_coated_film_is_laid_by_its_face(sheet_files: Any) -> None:
@@ -81,10 +85,12 @@ def test_a_tube_goes_between_the_films_of_its_own_chamber(sheet_files: Any) -> N
     assert "the tab's end, layers 1 and 3 for in and layers 3 and 5 for out; the PTFE" in words
 
 
-def test_a_folded_part_comes_off_the_sheet_as_one(sheet_files: Any) -> None:
-    words = words_of(page(sheet_files, "folded"))
-    # One part and one spare, of 21.3 cm2 of LDPE 0.1 mm thick, 0.92 mg/mm3: 196 mg each.
-    assert "2 come free, the lightest of 196 mg" in words
+def test_a_folded_part_comes_off_the_sheet_as_one() -> None:
+    design, laminate = built("folded")
+    plan = schedule(laminate, press_settings(design))
+    _, held, _ = before_cutting([Work(design, laminate, plan, (), Job(SHA, "sbafab 1.0.0"))])
+    # One part and one spare, of 21.3 cm2 of LDPE, 0.1 mm thick, 0.92 mg/mm3; each half weighs 98.
+    assert "2 come free, the lightest of 196 mg" in held.text
 
 
 def test_a_stack_for_vacuum_is_tested_under_vacuum(sheet_files: Any) -> None:
