@@ -256,6 +256,13 @@ def _underlay(folder: DesignFolder) -> bytes | None:
     return underlay_pdf(folder.laminate, design_sha256(folder.design), places, platen)
 
 
+def _seams(folder: DesignFolder) -> bytes | None:
+    # Only a folder with a traveller has pages of seams.
+    from sbafab.reports.underlay import seams_pdf
+
+    return seams_pdf(folder.laminate, design_sha256(folder.design))
+
+
 # Meshes and pictures.
 
 
@@ -490,6 +497,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
     Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
     Artefact("tray.html", "press", "of a batch: patterns and counts for a phone", _tray_html),
     Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),
+    Artefact("seams.pdf", "press", "paths of seams on the films in hand, 1:1", _seams),
     Artefact("mesh", "mesh", "solid, cavities, and meshes for simulation", _write_meshes),
     Artefact("preview/layers.svg", "preview", "every pattern", _layers_svg),
     Artefact("preview/stack.svg", "preview", "the layers in section", _stack_svg),

@@ -1,4 +1,5 @@
-"""underlay.pdf: pages to print at 1:1 and to lay up on, below the release film.
+"""underlay.pdf: pages to print at 1:1 and to lay up on, below the release film; seams.pdf: the
+paths of seams on the films in hand.
 
 It shows the edges of all that no pin holds, as it lies in the stack: seen from above, the axis of
 the actuator where the cross is. A cycle of many laminates that one page does not hold is spread
@@ -14,11 +15,12 @@ from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
 from sbafab.geometry.contour import Contour
-from sbafab.geometry.edges import Arc, Bounds, Edge, Point
-from sbafab.geometry.region import Region, coord, disc
-from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point, box_round
+from sbafab.geometry.region import Region, coord, disc, union
+from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers, laying
+from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.pressing.schedule import joined_words
+from sbafab.pressing.schedule import joined_words, layers_in_words
 from sbafab.reports.traveller.shapes import Bed, beds
 
 NAME = "underlay.pdf"
@@ -333,6 +335,76 @@ def _notes(page: PdfPage, outlines: tuple[Guide, ...], sha256: str, leaf: Leaf) 
     page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)
 
 
+# Paths of seams, on the films as they lie in hand.
+
+
+SEAMS = "seams.pdf"
+START = 0.8
+"""mm: radius of the circle where a path begins."""
+SEAM_USE = (
+    "Print at 100 % (“actual size”, not “fit to page”). Measure both bars: if either is not",
+    f"{BAR:g} mm, {CLOSE:g} more or less, do not use this print. Lay the films over it, edges on",
+    "blue lines, and mark the path on them, or the print over the films, and prick its corners.",
+    "No paper under a hot tool. Not tried by us.",
+)
+
+
+def seams_pdf(laminate: Laminate, design_sha256: str) -> bytes | None:
+    """Return pages of seam paths at 1:1, one for all seams of the same films in hand; None without
+    a seam.
+    """
+    steps: dict[tuple[int, ...], list[tuple[int, Seam]]] = {}
+    for step in laying(laminate):
+        if step.joining is not None and step.joining.seam is not None:
+            steps.setdefault(step.layers, []).append((step.number, step.joining.seam))
+    pages = [_seam_page(laminate, layers, seams, design_sha256) for layers, seams in steps.items()]
+    return pdf(pages, f"{laminate.name}: paths of seams") if pages else None
+
+
+def _seam_page(
+    laminate: Laminate, layers: Sequence[int], seams: Sequence[tuple[int, Seam]], sha256: str
+) -> PdfPage:
+    films = union([laminate.layer(index).profile for index in layers])
+    low_x, low_y, high_x, high_y = box_round(
+        [films.bounds, *(seam.region.bounds for _, seam in seams)]
+    )
+    foot = 24 + ROW * (len(seams) + 2)
+    width = max(PAPER[0], high_x - low_x + 2 * SIDE)
+    height = max(PAPER[1], high_y - low_y + HEAD + foot)
+    page = PdfPage(width, height)
+    x = (width - low_x - high_x) / 2
+    y = foot + (height - HEAD - foot - low_y - high_y) / 2
+    page.stroke(FILM, THIN)
+    for contour in films.moved(x, y).contours:
+        page.contour(contour)
+    for step, seam in seams:
+        page.stroke(MASK, THIN, (1.0, 0.6))
+        for contour in seam.region.moved(x, y).contours:
+            page.contour(contour)
+        page.stroke(BLACK, THIN)
+        for chain in seam.path:
+            page.chain(chain, (x, y))
+        start = seam.path[0][0].start
+        dot = start[0] + x, start[1] + y
+        for contour in disc(dot, START).contours:
+            page.contour(contour)
+        page.text((dot[0] + 1.5, dot[1] + 1.0), f"{step}", SMALL)
+    _bars(page)
+    top = page.height - 16
+    page.text((14, top), f"{laminate.name}: paths of seams, from above, 1:1", TITLE, bold=True)
+    for number, line in enumerate(SEAM_USE, 1):
+        page.text((14, top - 1 - ROW * number), line, WORDS)
+    y = foot - 8
+    for step, seam in seams:
+        words = f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
+        page.text((14, y), f"{words}{seam.below} and {seam.above}; begins at its circle", WORDS)
+        y -= ROW
+    lines = f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its"
+    page.text((14, y), f"{lines} width.", WORDS)
+    page.text((page.width - 46, y - ROW), f"design {sha256[:12]}", WORDS)
+    return page
+
+
 # Pages of lines, curves and words as PDF, in millimetres and to scale.
 #
 # PDF 1.4 without compression, dates or fonts of its own: the same pages give the same bytes with
@@ -368,6 +440,12 @@ class PdfPage:
         """A closed line of straight edges and arcs."""
         path = [f"{_at(contour.edges[0].start)} m", *map(_drawn, contour.edges), "h S"]
         self._drawn.append(" ".join(path))
+
+    def chain(self, edges: Sequence[Edge], by: Point) -> None:
+        """An open line of straight edges and arcs, moved by so many mm."""
+        x, y = coord(by[0]), coord(by[1])
+        path = [f"{_at(edges[0].start)} m", *map(_drawn, edges), "S"]
+        self._drawn.append(f"q 1 0 0 1 {x} {y} cm {' '.join(path)} Q")
 
     def line(self, start: Point, end: Point) -> None:
         self._drawn.append(f"{_at(start)} m {_at(end)} l S")

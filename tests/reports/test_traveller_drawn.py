@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.bench import before_cutting
 from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.underlay import seams_pdf
 from tests.reports.bench_pages import SHA, built, page, words_of
 
 
@@ -98,3 +100,21 @@ def test_a_stack_for_vacuum_is_tested_under_vacuum(sheet_files: Any) -> None:
     assert "Bottom balloon, layers 2 to 10" in words
     assert "draw the chamber to the vacuum of use" in words
     assert "vacuum of use" not in words_of(page(sheet_files, "pouch"))
+
+
+def test_paths_of_seams_are_printed_on_the_films_at_one_to_one(sheet_files: Any) -> None:
+    _, laminate = built("folded")
+    data = seams_pdf(laminate, SHA)
+    assert data is not None
+    words = data.decode("latin-1")
+    assert words.count("/Type /Page ") == 1
+    # Millimetres, 72 / 25.4 points each, and the path as in the design, from its first corner.
+    assert "2.8346456693 0 0 2.8346456693 0 0 cm" in words
+    left = r"q 1 0 0 1 (\S+) (\S+) cm -19 -13 m -19 12 l -2 12 l -2 25 l S Q"
+    (x, y) = re.findall(left, words)[0]
+    # The fold is at y = -12: an edge of the film runs there, as far off as the path.
+    assert re.search(rf"\S+ {float(y) - 12:g} [ml]", words)
+    assert "step 3: seam right, hot-tip, 2 mm wide" in words
+    assert seams_pdf(built("pouch")[1], SHA) is None
+    assert "Print seams.pdf at 100 %" in words_of(page(sheet_files, "folded"))
+    assert float(x) > 0

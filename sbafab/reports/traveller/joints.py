@@ -21,6 +21,7 @@ from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.lay_up import EQUAL, face_down
 from sbafab.reports.traveller.shapes import Picture, label
 from sbafab.reports.traveller.shapes import flat as flat_matrix
+from sbafab.reports.underlay import SEAMS
 
 WIDEST = 90.0
 """mm: the longer side of a picture on the page."""
@@ -96,8 +97,10 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
     seam = next(seam for seam in work.laminate.seams if seam.name == step.seam)
     path = seam_path(seam)
     yield Action(
-        f"Print {path} at 1:1 and check a length of it with a rule, or mark its path on the films: "
-        f"it begins at the dot of the picture, {_start_words(work.laminate, step.layers, seam)}."
+        f"Print {SEAMS} at 100 % and measure its bars. Lay the films over it, edges on the blue "
+        f"lines, and mark the path of step {step.step} on them: it begins at the circle (the dot "
+        f"of the picture), {_start_words(work.laminate, step.layers, seam)}. A machine takes the "
+        "file below."
     )
     yield Action(f"Follow the path ({path}) with the middle of the tool, once, without a stop.")
     yield Action("Look along the seam: no gap, no hole, nothing bonded beside it.")
