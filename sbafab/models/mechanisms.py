@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sbafab.design.records import Mechanism, MechanismKind
+from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import grow
 from sbafab.geometry.region import Region, strip
@@ -31,6 +32,8 @@ MOST_TURN = 0.1
 """rad by which pressure may bend a plate that is taken for stiff; ours."""
 RECTANGULAR = 0.9
 """Least share of its bounding box that a pocket fills for models of straight seams; ours."""
+LEAST_PLATE_KPA = 1.0
+"""kPa that stiff plates must stand as such; with less a hinge has none. Ours."""
 ATMOSPHERE = 101.325
 """kPa, the largest vacuum."""
 UNLIKE = 0.05
@@ -277,7 +280,16 @@ def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     yield Figure("bending", f"free bend{of}{joints}", count * each, "deg", model)
     angle = float(pouch.half_angle(1 - math.cos(pouch.free_bend() / 4)))
     limit = _stretch(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
-    limit = min(limit, _plate_bend(filled.laminate, length))
+    plates = _plate_bend(filled.laminate, length)
+    if plates.most < LEAST_PLATE_KPA:
+        yield LeftOut(
+            f"moment{of}",
+            "it has no stiff plate: the stiffest of its films would itself bend by more than "
+            f"{math.degrees(MOST_TURN):.0f} deg over half the pouch at {plates.most:.2g} kPa; lay "
+            "a thicker or stiffer layer under it",
+        )
+        return
+    limit = min(limit, plates)
     for share, at in ((0.0, "straight"), (0.5, "half bent")):
 
         def name(pressure: float, at: str = at) -> str:
@@ -396,6 +408,59 @@ FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | Left
     "jamming": _jammed,
     "push": _push,
 }
+
+
+class MechanismQuantity(NamedTuple):
+    """A quantity that people ask of a mechanism: its unit, whether it takes a pressure, and the
+    figure of ``predict`` that it is, by how the figure's name begins and ends.
+    """
+
+    unit: str
+    takes_pressure: bool
+    kind: MechanismKind
+    begins: str
+    ends: str
+
+
+ASKED: Mapping[str, MechanismQuantity] = {
+    "contraction": MechanismQuantity("mm", False, "pouch-motor", "free contraction", ""),
+    "pull": MechanismQuantity("N", True, "pouch-motor", "pull", "10 % shorter"),
+    "free_bend": MechanismQuantity("deg", False, "hinge", "free bend", ""),
+    "moment": MechanismQuantity("N mm", True, "hinge", "moment", "straight"),
+    "load": MechanismQuantity("N", True, "beam", "load that wrinkles", ""),
+    "slip": MechanismQuantity("N", True, "jamming", "load that slips", ""),
+    "push": MechanismQuantity("N", True, "push", "blocked force", "at most"),
+}
+"""By the names that requirements use."""
+
+
+def mechanism_value(
+    mechanism: Mechanism | None, laminate: Laminate, quantity: str, kpa: float
+) -> float:
+    """Return a quantity of ``ASKED`` at a pressure, of several chambers the least: the figure that
+    ``predict`` has.
+
+    Raises DesignError where the mechanism is another one, or its model does not hold.
+    """
+    asked = ASKED[quantity]
+    if mechanism is None or mechanism.kind != asked.kind:
+        has = "no mechanism" if mechanism is None else f"a mechanism of {mechanism.kind}"
+        raise DesignError(f"{quantity} is of a {asked.kind}, and the design has {has}")
+    values = []
+    for item in mechanism_figures(mechanism, laminate, PredictionRequest((kpa,))):
+        if isinstance(item, LeftOut):
+            if item.name.startswith((asked.begins, "what chamber", "contraction and", "bend and")):
+                raise DesignError(f"{item.name}: {item.reason}")
+        elif (
+            item.unit == asked.unit
+            and item.name.startswith(asked.begins)
+            and item.name.endswith(asked.ends)
+        ):
+            values.append(item.value)
+    if not values:
+        raise DesignError(f"no model gives {quantity} of this design at {kpa:g} kPa")
+    return min(values)
+
 
 LEFT_OUT: Mapping[MechanismKind, tuple[str, ...]] = {
     "pouch-motor": ("bending", "folded diameter"),

@@ -38,6 +38,7 @@ from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
 from sbafab.models.intervals import DELAYS, GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
 from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
+from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import (
     FLAT_HEIGHT_OF_FILMS,
@@ -84,6 +85,13 @@ QUANTITIES = (
     QuantityName("force@H@P", "N", "blocked at the stroke H mm, at P kPa"),
     QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
     QuantityName("time", "s", "to 10 kPa with water at --flow"),
+    QuantityName("contraction", "mm", "free, of a drawn pouch motor"),
+    QuantityName("pull@P", "N", "of it at P kPa, 10 % shorter"),
+    QuantityName("free_bend", "deg", "of drawn hinges, all of a chamber"),
+    QuantityName("moment@P", "N mm", "of one, straight, at P kPa"),
+    QuantityName("load@P", "N", "that wrinkles a drawn beam at P kPa"),
+    QuantityName("slip@P", "N", "that makes jammed sheets slip"),
+    QuantityName("push@P", "N", "of a drawn pouch on a plate, at most"),
 )
 """In the order of the help; names that stand twice take a pressure or none."""
 
@@ -113,6 +121,7 @@ UNITS = {
     "deg": {"deg": 1.0},
     "s": {"s": 1.0, "ms": 0.001},
     "N/mm": {"N/mm": 1.0, "mN/mm": 0.001, "N/m": 0.001},
+    "N mm": {"N mm": 1.0, "Nmm": 1.0, "mNm": 1.0, "Nm": 1000.0},
 }
 """Of masses, forces, angles, times and stiffness; lengths have those of design files."""
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
@@ -343,6 +352,9 @@ class Subject:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
         if quantity.name == "yield":
             return share_of_good()
+        if quantity.name in ASKED:
+            mechanism, kpa = self.design.form.mechanism, quantity.kpa or USUAL_KPA
+            return mechanism_value(mechanism, self.laminate, quantity.name, kpa)
         if quantity.name in AT_PRESSURE:
             return self._moved(quantity)
         if quantity.name == "time":
@@ -503,6 +515,8 @@ def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
     """Return the group of a quantity's discrepancy; None where no calibrated model gives it."""
     if quantity.name == "height":
         return "flat height"
+    if quantity.name in ASKED:
+        return None
     is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
     if not is_moved or quantity.is_full_stroke or isinstance(form.pockets, Slots):
         return None

@@ -12,6 +12,7 @@ from sbafab.design.files import shown
 from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
+from sbafab.models.mechanisms import ASKED
 from sbafab.models.paper import WATER_FLOW
 from sbafab.output.checked import Checked, limits, refuse_undoable
 from sbafab.process import Progress
@@ -73,7 +74,10 @@ class Goal:
         return f"{'most' if self.more else 'least'} {self.quantity.label}"
 
 
-GOOD_IF_MORE = ("stroke", "bend", "force", "lateral_stiffness", "yield", "lumen")
+GOOD_IF_MORE = (
+    *("stroke", "bend", "force", "lateral_stiffness", "yield", "lumen"),
+    *ASKED,
+)
 """Of these as much as can be is best, of all others as little."""
 
 

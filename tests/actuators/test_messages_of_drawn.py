@@ -36,3 +36,14 @@ def test_a_fault_is_named_with_what_is_allowed(name: str, tmp_path: Path) -> Non
     with pytest.raises(DesignError) as refused:
         build(load_design(path))
     assert words in str(refused.value)
+
+
+def test_a_width_unlike_the_drawn_strip_is_named() -> None:
+    [chamber] = load_design("pouch").model_dump()["chambers"]
+    for width, is_right in ((2.0, True), (3.0, False)):
+        design = load_design("pouch").with_({"chambers": [{**chamber, "width": width}]})
+        if is_right:
+            build(design)
+        else:
+            with pytest.raises(DesignError, match=r"chambers\.0\.width = 3.*write width = 2, or"):
+                build(design)

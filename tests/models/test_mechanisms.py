@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import pouch
 
@@ -116,3 +117,14 @@ def test_sheets_slip_where_the_shear_of_a_solid_beam_reaches_friction() -> None:
     # F S / I b at the middle, with S = b H^2 / 8 and I = b H^3 / 12.
     shear = load * (width * depth**2 / 8) / (width * depth**3 / 12 * width)
     assert shear == pytest.approx(friction * vacuum / 1000)
+
+
+def test_a_hinge_without_a_stiff_plate_has_no_moment() -> None:
+    """Two films of 0.038 mm: no plate, so a sentence in place of a tiny moment."""
+    hinge = {"mechanism": {"kind": "hinge", "direction": 0}}
+    said = sbafab.predict(sbafab.load("pouch", **hinge), pressures_kpa=[5.0])
+    assert not [figure for figure in said.figures if figure.unit == "N mm"]
+    (reason,) = (left.reason for left in said.left_out if left.name == "moment")
+    assert "it has no stiff plate" in reason
+    finger = sbafab.predict(sbafab.load("finger"), pressures_kpa=[5.0])
+    assert [figure for figure in finger.figures if figure.unit == "N mm"]

@@ -53,7 +53,7 @@ def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
         ("weight_of_it", "is not a quantity; there are"),
         ("stroke@5mPa", "neither a pressure nor a length"),
         ("force@12.5@50kPa", "12.5kPa or 12.5mm"),
-        ("mass@50kPa", "only stroke, bend, force and lateral_stiffness"),
+        ("mass@50kPa", "only stroke, bend, force, lateral_stiffness, pull"),
         ("bend@0chambers", "neither a pressure nor a length"),
         ("force@2chambers@1mm", "neither a pressure nor a length"),
         ("time@5kPa", "a time takes one flow, such as time@35ml/min"),
@@ -219,3 +219,44 @@ def test_stroke_and_force_are_those_of_a_flat_balloon() -> None:
     near = [_value(f"force@{stroke}mm@5kPa") for stroke in (2, 4, 6)]
     assert near == sorted(near, reverse=True)
     assert _value(f"force@{1.05 * said}mm@5kPa") < 0
+
+
+def test_a_mechanism_is_the_figure_of_predict() -> None:
+    names = {
+        "pouch": {
+            "contraction": "free contraction",
+            "pull@0.5kPa": "pull at 0.5 kPa, 10 % shorter",
+        },
+        "finger": {
+            "free_bend": "free bend, 3 hinges",
+            "moment@20kPa": "moment at 20 kPa, straight",
+        },
+        "vacuum": {"slip@50kPa": "load that slips at a vacuum of 50 kPa"},
+    }
+    for template, figures in names.items():
+        design = sbafab.load(template)
+        subject = Subject(design, sbafab.build(design))
+        for text, name in figures.items():
+            quantity = read_quantity(text)
+            said = sbafab.predict(design, pressures_kpa=[quantity.kpa or 10.0])
+            (figure,) = (item for item in said.figures if item.name == name)
+            assert subject.value(quantity, lambda: 1.0) == figure.value, text
+            assert quantity.unit == figure.unit
+            assert subject.interval(quantity) is None
+
+
+def test_a_pull_is_that_of_two_arcs() -> None:
+    # Niiyama et al.: p D L cos t / t with sin t / t = 0.9, of a pouch of 40 x 30 mm.
+    angle = 0.786683
+    assert math.sin(angle) / angle == pytest.approx(0.9, rel=1e-5)
+    pull = 0.5e-3 * 30 * 40 * math.cos(angle) / angle
+    assert _value("pull@0.5kPa", "pouch") == pytest.approx(pull, rel=1e-4)
+
+
+def test_a_mechanism_that_is_another_or_does_not_hold_is_named() -> None:
+    with pytest.raises(DesignError, match="pull is of a pouch-motor, and the design has a mecha"):
+        _value("pull@1kPa", "finger")
+    with pytest.raises(DesignError, match="push is of a push, and the design has no mechanism"):
+        _value("push@1kPa")
+    with pytest.raises(DesignError, match="the film would stretch by more than 5 %"):
+        _value("pull@10kPa", "pouch")
