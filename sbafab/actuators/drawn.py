@@ -33,7 +33,7 @@ from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import Length, LengthOrZero
 from sbafab.errors import DesignError, SbafabError
 from sbafab.geometry.edges import Edge, unit
-from sbafab.geometry.region import Region, strip
+from sbafab.geometry.region import Region
 from sbafab.laminate.folding import lies_on, toward, unfolded
 from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import (
@@ -406,40 +406,7 @@ def build(design: DrawnDesign) -> Laminate:
     )
     _check_folds(laminate, design)
     joinings(laminate)
-    _check_strips(laminate, design)
     return laminate
-
-
-INSIDE = 0.25
-"""mm from a mouth at which its strip is measured."""
-UNLIKE = 0.05
-"""mm by which a strip may be wider or narrower than its chamber says."""
-
-
-def _check_strips(laminate: Laminate, design: DrawnDesign) -> None:
-    """Raises DesignError where a chamber states another width than its strip is drawn with."""
-    for number, (row, inlet) in enumerate(zip(design.chambers, laminate.inlets, strict=True)):
-        drawn = None if row.width is None else _strip_width(laminate, inlet)
-        if drawn is not None and abs(drawn - inlet.width) > UNLIKE:
-            raise DesignError(
-                f"chambers.{number}.width = {inlet.width:g}, and the strip of {row.name} is "
-                f"{drawn:.4g} wide at its mouth; write width = {drawn:.4g}, or draw it so"
-            )
-
-
-def _strip_width(laminate: Laminate, inlet: Inlet) -> float | None:
-    """Return the width of the void just inside a mouth, mm; None where there is none."""
-    (x, y), (u, v) = inlet.mouth, inlet.direction
-    middle = x - INSIDE * u, y - INSIDE * v
-    reach = max(layer.profile.bounds[axis + 2] for layer in laminate.layers for axis in (0, 1))
-    reach -= min(layer.profile.bounds[axis] for layer in laminate.layers for axis in (0, 1))
-    start, end = ((middle[0] - s * reach * v, middle[1] + s * reach * u) for s in (-1, 1))
-    line = strip(start, end, 2e-3)
-    for gap in laminate.interfaces:
-        if gap.unbonded.contains(middle):
-            chord = next(p for p in (gap.unbonded & line).pieces if p.contains(middle))
-            return chord.area / 2e-3
-    return None
 
 
 def _tube_on(port: DrawnPort, design: DrawnDesign) -> float | None:

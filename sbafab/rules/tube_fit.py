@@ -29,6 +29,9 @@ from sbafab.rules.rule import Explanation, Rule
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
+MOUTH = "the mouth"
+UNLIKE = 0.05
+"""mm by which a strip may be wider or narrower than its inlet states; ours."""
 REMEDY = "widen inlet.width"
 ROOM = 1e-9
 """mm by which what is straight, parallel or at the mouth may be off for rounding."""
@@ -84,7 +87,23 @@ def check(measures: Measures) -> list[Finding]:
         place = Place(worst.interface.index, worst.interface.layer_indices, *worst.at)
     verdict: Verdict = "pass" if good else "fail"
     finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
-    return [finding, _of_holes(on_holes)] if on_holes else [finding]
+    holes = [_of_holes(on_holes)] if on_holes else []
+    return [finding, *_unlike(fits), *holes]
+
+
+def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
+    """Yield a warning for each mouth that is drawn with another width than its inlet states."""
+    for fit in fits:
+        stated = fit.inlet.width
+        if fit.feature != MOUTH or fit.interface is None or abs(fit.drawn - stated) <= UNLIKE:
+            continue
+        remedy = f"write {fit.drawn:.3f} as the width of {fit.inlet.chamber}, or draw it so"
+        message = (
+            f"{remedy}: the strip of {fit.inlet.chamber} is stated {stated:.3f} mm wide and drawn "
+            f"{fit.drawn:.3f}, {at(fit.at)}"
+        )
+        place = Place(fit.interface.index, fit.interface.layer_indices, *fit.at)
+        yield Finding(NAME, "warn", stated, fit.drawn, "mm", place, message, remedy=remedy)
 
 
 RULE = Rule(
@@ -183,14 +202,14 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         if mouth:
             width = sum([edge.length for edge in mouth], 0.0)
             cut = max(0.0, width - _lost(interface, limits))
-            opening = _Fit(inlet, interface, "the mouth", cut, needed, inlet.mouth, REMEDY, width)
+            opening = _Fit(inlet, interface, MOUTH, cut, needed, inlet.mouth, REMEDY, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]
     message = "open a mask strip to the tab's end"
     gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     if gaps and not any(interface.pressed for interface in gaps):
         message = "open the path of the seam at the tab's end, as wide as that"
     needed = math.pi * inlet.tube_diameter / 2
-    return [_Fit(inlet, None, "the mouth", 0.0, needed, inlet.mouth, message)]
+    return [_Fit(inlet, None, MOUTH, 0.0, needed, inlet.mouth, message)]
 
 
 def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits) -> list[_Fit]:
