@@ -220,8 +220,8 @@ def _vacuum_test(work: Work, names: tuple[str, ...]) -> Iterator[Action]:
     mechanism = work.design.form.mechanism
     if mechanism is not None and mechanism.kind == "jamming":
         yield Action(
-            f"It works under a vacuum: draw {_each(names)} to the vacuum of use, shut the valve and "
-            "hold for 60 s. A gauge that goes back shows a leak; the stack is stiff all over, and "
+            f"It works under a vacuum: draw {_each(names)} to the vacuum of use, shut the valve "
+            "and hold for 60 s. A gauge that goes back shows a leak; the stack is stiff all over, and "
             "no film is drawn into the inlet. (Ours, not tried.)",
             (),
             names,
