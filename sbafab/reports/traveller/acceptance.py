@@ -221,8 +221,8 @@ def _vacuum_test(work: Work, names: tuple[str, ...]) -> Iterator[Action]:
     if mechanism is not None and mechanism.kind == "jamming":
         yield Action(
             f"It works under a vacuum: draw {_each(names)} to the vacuum of use, shut the valve "
-            "and hold for 60 s. A gauge that goes back shows a leak; the stack is stiff all over, and "
-            "no film is drawn into the inlet. (Ours, not tried.)",
+            "and hold for 60 s. A gauge that goes back shows a leak; the stack is stiff all over, "
+            "and no film is drawn into the inlet. (Ours, not tried.)",
             (),
             names,
         )
