@@ -1,22 +1,24 @@
-"""The nesting engines: bottom-left on a fine grid, the default, and strip packing with spyrrow.
+"""The nesting engine: bottom-left on a fine grid, from an empty sheet or round a lattice.
 
-The first puts each part at the lowest free place. It tries several fixed orders and returns the
-best result; nothing is random. Holes of parts are free for smaller parts.
+Each part goes to the lowest free place. Several fixed orders are tried; where the parts take more
+sheets than their area needs, they are tried round lattices of the shapes of most area, too, and
+the best result is returned. Nothing is random.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from sbafab.errors import SbafabError
-from sbafab.geometry.contour import Contour, run_chords, ticks
-from sbafab.geometry.edges import Arc, Bounds, Edge, Point
+from sbafab.geometry.contour import ticks
+from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
+from sbafab.nesting.lattice import Lattice, lattices
 from sbafab.nesting.records import (
     TURNS,
     NestPart,
@@ -24,14 +26,11 @@ from sbafab.nesting.records import (
     Stock,
     Turn,
     no_place,
-    pins_unknown,
     placed,
-    too_tight,
 )
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from spyrrow import Item, PlacedItem
 
     Cells = NDArray[np.bool_]
     Counts = NDArray[np.intp]
@@ -39,6 +38,10 @@ if TYPE_CHECKING:
 
 MANY = 600
 """Number of parts from which only the first few ways to fill a sheet are tried."""
+MOST_LATTICES = 3
+"""Shapes of which a lattice is tried."""
+LEAST_COPIES = 6
+"""Copies that are worth a lattice."""
 
 
 def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...]:
@@ -58,15 +61,24 @@ def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...
         window = min(high_y - low_y, 2 * window)
     if best.stuck is not None:
         raise no_place(parts[best.stuck], stock)
+    if stock.roll or best.sheets > least_sheets(parts, stock):
+        ways = _lattice_ways(parts, filler.lattices())
+        best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
 
 
 @dataclass(frozen=True)
 class _Way:
-    """A way to fill: the order of the parts, and the share of their height that counts as low."""
+    """A way to fill: the order of the parts, and the share of their height that counts as low.
+
+    Sheets start with a lattice of the shape of most area left, of those that have one; with
+    ``whole_only`` only if it fills.
+    """
 
     order: tuple[int, ...]
     share: float
+    lattices: Mapping[int, Lattice] = field(default_factory=dict)
+    whole_only: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,6 +109,30 @@ def _ways(parts: Sequence[NestPart]) -> list[_Way]:
         orders.append(tuple(sorted(range(len(parts)), key=sizes.__getitem__)))
     ways = [_Way(order, share) for order in dict.fromkeys(orders) for share in (0.5, 0.0, 1.0)]
     return ways if sum(part.count for part in parts) < MANY else ways[:2]
+
+
+def _lattice_ways(parts: Sequence[NestPart], lattices: Mapping[int, Lattice]) -> list[_Way]:
+    """Return ways to fill that start with lattices."""
+    if not lattices:
+        return []
+    return [
+        replace(way, lattices=lattices, whole_only=whole_only)
+        for way in _ways(parts)
+        for whole_only in (True, False)
+    ]
+
+
+def least_sheets(parts: Sequence[NestPart], stock: Stock) -> int:
+    """Return a lower bound of the sheets: areas of the parts, each with half the spacing round it.
+
+    Grown by as much, the usable area holds them all.
+    """
+    low_x, low_y, high_x, high_y = stock.usable
+    half = stock.spacing / 2
+    regions = ((Region(part.region.outers), part.count) for part in parts)
+    area = sum(count * grow(region, half).area for region, count in regions)
+    usable = (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
+    return math.ceil(area / usable - 1e-6)
 
 
 def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
@@ -132,6 +168,33 @@ class _Filler:
         self.parts, self.shape_of, self.stock, self.grid = parts, shape_of, stock, grid
         self.empty = [grid.places(form, stock) for form in grid.forms]
         self.forms = [[form for form in grid.forms if form.shape == shape] for shape in shape_of]
+        self._started: dict[tuple[int, int], list[Cells]] = {}
+
+    def lattices(self) -> dict[int, Lattice]:
+        """Return the best lattice of each of the shapes of most area that come often enough."""
+        areas: Counter[int] = Counter()
+        counts: Counter[int] = Counter()
+        for part, shape in zip(self.parts, self.shape_of, strict=True):
+            areas[shape] += part.count * part.region.area
+            counts[shape] += part.count
+        chosen = {}
+        for shape, _ in areas.most_common(MOST_LATTICES):
+            if counts[shape] >= LEAST_COPIES:
+                laid = self._clear_lattices(self.grid.shapes[shape])
+                best = min(laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3)))
+                chosen[shape] = best
+        return chosen
+
+    def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
+        """Yield the lattices of a shape without the copies that are too near to pins."""
+        stock = self.stock
+        for lattice in lattices(shape, stock.spacing, self.grid.area, stock.turns):
+            places = (
+                (turn, shift)
+                for turn, shift in lattice.places
+                if not stock.pins or is_clear(placed(shape, turn, shift), stock)
+            )
+            yield lattice._replace(places=tuple(places))
 
     def filled(self, way: _Way) -> _Filled:
         """Fill sheet after sheet with the remaining parts, in the way's order."""
@@ -152,8 +215,11 @@ class _Filler:
         return _Filled(tuple(placements), sheet, self._reach(on_sheet))
 
     def _sheet(self, sheet: int, remaining: Sequence[int], way: _Way) -> list[Placement]:
-        free = _Free(self.grid, [np.copy(places) for places in self.empty], way.share)
-        placements: list[Placement] = []
+        placements, maps = self._start(sheet, remaining, way)
+        free = _Free(self.grid, [np.copy(places) for places in maps], way.share)
+        remaining = list(remaining)
+        for placement in placements:
+            remaining[placement.part] -= 1
         for step, part in enumerate(way.order):
             for number in range(remaining[part]):
                 spot = free.lowest(self.forms[part])
@@ -166,6 +232,43 @@ class _Filler:
                 open_shapes = {self.shape_of[later] for later in rest if remaining[later]}
                 free.occupy(form, (row, column), open_shapes)
         return placements
+
+    def _start(
+        self, sheet: int, remaining: Sequence[int], way: _Way
+    ) -> tuple[list[Placement], list[Cells]]:
+        """Return the lattice that a sheet starts with, and the places that it leaves free."""
+        left: Counter[int] = Counter()
+        for part, count in enumerate(remaining):
+            left[self.shape_of[part]] += count
+        shapes = [
+            shape
+            for shape, lattice in way.lattices.items()
+            if left[shape] >= (len(lattice.places) if way.whole_only else LEAST_COPIES)
+        ]
+        if not shapes:
+            return [], self.empty
+        shape = max(shapes, key=lambda shape: left[shape] * self.grid.shapes[shape].area)
+        places = way.lattices[shape].places[: left[shape]]
+        queue = [
+            part
+            for part in way.order
+            if self.shape_of[part] == shape
+            for _ in range(remaining[part])
+        ]
+        placements = [
+            Placement(part, sheet, turn, shift)
+            for part, (turn, shift) in zip(queue, places, strict=False)
+        ]
+        key = shape, len(placements)
+        if key not in self._started:
+            free = _Free(self.grid, [np.copy(places) for places in self.empty], way.share)
+            everything = set(self.shape_of)
+            for turn, shift in places:
+                form = self.grid.form_of[shape, turn]
+                for place in self.grid.around(shape, turn, shift):
+                    free.occupy(form, place, everything)
+            self._started[key] = free.maps
+        return placements, self._started[key]
 
     def _alone(self, sheet: int, remaining: Sequence[int], order: Sequence[int]) -> list[Placement]:
         """Place the next part in the corner of an empty sheet, for a fit too tight for the grid."""
@@ -399,6 +502,8 @@ def _add_winding(turns: NDArray[np.int32], edge: Edge, corner: Point, cell: floa
 CELL = 0.1
 """mm; the finest grid. It is coarser where the maps would outgrow ``MEMORY`` bytes."""
 MEMORY = 120e6
+SNAP = 1e-6
+"""Cells by which a shape may lie off the grid as if it lay on it."""
 ROUNDING = 5e-7
 """mm by which a part may lie past the border: less than the check's tolerance."""
 
@@ -419,15 +524,30 @@ class TurnedShape:
     bounds: Bounds
 
 
+def is_clear(region: Region, stock: Stock) -> bool:
+    """Return True if a placed region keeps the spacing from all pins."""
+    low_x, low_y, high_x, high_y = region.bounds
+    for x, y, diameter in stock.pins:
+        room = diameter / 2 + stock.spacing
+        is_near = low_x - room < x < high_x + room and low_y - room < y < high_y + room
+        if is_near and (
+            Region(region.outers).contains((x, y))
+            or min(distance_to(edge, (x, y)) for edge in region.edges) < room
+        ):
+            return False
+    return True
+
+
 @dataclass(frozen=True)
 class Grid:
     """The forms of all shapes on the grid of one usable ``area``."""
 
+    shapes: tuple[Region, ...]
     area: Bounds
     margin: float
     cell: float
     forms: tuple[TurnedShape, ...]
-    _form_of: dict[tuple[int, Turn], TurnedShape] = field(repr=False)
+    form_of: dict[tuple[int, Turn], TurnedShape] = field(repr=False)
     _clear: dict[tuple[int, int], Cells] = field(default_factory=dict, repr=False)
 
     @property
@@ -448,19 +568,28 @@ class Grid:
             return np.ascontiguousarray(opposite[::-1, ::-1])
         if a.turn == 0:
             # The reverse pair, turned until a lies as it is drawn.
-            turned = self._form_of[a.shape, TURNS[-b.turn % len(TURNS)]]
-            twin = self._clear.get((self._form_of[b.shape, 0].number, turned.number))
+            turned = self.form_of[a.shape, TURNS[-b.turn % len(TURNS)]]
+            twin = self._clear.get((self.form_of[b.shape, 0].number, turned.number))
             if twin is not None:
                 return np.ascontiguousarray(quarter_turned(twin, b.turn)[::-1, ::-1])
             return ~meetings(a.cells, b.cells)
         # A common turn of both turns the offsets with them.
-        back = self._form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
-        return quarter_turned(self.clear(self._form_of[a.shape, 0], back), a.turn)
+        back = self.form_of[b.shape, TURNS[(b.turn - a.turn) % len(TURNS)]]
+        return quarter_turned(self.clear(self.form_of[a.shape, 0], back), a.turn)
 
     def shift(self, form: TurnedShape, row: int, column: int) -> Point:
         """Return the shift in mm of the turned shape to a place."""
         x, y = self.origin
         return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
+
+    def around(self, shape: int, turn: Turn, shift: Point) -> Iterator[tuple[int, int]]:
+        """Yield up to four places whose cells together hold the shape where it lies off the grid."""
+        left, low, _, _ = _turned(self.form_of[shape, 0].frame, turn)
+        x = (left + shift[0] - self.origin[0]) / self.cell
+        y = (low + shift[1] - self.origin[1]) / self.cell
+        for row in sorted({math.floor(y + SNAP), math.ceil(y - SNAP)}):
+            for column in sorted({math.floor(x + SNAP), math.ceil(x - SNAP)}):
+                yield row, column
 
     def places(self, form: TurnedShape, stock: Stock) -> Cells:
         """Return the places of the form inside the border and clear of the pins."""
@@ -509,7 +638,7 @@ def grid_of(shapes: Sequence[Region], area: Bounds, spacing: float, turns: Seque
                 by_cells[key] = TurnedShape(len(forms), number, turn, turned, *boxes)
                 forms.append(by_cells[key])
             form_of[number, turn] = by_cells[key]
-    return Grid(area, margin, cell, tuple(forms), form_of)
+    return Grid(tuple(shapes), area, margin, cell, tuple(forms), form_of)
 
 
 def _turned(box: Bounds, turn: Turn) -> Bounds:
@@ -528,124 +657,3 @@ def _cell_size(shapes: Sequence[Region], area: Bounds, spacing: float, turns: in
     maps = 2 * turns * len(shapes) * (area[2] - area[0]) * (area[3] - area[1])
     pairs = sum((max(a) + max(b)) ** 2 for a in sizes for b in sizes) * turns**2
     return CELL * max(1.0, math.sqrt((maps + pairs) / CELL**2 / MEMORY))
-
-
-# The spyrrow engine: strip packing that imitates sheets.
-#
-# The strip runs along a sheet's length and is as high as the sheet is wide. Parts that reach past
-# the sheet's end go to the next sheet, for which a new search begins. It ends by the clock, so its
-# result is not reproducible, and is saved.
-
-
-SAGITTA = 0.01
-"""mm by which the polygons for spyrrow may reach past arcs."""
-ROOM = 0.002
-"""mm added to the spacing and along the sides: spyrrow computes in single precision."""
-SEED = 1
-
-
-def strip(parts: Sequence[NestPart], stock: Stock, seconds: float) -> tuple[Placement, ...]:
-    """Return places for every part, after about ``seconds`` of search for each sheet.
-
-    Raises DesignError if the sheet has pins or a part fits it only just, SbafabError if spyrrow
-    is not installed.
-    """
-    if stock.pins:
-        raise pins_unknown(parts[0].material, stock)
-    remaining = [part.count for part in parts]
-    placements: list[Placement] = []
-    sheet = 0
-    while any(remaining):
-        for placement in _sheet(parts, remaining, stock, sheet, seconds):
-            remaining[placement.part] -= 1
-            placements.append(placement)
-        sheet += 1
-    return tuple(placements)
-
-
-def _sheet(
-    parts: Sequence[NestPart], remaining: Sequence[int], stock: Stock, sheet: int, seconds: float
-) -> list[Placement]:
-    """Return the parts of the best strip that end before the sheet does; at least one."""
-    placements = [
-        _placement(item, sheet, stock) for item in _solved(parts, remaining, stock, seconds)
-    ]
-    tops = [_extent(parts[place.part], place)[1] for place in placements]
-    whole = [place for place, top in zip(placements, tops, strict=True) if top <= stock.usable[3]]
-    if whole:
-        return whole
-    first = placements[tops.index(min(tops))]
-    x, y = first.shift
-    down = _extent(parts[first.part], first)[0] - stock.usable[1]
-    return [Placement(first.part, sheet, first.turn, (x, y - down))]
-
-
-def _solved(
-    parts: Sequence[NestPart], remaining: Sequence[int], stock: Stock, seconds: float
-) -> list[PlacedItem]:
-    try:
-        import spyrrow
-    except ImportError as error:
-        raise SbafabError(
-            'engine "spyrrow" is not installed; run pip install "sbafab[nest]", or use '
-            '"bottom-left".'
-        ) from error
-    items = [_item(number, part, remaining[number], stock) for number, part in enumerate(parts)]
-    separation = stock.spacing + ROOM
-    instance = spyrrow.StripPackingInstance(
-        "sheet", _height(stock) + 2 * separation, [item for item in items if item is not None]
-    )
-    config = spyrrow.StripPackingConfig(
-        min_items_separation=separation,
-        total_computation_time=max(1, round(seconds)),
-        num_workers=1,
-        seed=SEED,
-    )
-    return instance.solve(config).placed_items
-
-
-def _height(stock: Stock) -> float:
-    return stock.usable[2] - stock.usable[0] - 2 * ROOM
-
-
-def _item(number: int, part: NestPart, count: int, stock: Stock) -> Item | None:
-    from spyrrow import Item
-
-    if count == 0:
-        return None
-    low_x, low_y, high_x, high_y = part.region.bounds
-    along, across = high_x - low_x, high_y - low_y
-    length = stock.usable[3] - stock.usable[1]
-    angles: list[float] = []
-    for (u, v), pair in (((along, across), (0.0, 180.0)), ((across, along), (90.0, 270.0))):
-        # The strip's x runs along the sheet's y.
-        if TURNS[round(pair[0] / 90) + 1] not in stock.turns:
-            continue
-        if u <= length - ROOM and v <= _height(stock) - 3 * SAGITTA:
-            angles += pair
-    if not angles:
-        raise too_tight(part)
-    return Item(str(number), _outline(part.region.outers[0]), count, angles)
-
-
-def _placement(item: PlacedItem, sheet: int, stock: Stock) -> Placement:
-    """The place of a packed item: the strip's x runs along the sheet's y, a quarter turn more.
-
-    spyrrow adds the separation at the strip's ends and sides, too; a sheet's border needs none.
-    """
-    _, bottom, right, _ = stock.usable
-    along, across = item.translation
-    separation = stock.spacing + ROOM
-    shift = (right - ROOM + separation - across, bottom + ROOM - separation + along)
-    return Placement(int(item.id), sheet, TURNS[(round(item.rotation / 90) + 1) % 4], shift)
-
-
-def _extent(part: NestPart, place: Placement) -> tuple[float, float]:
-    """Return lowest and highest y of a placed part."""
-    _, low, _, high = placed(part.region, place.turn, place.shift).bounds
-    return low, high
-
-
-def _outline(contour: Contour) -> list[Point]:
-    """Return a polygon that holds the contour, nowhere more than ``SAGITTA`` outside it."""
-    return [p for run in contour.runs for p in run_chords(run, True, SAGITTA)]

@@ -20,7 +20,7 @@ from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
-from sbafab.nesting.records import TURNS, Stock, Turn, placed
+from sbafab.nesting.records import TURNS, Turn, placed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,8 +47,7 @@ ROUNDING = 5e-7
 """mm by which a copy may lie past the border: less than the check's tolerance."""
 
 
-@dataclass(frozen=True)
-class Lattice:
+class Lattice(NamedTuple):
     """Places of copies of one shape on an empty sheet, the lowest first: turn and shift in mm.
 
     ``top`` is the highest y that they reach.
@@ -58,21 +57,21 @@ class Lattice:
     top: float
 
 
-def lattices(shape: Region, stock: Stock, length: float) -> list[Lattice]:
-    """Return the lattices that hold most copies of a shape, the best first.
+def lattices(shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn]) -> list[Lattice]:
+    """Return the lattices that hold most copies of a shape in ``area``, the best first.
 
-    ``length`` mm of the usable area, from its lower end, may be taken.
+    Copies are ``spacing`` mm apart, and turned by ``turns`` alone.
     """
-    low_x, low_y, high_x, _ = stock.usable
-    width = high_x - low_x
+    low_x, low_y, high_x, high_y = area
+    width, length = high_x - low_x, high_y - low_y
     laid: list[Lattice] = []
     for base in TURNS[:2]:
-        rows = _Rows(shape, base, stock.spacing)
-        if base in stock.turns:
+        rows = _Rows(shape, base, spacing)
+        if base in turns:
             for copies in rows.layouts((width, length)):
                 places = [(turn, (low_x + u, low_y + v)) for turn, (u, v) in copies]
                 laid.append(_lattice(shape, places))
-        if TURNS[base + 1] in stock.turns and abs(width - length) > LEVEL:
+        if TURNS[base + 1] in turns and abs(width - length) > LEVEL:
             # Columns: the sheet's y is the rows' x.
             for copies in rows.layouts((length, width)):
                 places = [
@@ -220,9 +219,7 @@ class _Rows:
         yield _Pattern((pair,), (share * pitches,))
         yield _Pattern((pair,), (share * pitches, -share * pitches))
 
-    def _ranked(
-        self, family: _Pattern, box: tuple[float, float]
-    ) -> list[tuple[float, _Pattern]]:
+    def _ranked(self, family: _Pattern, box: tuple[float, float]) -> list[tuple[float, _Pattern]]:
         """Return a family's patterns with the number of copies that they promise."""
         counts = self._promise(family, box)
         best = np.argsort(-counts, kind="stable")[:PROMISING]

@@ -10,7 +10,7 @@ from dataclasses import astuple
 from typing import Any
 
 from sbafab.laminate.films import Material, in_order
-from sbafab.nesting.engines import ROUNDING, bottom_left, strip
+from sbafab.nesting.engines import ROUNDING, bottom_left
 from sbafab.nesting.records import (
     TURNS,
     EngineName,
@@ -68,8 +68,7 @@ def _nest(
     seconds: float,
 ) -> Nest:
     _check_fit(material, parts, stock)
-    is_strip = engine == "spyrrow"
-    placements = strip(parts, stock, seconds) if is_strip else bottom_left(parts, stock)
+    placements = bottom_left(parts, stock)
     result = Nest(engine, material, stock, parts, placements)
     if result.sheets > stock.most:
         total = sum(part.count for part in parts)
