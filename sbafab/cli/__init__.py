@@ -88,7 +88,6 @@ EXTRAS = {
     "dask": ("distributed", "sweep --dask"),
     "mesh": ("netgen", "sbafab mesh, simulate --with calculix"),
     "mujoco": ("mujoco", "simulate --with mujoco"),
-    "nest": ("spyrrow", "--nest spyrrow"),
     "optuna": ("optuna", "find --optuna"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),

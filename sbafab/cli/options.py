@@ -304,27 +304,21 @@ def _with_request(command: Command, argument: Callable[[Command], Command]) -> C
 
 
 def sheet_options(command: Command) -> Command:
-    """Add ``--copies`` and ``--nest``, which set keys of the design."""
+    """Add ``--copies``, which sets a key of the design."""
 
     @functools.wraps(command)
-    def assigned(request: Request, copies: int | None, nest: str | None, **parameters: Any) -> Any:
-        keys = [] if copies is None else [f"order.copies={copies}"]
-        keys += [] if nest is None else [f"sheets.engine={nest}"]
+    def assigned(request: Request, copies: int | None, **parameters: Any) -> Any:
+        keys = () if copies is None else (f"order.copies={copies}",)
         request = replace(request, assignments=(*request.assignments, *keys))
         return command(request=request, **parameters)
 
-    engine = click.option(
-        "--nest",
-        type=click.Choice(["bottom-left", "spyrrow"]),
-        help="Nesting engine of the film sheets.  [default: the design's sheets.engine]",
-    )
     count = click.option(
         "--copies",
         type=int,
         metavar="K",
         help="Cut K copies of each actuator.  [default: the design's order.copies, 1]",
     )
-    return count(engine(assigned))
+    return count(assigned)
 
 
 def refuse_options(why: str, *names: str) -> None:

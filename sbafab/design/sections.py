@@ -477,12 +477,22 @@ class Sheets(Section):
 
     tpe: Sheet = Sheet.model_construct()
     ptfe: Sheet = Sheet.model_construct()
-    engine: Literal["bottom-left", "spyrrow"] = "bottom-left"
-    """What looks for places; "spyrrow" (an extra) packs tighter and takes its time."""
+    engine: Literal["bottom-left"] = "bottom-left"
+    """What looks for places: bottom-left, and round lattices where that takes fewer sheets."""
     seconds: float = Field(default=20.0, gt=0, le=3600)
-    """How long spyrrow looks, for each sheet."""
+    """Not used: how long an engine of earlier versions looked."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
+
+    @field_validator("engine", mode="before")
+    @classmethod
+    def _is_known(cls, engine: object) -> object:
+        if engine == "spyrrow":
+            raise ValueError(
+                'is no engine any more; set "bottom-left", which took no more sheets in any '
+                "batch measured"
+            )
+        return engine
 
 
 class Rules(Section):

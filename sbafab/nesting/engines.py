@@ -61,7 +61,7 @@ def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...
         window = min(high_y - low_y, 2 * window)
     if best.stuck is not None:
         raise no_place(parts[best.stuck], stock)
-    if stock.roll or best.sheets > least_sheets(parts, stock):
+    if takes_lattices(parts, stock, best.sheets):
         ways = _lattice_ways(parts, filler.lattices())
         best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
@@ -122,17 +122,26 @@ def _lattice_ways(parts: Sequence[NestPart], lattices: Mapping[int, Lattice]) ->
     ]
 
 
-def least_sheets(parts: Sequence[NestPart], stock: Stock) -> int:
-    """Return a lower bound of the sheets: areas of the parts, each with half the spacing round it.
+def takes_lattices(parts: Sequence[NestPart], stock: Stock, sheets: int) -> bool:
+    """Return True if lattices may save film where bottom-left alone takes so many sheets."""
+    shapes, shape_of = _shapes(parts)
+    counts: Counter[int] = Counter()
+    for part, shape in zip(parts, shape_of, strict=True):
+        counts[shape] += part.count
+    if max(counts.values()) < LEAST_COPIES:
+        return False
+    return stock.roll or (sheets > 1 and sheets > _area_bound(shapes, counts, stock))
 
-    Grown by as much, the usable area holds them all.
+
+def _area_bound(shapes: Sequence[Region], counts: Mapping[int, int], stock: Stock) -> int:
+    """Return the sheets that are filled by the shapes, each with half the spacing round it.
+
+    The usable area with half the spacing round it holds as much at most.
     """
     low_x, low_y, high_x, high_y = stock.usable
-    half = stock.spacing / 2
-    regions = ((Region(part.region.outers), part.count) for part in parts)
-    area = sum(count * grow(region, half).area for region, count in regions)
+    grown = sum(counts[i] * grow(shape, stock.spacing / 2).area for i, shape in enumerate(shapes))
     usable = (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
-    return math.ceil(area / usable - 1e-6)
+    return math.ceil(grown / usable - 1e-6)
 
 
 def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
@@ -172,13 +181,13 @@ class _Filler:
 
     def lattices(self) -> dict[int, Lattice]:
         """Return the best lattice of each of the shapes of most area that come often enough."""
-        areas: Counter[int] = Counter()
+        areas = dict.fromkeys(range(len(self.grid.shapes)), 0.0)
         counts: Counter[int] = Counter()
         for part, shape in zip(self.parts, self.shape_of, strict=True):
             areas[shape] += part.count * part.region.area
             counts[shape] += part.count
         chosen = {}
-        for shape, _ in areas.most_common(MOST_LATTICES):
+        for shape in sorted(areas, key=lambda shape: -areas[shape])[:MOST_LATTICES]:
             if counts[shape] >= LEAST_COPIES:
                 laid = self._clear_lattices(self.grid.shapes[shape])
                 best = min(laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3)))
@@ -583,7 +592,7 @@ class Grid:
         return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
 
     def around(self, shape: int, turn: Turn, shift: Point) -> Iterator[tuple[int, int]]:
-        """Yield up to four places whose cells together hold the shape where it lies off the grid."""
+        """Yield up to four places whose cells together hold a shape that lies off the grid."""
         left, low, _, _ = _turned(self.form_of[shape, 0].frame, turn)
         x = (left + shift[0] - self.origin[0]) / self.cell
         y = (low + shift[1] - self.origin[1]) / self.cell

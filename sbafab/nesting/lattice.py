@@ -8,14 +8,13 @@ laid by the distances themselves.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property, reduce
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
-from sbafab.geometry.contour import Contour, run_chords
+from sbafab.geometry.contour import run_chords
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
@@ -31,9 +30,9 @@ SAGITTA = 5e-4
 """mm by which the polygons of grown outlines may reach past arcs."""
 LEVEL = 1e-10
 """mm beside a corner at which an envelope is read, since it may jump there."""
-STEPS = 96
+STEPS = 64
 """Offsets that are tried between two rows, and between the two copies of a pair."""
-TABLE = 256
+TABLE = 192
 """Entries of a table of distances."""
 MOST_ROWS = 60
 """Rows that are counted to rank a lattice."""
@@ -45,6 +44,10 @@ ROOM = 0.02
 """mm more than there is, in which copies are counted to rank a lattice."""
 ROUNDING = 5e-7
 """mm by which a copy may lie past the border: less than the check's tolerance."""
+
+
+Value = TypeVar("Value")
+"""A number, or an array of a number of many rows."""
 
 
 class Lattice(NamedTuple):
@@ -82,32 +85,34 @@ def lattices(shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn])
 
 
 def _lattice(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
-    tops = {turn: placed(shape, turn, (0.0, 0.0)).bounds[3] for turn, _ in places}
+    tops = {
+        turn: placed(shape, turn, (0.0, 0.0)).bounds[3] for turn in {turn for turn, _ in places}
+    }
     highest = [tops[turn] + shift[1] for turn, shift in places]
     order = sorted(range(len(places)), key=lambda i: (round(highest[i], 6), places[i][1][0]))
     return Lattice(tuple(places[i] for i in order), max(highest, default=0.0))
 
 
-class _Copy(NamedTuple):
+class _Copy(NamedTuple, Generic[Value]):
     """A copy in a row: 1 if it is turned by half, else 0, and its shift in mm."""
 
     half: int
-    x: float
-    y: float
+    x: Value
+    y: Value
 
 
-class _Row(NamedTuple):
+class _Row(NamedTuple, Generic[Value]):
     """Copies that repeat every ``pitch`` mm."""
 
-    copies: tuple[_Copy, ...]
-    pitch: float
+    copies: tuple[_Copy[Value], ...]
+    pitch: Value
 
 
-class _Pattern(NamedTuple):
+class _Pattern(NamedTuple, Generic[Value]):
     """Rows that repeat upward; each begins one of ``steps`` mm to the right of that below it."""
 
-    rows: tuple[_Row, ...]
-    steps: tuple[float, ...]
+    rows: tuple[_Row[Value], ...]
+    steps: tuple[Value, ...]
 
 
 class _Rows:
@@ -129,7 +134,7 @@ class _Rows:
         self.upright = [_sides(outline) for outline in outlines]
         self.lying = [_sides(outline[:, ::-1]) for outline in outlines]
         self.reach: Point = tuple((2 * np.abs(outlines[0]).max(axis=0)).tolist())
-        self._known: dict[tuple[_Row, _Row, float], float] = {}
+        self._known: dict[tuple[_Row[float], _Row[float], float], float] = {}
 
     @cached_property
     def is_symmetric(self) -> bool:
@@ -149,7 +154,7 @@ class _Rows:
         """Return how far above the first copy the second, ``right`` mm to the right, must lie."""
         return _slides(self.lying[first], self.lying[second], right)
 
-    def climb(self, low: _Row, high: _Row, right: float) -> float:
+    def climb(self, low: _Row[float], high: _Row[float], right: float) -> float:
         """Return how far above a row another, ``right`` mm to the right, must lie."""
         key = low, high, round(right % low.pitch, 9)
         if key not in self._known:
@@ -159,20 +164,20 @@ class _Rows:
                     offset = b.x - a.x + right
                     first = math.ceil((-self.reach[0] - offset) / low.pitch)
                     last = math.floor((self.reach[0] - offset) / low.pitch)
-                    offsets = offset + low.pitch * np.arange(first, last + 1)
+                    offsets = np.array([offset + k * low.pitch for k in range(first, last + 1)])
                     heights += (self.above(a.half, b.half, offsets) + (a.y - b.y)).tolist()
             self._known[key] = max(heights, default=-math.inf)
         return self._known[key]
 
-    def _ranked_climb(self, low: _Row, high: _Row, right: Numbers) -> Numbers:
+    def _ranked_climb(self, low: _Row[Numbers], high: _Row[Numbers], right: Numbers) -> Numbers:
         """Return about what ``climb`` does, for arrays of rows."""
         best = np.full(np.shape(right), -math.inf)
-        reach = math.ceil(self.reach[0] / np.min(low.pitch)) + 1
+        reach = math.ceil(self.reach[0] / np.min(low.pitch))
         for a in low.copies:
             for b in high.copies:
                 places, heights = self._table[a.half, b.half]
                 offset = (b.x - a.x + right) % low.pitch
-                for times in range(-reach, reach):
+                for times in range(-reach, reach + 1):
                     height = np.interp(offset + times * low.pitch, places, heights, NEVER, NEVER)
                     best = np.maximum(best, height + a.y - b.y)
         return best
@@ -197,16 +202,16 @@ class _Rows:
         ranked.sort(key=lambda entry: -entry[0])
         return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]
 
-    def _families(self) -> Iterator[_Pattern]:
+    def _families(self) -> Iterator[_Pattern[Numbers]]:
         """Yield patterns with arrays of numbers: of rows alike, in turn by half, and of pairs."""
-        (pitch,) = self.beside(0, 0, np.zeros(1)).tolist()
-        upright = _Row((_Copy(0, 0.0, 0.0),), pitch)
-        steps = np.linspace(0.0, pitch, STEPS, endpoint=False)
+        origin, pitch = np.array(0.0), np.array(self.beside(0, 0, np.zeros(1))[0])
+        upright = _Row((_Copy(0, origin, origin),), pitch)
+        steps = np.linspace(0.0, float(pitch), STEPS, endpoint=False)
         yield _Pattern((upright,), (steps,))
         yield _Pattern((upright,), (steps, -steps))
         if self.is_symmetric:
             return
-        turned = _Row((_Copy(1, 0.0, 0.0),), pitch)
+        turned = _Row((_Copy(1, origin, origin),), pitch)
         yield _Pattern((upright, turned), (steps, -steps))
         yield _Pattern((upright, turned), (steps, steps))
         rises = np.linspace(-self.reach[1], self.reach[1], STEPS + 1)[1:-1]
@@ -215,24 +220,26 @@ class _Rows:
         shares = np.linspace(0.0, 1.0, STEPS, endpoint=False)
         rise, share = (each.ravel() for each in np.meshgrid(rises, shares, indexing="ij"))
         there, pitches = np.repeat(there, STEPS), np.repeat(pitches, STEPS)
-        pair = _Row((_Copy(0, 0.0, 0.0), _Copy(1, there, rise)), pitches)
+        pair = _Row((_Copy(0, origin, origin), _Copy(1, there, rise)), pitches)
         yield _Pattern((pair,), (share * pitches,))
         yield _Pattern((pair,), (share * pitches, -share * pitches))
 
-    def _ranked(self, family: _Pattern, box: tuple[float, float]) -> list[tuple[float, _Pattern]]:
+    def _ranked(
+        self, family: _Pattern[Numbers], box: tuple[float, float]
+    ) -> list[tuple[float, _Pattern[float]]]:
         """Return a family's patterns with the number of copies that they promise."""
         counts = self._promise(family, box)
         best = np.argsort(-counts, kind="stable")[:PROMISING]
         return [(float(counts[i]), _member(family, int(i))) for i in best]
 
-    def _promise(self, family: _Pattern, box: tuple[float, float]) -> Numbers:
+    def _promise(self, family: _Pattern[Numbers], box: tuple[float, float]) -> Numbers:
         rows, steps = family.rows, family.steps
         width, height = (
             side - 2 * half + ROOM
             for side, half in zip(box, (self.half_width, self.half_height), strict=True)
         )
         right = np.zeros(np.shape(steps[0]))
-        up = right - functools.reduce(np.minimum, [copy.y for copy in rows[0].copies])
+        up = right - reduce(np.minimum, [copy.y for copy in rows[0].copies])
         counts = np.zeros(np.shape(right))
         before: Numbers | None = None
         for number in range(MOST_ROWS):
@@ -254,12 +261,12 @@ class _Rows:
             before, up, right = up, higher, right + step
         return counts
 
-    def _laid(self, pattern: _Pattern, box: tuple[float, float]) -> list[tuple[Turn, Point]]:
+    def _laid(self, pattern: _Pattern[float], box: tuple[float, float]) -> list[tuple[Turn, Point]]:
         """Return the copies of a pattern that lie in a box from the origin."""
         rows, steps = pattern.rows, pattern.steps
         copies: list[tuple[Turn, Point]] = []
         right, up = 0.0, -min(copy.y for copy in rows[0].copies)
-        below: list[tuple[_Row, float, float]] = []
+        below: list[tuple[_Row[float], float, float]] = []
         number = 0
         while True:
             row = rows[number % len(rows)]
@@ -274,7 +281,7 @@ class _Rows:
             number += 1
 
     def _in_row(
-        self, row: _Row, start: Point, box: tuple[float, float]
+        self, row: _Row[float], start: Point, box: tuple[float, float]
     ) -> Iterator[tuple[Turn, Point]]:
         width, height = (
             side - 2 * half + ROUNDING
@@ -295,11 +302,11 @@ class _Rows:
                 )
 
 
-def _member(family: _Pattern, number: int) -> _Pattern:
+def _member(family: _Pattern[Numbers], number: int) -> _Pattern[float]:
     """Return a pattern of a family that has arrays for numbers."""
 
-    def chosen(value: float | Numbers) -> float:
-        return float(value if np.ndim(value) == 0 else np.asarray(value)[number])
+    def chosen(values: Numbers) -> float:
+        return float(values if values.ndim == 0 else values[number])
 
     rows = tuple(
         _Row(tuple(_Copy(c.half, chosen(c.x), chosen(c.y)) for c in row.copies), chosen(row.pitch))
@@ -371,4 +378,4 @@ def _slides(first: _Sides, second: _Sides, offsets: Numbers) -> Numbers:
 
 def _turned(polygon: Numbers, turn: Turn) -> Numbers:
     c, s = unit(90.0 * turn)
-    return polygon @ np.array([[c, s], [-s, c]])
+    return np.asarray(polygon @ np.array([[c, s], [-s, c]]))

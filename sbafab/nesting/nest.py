@@ -10,7 +10,7 @@ from dataclasses import astuple
 from typing import Any
 
 from sbafab.laminate.films import Material, in_order
-from sbafab.nesting.engines import ROUNDING, bottom_left
+from sbafab.nesting.engines import ROUNDING, bottom_left, takes_lattices
 from sbafab.nesting.records import (
     TURNS,
     EngineName,
@@ -31,17 +31,15 @@ def nest(
     parts: Sequence[NestPart],
     stocks: Mapping[Material, Stock],
     engine: EngineName = "bottom-left",
-    seconds: float = 20.0,
 ) -> tuple[Nest, ...]:
     """Return one nest for each material that has parts, TPE first.
 
-    ``seconds`` is spyrrow's time for each sheet. Raises DesignError if a part does not fit a sheet
-    or more sheets are needed than allowed.
+    Raises DesignError if a part does not fit a sheet or more sheets are needed than allowed.
     """
     nests = []
     for material in materials_of(parts):
         chosen = of_material(parts, material)
-        nests.append(_nest(material, chosen, stocks[material], engine, seconds))
+        nests.append(_nest(material, chosen, stocks[material], engine))
     return tuple(nests)
 
 
@@ -65,7 +63,6 @@ def _nest(
     parts: tuple[NestPart, ...],
     stock: Stock,
     engine: EngineName,
-    seconds: float,
 ) -> Nest:
     _check_fit(material, parts, stock)
     placements = bottom_left(parts, stock)
@@ -107,7 +104,7 @@ def _least_sheets(parts: Sequence[NestPart], stock: Stock) -> int:
 def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
     """Return the placements of all nests, for JSON, under a key of all their inputs."""
     return {
-        "key": _key((nest.engine, nest.stock, nest.parts) for nest in nests),
+        "key": _key((nest.stock, nest.parts, nest.sheets) for nest in nests),
         "nests": {
             nest.material: [[p.part, p.sheet, p.turn, *p.shift] for p in nest.placements]
             for nest in nests
@@ -126,26 +123,27 @@ def from_dict(
         (material, stocks[material], of_material(parts, material))
         for material in materials_of(parts)
     ]
-    key = _key((engine, stock, chosen) for _, stock, chosen in requests)
-    if not isinstance(data, dict) or data.get("key") != key:
+    if not isinstance(data, dict):
         return None
     try:
-        return tuple(
+        nests = tuple(
             Nest(engine, material, stock, chosen, _placements(data["nests"][material], chosen))
             for material, stock, chosen in requests
         )
-    except (KeyError, TypeError, ValueError):
+        return nests if data["key"] == as_dict(nests)["key"] else None
+    except (KeyError, TypeError, ValueError, IndexError):
         return None
 
 
-def _key(nests: Iterable[tuple[EngineName, Stock, Sequence[NestPart]]]) -> str:
+def _key(nests: Iterable[tuple[Stock, Sequence[NestPart], int]]) -> str:
+    """Return a hash of what was nested, and of whether lattices were tried."""
     inputs = [
         (
-            engine,
+            "bottom-left, lattices" if takes_lattices(parts, stock, sheets) else "bottom-left",
             astuple(stock),
             [(p.design, p.pattern, p.piece, p.material, p.region.key, p.count) for p in parts],
         )
-        for engine, stock, parts in nests
+        for stock, parts, sheets in nests
     ]
     return hashlib.sha256(repr(inputs).encode()).hexdigest()
 

@@ -16,7 +16,7 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.films import FIRST, Material
 from sbafab.laminate.laminate import Laminate
 
-EngineName = Literal["bottom-left", "spyrrow"]
+EngineName = Literal["bottom-left"]
 Turn = Literal[0, 1, 2, 3]
 """Quarter turns, counterclockwise. Never mirrored: a film's faces differ by their cut."""
 TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
@@ -216,20 +216,4 @@ def too_many(material: Material, parts: int, needed: str, stock: Stock) -> Desig
     return DesignError(
         f"{parts} parts of {material} need {needed} of {stock.width:g} x {stock.length:g} mm, "
         f"{where}.most allows {stock.most}; raise it, order fewer copies, or enlarge the sheets."
-    )
-
-
-def pins_unknown(material: Material, stock: Stock) -> DesignError:
-    where = field(material)
-    return DesignError(
-        f'engine "spyrrow" cannot keep clear of the {len(stock.pins)} {where}.pins; use '
-        '"bottom-left", or take the pins out.'
-    )
-
-
-def too_tight(part: NestPart) -> DesignError:
-    where = field(part.material)
-    return DesignError(
-        f"pattern {part.pattern} of {part.design} fits {where} too tightly for engine "
-        f'"spyrrow"; use "bottom-left", or lower {where}.border by 0.1 mm.'
     )

@@ -226,7 +226,7 @@ def find_nests(
         return ()
     progress("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
-    return saved or nest(parts, stocks(design), design.sheets.engine, design.sheets.seconds)
+    return saved or nest(parts, stocks(design), design.sheets.engine)
 
 
 def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:

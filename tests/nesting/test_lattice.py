@@ -1,0 +1,135 @@
+"""Lattices against packings known by closed forms, with shapely as the other judge of the gaps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import STRtree, unary_union
+from shapely.geometry import Point as ShapelyPoint
+from shapely.geometry import Polygon, box
+
+from sbafab.actuators import build, load_design
+from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
+from sbafab.nesting.check import check_nest
+from sbafab.nesting.lattice import Lattice, lattices
+from sbafab.nesting.nest import nest
+from sbafab.nesting.records import TURNS, Nest, NestPart, Stock, placed
+
+
+def best(shape: Region, spacing: float, width: float, length: float) -> Lattice:
+    return lattices(shape, spacing, (0.0, 0.0, width, length), TURNS)[0]
+
+
+def shapely_of(region: Region) -> Polygon:
+    return Polygon(region.polygons(1e-4)[0][0])
+
+
+def least_gap(shapes: Sequence[Polygon], near: float) -> float:
+    """Return the least distance of two shapes, if it is less than ``near``."""
+    outlines = np.array(shapes)
+    first, second = STRtree(outlines).query(outlines, predicate="dwithin", distance=near)
+    apart = first < second
+    return float(
+        shapely.distance(outlines[first[apart]], outlines[second[apart]]).min(initial=near)
+    )
+
+
+@pytest.mark.parametrize(("rows", "a_row"), [(7, 8), (8, 8), (15, 13)])
+def test_discs_lie_in_the_densest_packing(rows: int, a_row: int) -> None:
+    """Rows of discs half a pitch apart, sqrt(3)/2 of a pitch above each other (Thue)."""
+    pitch = 11.0
+    length = 10 + (rows - 1) * pitch * math.sqrt(3) / 2 + 0.002 * rows
+    laid = best(disc((3.0, -2.0), 5.0), 1.0, 10 + (a_row - 1) * pitch + 0.002 * a_row, length)
+    assert len(laid.places) == a_row * rows - rows // 2
+
+
+@pytest.mark.parametrize("size", [(10.0, 10.0), (17.0, 6.0), (3.0, 19.0)])
+def test_rectangles_fill_what_they_fill_exactly(size: tuple[float, float]) -> None:
+    width, height = (5 * size[0] + 4 * 0.7, 6 * size[1] + 5 * 0.7)
+    laid = best(rectangle((1.0, 1.0), (1.0 + size[0], 1.0 + size[1])), 0.7, width, height)
+    assert len(laid.places) == 30
+
+
+def test_right_triangles_lie_in_pairs() -> None:
+    """Turned by half, a triangle lies on the other's long side: 0.3 sqrt(2) mm off along x."""
+    across, up = 9, 10
+    pair = 10 + 0.3 * math.sqrt(2)
+    width = across * pair + (across - 1) * 0.3 + 0.02
+    laid = best(polygon([(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)]), 0.3, width, up * 10.3 - 0.28)
+    assert len(laid.places) >= 2 * across * up
+
+
+def test_the_commonest_plate_lies_closer_than_bottom_left_puts_it() -> None:
+    """Walls of the 15 mm actuator at 1.23 mm on 132.4 mm: 105 a sheet, 96 by bottom-left alone."""
+    laminate = build(load_design("3dof-15mm"))
+    walls = max(
+        (layers for layers in laminate.patterns.values() if layers[0].role == "wall"), key=len
+    )
+    stock = Stock(152.4, 152.4, 10, 1.23)
+    part = NestPart("3dof", "P05", 1, "TPE", walls[0].profile, 210)
+    (result,) = nest([part], {"TPE": stock})
+    check_nest(result)
+    assert result.sheets == 2
+    judged(result)
+
+
+sizes = st.floats(3.0, 12.0)
+shapes_of_parts = st.one_of(
+    sizes.map(lambda d: disc((d, -d), d / 2)),
+    st.tuples(sizes, sizes).map(lambda s: stadium((0.0, 0.0), min(s), max(s))),
+    st.tuples(sizes, sizes, sizes).map(lambda s: polygon([(0.0, 0.0), (s[0], 0.0), (s[1], s[2])])),
+    st.tuples(sizes, sizes).map(
+        lambda s: polygon(
+            [(0.0, 0.0), (s[0], 0.0), (s[0], 1.0), (1.0, 1.0), (1.0, s[1] + 1), (0.0, s[1] + 1)]
+        )
+    ),
+    sizes.map(lambda d: rectangle((0.0, 0.0), (d, 9.0)) - disc((d, 4.5), 0.4 * d)),
+)
+
+
+@settings(max_examples=3)
+@given(shapes_of_parts, st.floats(0.05, 3.0), st.floats(30.0, 60.0), st.floats(30.0, 60.0))
+def test_shapely_agrees_that_copies_are_apart(
+    shape: Region, spacing: float, width: float, length: float
+) -> None:
+    for laid in lattices(shape, spacing, (2.0, 3.0, 2.0 + width, 3.0 + length), TURNS)[:2]:
+        shapes = [shapely_of(placed(shape, turn, shift)) for turn, shift in laid.places]
+        assert shapes
+        assert least_gap(shapes, spacing) >= spacing - 2e-4
+        assert box(2, 3, 2 + width, 3 + length).buffer(1e-5).contains(unary_union(shapes))
+
+
+def judged(result: Nest) -> None:
+    """Ask shapely for the gaps between parts and to pins."""
+    stock = result.stock
+    for sheet in range(result.sheets):
+        shapes = [shapely_of(result.region(place)) for place in result.on_sheet(sheet)]
+        pins = [ShapelyPoint(x, y).buffer(d / 2, quad_segs=100) for x, y, d in stock.pins]
+        assert least_gap([*shapes, *pins], stock.spacing) >= stock.spacing - 5e-4
+        assert box(*stock.usable).buffer(1e-5).contains(unary_union(shapes))
+
+
+@settings(max_examples=2)
+@given(st.lists(shapes_of_parts, min_size=2, max_size=3, unique=True), st.floats(0.3, 2.0))
+def test_parts_round_lattices_and_pins_are_apart(shapes: list[Region], spacing: float) -> None:
+    stock = Stock(64.0, 58.0, 4.0, spacing, pins=((31.0, 22.0, 2.5),))
+    parts = [
+        NestPart("demo", f"P{i}", 1, "TPE", shape, count)
+        for i, (shape, count) in enumerate(zip(shapes, (90, 14, 5), strict=False))
+    ]
+    (result,) = nest(parts, {"TPE": stock})
+    check_nest(result)
+    assert result.sheets > 1
+    judged(result)
+
+
+def test_only_turns_that_the_stock_allows_are_used() -> None:
+    triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
+    for laid in lattices(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
+        assert {turn for turn, _ in laid.places} <= {0, 2}
