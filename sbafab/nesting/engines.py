@@ -18,7 +18,7 @@ from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
-from sbafab.nesting.lattice import Lattice, lattices
+from sbafab.nesting.lattice import Lattice, lattices_of
 from sbafab.nesting.records import (
     TURNS,
     NestPart,
@@ -44,10 +44,13 @@ LEAST_COPIES = 6
 """Copies that are worth a lattice."""
 
 
-def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...]:
+def bottom_left(
+    parts: Sequence[NestPart], stock: Stock, lattices: bool = True
+) -> tuple[Placement, ...]:
     """Return places for every part; each must fit the usable area.
 
-    Raises DesignError where the pins leave no place for one.
+    Without ``lattices`` all sheets start empty. Raises DesignError where the pins leave no place
+    for one.
     """
     shapes, shape_of = _shapes(parts)
     low_x, low_y, high_x, high_y = stock.usable
@@ -61,7 +64,7 @@ def bottom_left(parts: Sequence[NestPart], stock: Stock) -> tuple[Placement, ...
         window = min(high_y - low_y, 2 * window)
     if best.stuck is not None:
         raise no_place(parts[best.stuck], stock)
-    if takes_lattices(parts, stock, best.sheets):
+    if lattices and takes_lattices(parts, stock, best.sheets):
         ways = _lattice_ways(parts, filler.lattices())
         best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
@@ -197,7 +200,7 @@ class _Filler:
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""
         stock = self.stock
-        for lattice in lattices(shape, stock.spacing, self.grid.area, stock.turns):
+        for lattice in lattices_of(shape, stock.spacing, self.grid.area, stock.turns):
             places = (
                 (turn, shift)
                 for turn, shift in lattice.places

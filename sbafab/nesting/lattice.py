@@ -60,7 +60,9 @@ class Lattice(NamedTuple):
     top: float
 
 
-def lattices(shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn]) -> list[Lattice]:
+def lattices_of(
+    shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn]
+) -> list[Lattice]:
     """Return the lattices that hold most copies of a shape in ``area``, the best first.
 
     Copies are ``spacing`` mm apart, and turned by ``turns`` alone.

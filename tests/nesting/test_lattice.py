@@ -17,13 +17,13 @@ from shapely.geometry import Polygon, box
 from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
-from sbafab.nesting.lattice import Lattice, lattices
+from sbafab.nesting.lattice import Lattice, lattices_of
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import TURNS, Nest, NestPart, Stock, placed
 
 
 def best(shape: Region, spacing: float, width: float, length: float) -> Lattice:
-    return lattices(shape, spacing, (0.0, 0.0, width, length), TURNS)[0]
+    return lattices_of(shape, spacing, (0.0, 0.0, width, length), TURNS)[0]
 
 
 def shapely_of(region: Region) -> Polygon:
@@ -98,7 +98,7 @@ shapes_of_parts = st.one_of(
 def test_shapely_agrees_that_copies_are_apart(
     shape: Region, spacing: float, width: float, length: float
 ) -> None:
-    for laid in lattices(shape, spacing, (2.0, 3.0, 2.0 + width, 3.0 + length), TURNS)[:2]:
+    for laid in lattices_of(shape, spacing, (2.0, 3.0, 2.0 + width, 3.0 + length), TURNS)[:2]:
         shapes = [shapely_of(placed(shape, turn, shift)) for turn, shift in laid.places]
         assert shapes
         assert least_gap(shapes, spacing) >= spacing - 2e-4
@@ -131,5 +131,5 @@ def test_parts_round_lattices_and_pins_are_apart(shapes: list[Region], spacing: 
 
 def test_only_turns_that_the_stock_allows_are_used() -> None:
     triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
-    for laid in lattices(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
+    for laid in lattices_of(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
         assert {turn for turn, _ in laid.places} <= {0, 2}

@@ -1,0 +1,121 @@
+"""Writes docs/measured/nesting.csv: sheets of every template's batch, beside other nesters.
+
+    python docs/scripts/nesting.py        (spyrrow installed for it: pip install spyrrow)
+
+sparrow packs a strip as wide as a sheet; its length over a sheet's, rounded up, is the least number
+of sheets that the strip can be cut into. ``area`` is a lower bound for any nester.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from sbafab.actuators import load_design
+from sbafab.design.files import template_names
+from sbafab.errors import DesignError
+from sbafab.geometry.contour import run_chords
+from sbafab.geometry.offset import grow
+from sbafab.geometry.region import Region
+from sbafab.nesting.check import check_nest
+from sbafab.nesting.engines import bottom_left
+from sbafab.nesting.nest import materials_of, nest, of_material
+from sbafab.nesting.records import NestPart, Stock
+from sbafab.output.checked import check, plan_design, stocks
+
+COPIES = (1, 4, 8, 20)
+SECONDS = 20
+"""By the clock, of sparrow for each strip; the processor's time is written."""
+TABLE = Path(__file__).parents[1] / "measured" / "nesting.csv"
+COLUMNS = (
+    "design", "copies", "film", "parts", "area", "bottom_left", "sbafab", "seconds",
+    "sparrow", "sparrow_seconds",
+)  # fmt: skip
+
+
+def rows() -> Iterator[dict[str, Any]]:
+    """Yield a row for each film of each batch."""
+    for name in template_names():
+        for copies in COPIES:
+            try:
+                design = load_design(name, (f"order.copies={copies}",), ())
+            except DesignError:
+                # An assembly, whose designs are templates themselves.
+                break
+            parts = plan_design(check(design), ("cut",)).parts
+            for film in materials_of(parts):
+                stock = replace(stocks(design)[film], most=1000)
+                entry = {"design": name, "copies": copies, "film": film}
+                yield entry | measured(of_material(parts, film), stock)
+
+
+def measured(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
+    """Return sheets and processor time of each nester."""
+    began = time.process_time()
+    (result,) = nest(parts, {parts[0].material: stock})
+    seconds = time.process_time() - began
+    check_nest(result)
+    area = area_bound(parts, stock)
+    plain = 1 + max(place.sheet for place in bottom_left(parts, stock, lattices=False))
+    row = {"parts": sum(part.count for part in parts), "area": area, "bottom_left": plain}
+    row |= {"sbafab": result.sheets, "seconds": round(seconds, 2)}
+    # One sheet, or as few as the area needs, cannot be beaten.
+    return row | (sparrow(parts, stock) if result.sheets > max(1, area) else {})
+
+
+def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
+    """Return the sheets that the parts fill, each with half the spacing round it."""
+    low_x, low_y, high_x, high_y = stock.usable
+    grown = [
+        part.count * grow(Region(part.region.outers), stock.spacing / 2).area for part in parts
+    ]
+    room = (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
+    return math.ceil(sum(grown) / room - 1e-6)
+
+
+def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
+    """Return the sheets of the strip that sparrow packs, and its processor time."""
+    import spyrrow
+
+    low_x, low_y, high_x, high_y = stock.usable
+    items = [
+        spyrrow.Item(
+            str(number),
+            [p for run in part.region.outers[0].runs for p in run_chords(run, True, 0.01)],
+            part.count,
+            [0.0, 90.0, 180.0, 270.0],
+        )
+        for number, part in enumerate(parts)
+    ]
+    # It keeps the spacing from the strip's sides and ends, too, where a border needs none.
+    strip = spyrrow.StripPackingInstance("strip", high_x - low_x + 2 * stock.spacing, items)
+    settings = spyrrow.StripPackingConfig(
+        min_items_separation=stock.spacing,
+        total_computation_time=SECONDS,
+        num_workers=1,
+        seed=1,
+    )
+    began = time.process_time()
+    length = strip.solve(settings).width - 2 * stock.spacing
+    # Two sheets' worth of strip lacks the gap between them.
+    sheets = math.ceil((length + stock.spacing) / (high_y - low_y + stock.spacing) - 1e-6)
+    return {"sparrow": sheets, "sparrow_seconds": round(time.process_time() - began, 1)}
+
+
+def main() -> None:
+    """Write the table."""
+    with TABLE.open("w", encoding="utf-8", newline="") as opened:
+        table = csv.DictWriter(opened, COLUMNS, lineterminator="\n")
+        table.writeheader()
+        for row in rows():
+            table.writerow(row)
+            opened.flush()
+
+
+if __name__ == "__main__":
+    main()
