@@ -28,6 +28,7 @@ SUMMARIES = {
     "press": "Write the heat-press schedule.",
     "mesh": "Write meshes: solid, cavities, volume and shell.",
     "nest": "Cut several designs from the same film sheets.",
+    "stock": "Show what an output folder takes of the film in stock.",
     "kerf": "Compute the kerf from a filled coupon.csv.",
     "predict": "Predict size, stroke, force, time and bending.",
     "map": "Map force and volume of the balloons.",

@@ -81,6 +81,8 @@ class Sheet(Section):
     """What holds the sheet down: x, y from its lower left corner, and diameter."""
     most: int = Field(default=20, ge=1, le=1000)
     """Sheets that may be used."""
+    piece: str | None = Field(default=None, max_length=40)
+    """The piece of the stock file that a run cuts; the run writes it, with width and length."""
 
 
 FaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]

@@ -483,6 +483,8 @@ class Sheets(Section):
     """Not used: how long an engine of earlier versions looked."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
+    stock: str | None = Field(default=None, min_length=1, max_length=1000)
+    """A stock file beside the design: the smallest pieces that hold the parts are cut first."""
 
     @field_validator("engine", mode="before")
     @classmethod

@@ -43,6 +43,7 @@ from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
+from sbafab.runs.stock import cut_from_stock
 from sbafab.simulators.simulator import Name, Result, SimulationRequest, simulator
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     old folder is then whole.
     """
     progress = progress or ignore_progress
-    job = check_job(request.source, request.name, progress)
+    job = cut_from_stock(check_job(request.source, request.name, progress))
     target = request.out / job.name
     parts = _parts_to_write(request, job, target)
     if parts is None:

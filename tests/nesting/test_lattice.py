@@ -115,13 +115,22 @@ def judged(result: Nest) -> None:
         assert box(*stock.usable).buffer(1e-5).contains(unary_union(shapes))
 
 
-@settings(max_examples=2)
-@given(st.lists(shapes_of_parts, min_size=2, max_size=3, unique=True), st.floats(0.3, 2.0))
-def test_parts_round_lattices_and_pins_are_apart(shapes: list[Region], spacing: float) -> None:
+TRIANGLE = polygon([(0.0, 0.0), (9.0, 0.0), (4.0, 7.0)])
+BENT = polygon([(0.0, 0.0), (8.0, 0.0), (8.0, 1.0), (1.0, 1.0), (1.0, 7.0), (0.0, 7.0)])
+BITTEN = rectangle((0.0, 0.0), (6.0, 9.0)) - disc((6.0, 4.5), 2.4)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "spacing"),
+    [((TRIANGLE, BENT, disc((1.0, 2.0), 4.0)), 0.6), ((BITTEN, TRIANGLE, BENT), 1.3)],
+)
+def test_parts_round_lattices_and_pins_are_apart(
+    shapes: tuple[Region, ...], spacing: float
+) -> None:
     stock = Stock(64.0, 58.0, 4.0, spacing, pins=((31.0, 22.0, 2.5),))
     parts = [
         NestPart("demo", f"P{i}", 1, "TPE", shape, count)
-        for i, (shape, count) in enumerate(zip(shapes, (90, 14, 5), strict=False))
+        for i, (shape, count) in enumerate(zip(shapes, (70, 14, 5), strict=True))
     ]
     (result,) = nest(parts, {"TPE": stock})
     check_nest(result)
