@@ -15,9 +15,9 @@ from sbafab.runs.stock import read_stock, rests, take
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--take", "is_taken", is_flag=True, help="Book the pieces out and their rests in.")
 def stock(folder: Path, file: Path, is_taken: bool) -> None:
-    """Show what an output FOLDER takes of the stock FILE.
+    """Show what an output folder takes of the film in stock.
 
-    The design names the stock file in sheets.stock. A run only reads it; --take books the run,
+    The design names the stock FILE in sheets.stock. A run only reads it; --take books the run,
     once. A rest is one rectangle.
     """
     before = {piece.id for piece in read_stock(file).piece}
