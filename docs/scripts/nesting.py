@@ -1,9 +1,10 @@
 """Writes docs/measured/nesting.csv: sheets of every template's batch, beside other nesters.
 
-    python docs/scripts/nesting.py        (spyrrow installed for it: pip install spyrrow)
+    python -m docs.scripts.nesting        (for it alone: pip install spyrrow python-libnest2d)
 
 sparrow packs a strip as wide as a sheet; its length over a sheet's, rounded up, is the least number
-of sheets that the strip can be cut into. ``area`` is a lower bound for any nester.
+of sheets that the strip can be cut into. libnest2d puts parts by no-fit polygons, first fit.
+``area`` is a lower bound for any nester.
 """
 
 from __future__ import annotations
@@ -31,10 +32,12 @@ from sbafab.output.checked import check, plan_design, stocks
 COPIES = (1, 4, 8, 20)
 SECONDS = 20
 """By the clock, of sparrow for each strip; the processor's time is written."""
+MOST_PARTS = 300
+"""libnest2d, whose time grows with the square of the parts, gets no more."""
 TABLE = Path(__file__).parents[1] / "measured" / "nesting.csv"
 COLUMNS = (
     "design", "copies", "film", "parts", "area", "bottom_left", "sbafab", "seconds",
-    "sparrow", "sparrow_seconds",
+    "sparrow", "sparrow_seconds", "libnest2d", "libnest2d_seconds",
 )  # fmt: skip
 
 
@@ -65,7 +68,9 @@ def measured(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     row = {"parts": sum(part.count for part in parts), "area": area, "bottom_left": plain}
     row |= {"sbafab": result.sheets, "seconds": round(seconds, 2)}
     # One sheet, or as few as the area needs, cannot be beaten.
-    return row | (sparrow(parts, stock) if result.sheets > max(1, area) else {})
+    if result.sheets == max(1, area):
+        return row
+    return row | sparrow(parts, stock) | libnest2d(parts, stock)
 
 
 def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
@@ -105,6 +110,27 @@ def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     # Two sheets' worth of strip lacks the gap between them.
     sheets = math.ceil((length + stock.spacing) / (high_y - low_y + stock.spacing) - 1e-6)
     return {"sparrow": sheets, "sparrow_seconds": round(time.process_time() - began, 1)}
+
+
+def libnest2d(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
+    """Return the sheets that libnest2d takes, and its processor time; nothing for many parts."""
+    import pynest2d
+
+    if sum(part.count for part in parts) > MOST_PARTS:
+        return {}
+    low_x, low_y, high_x, high_y = stock.usable
+    unit = pynest2d.mm()
+    items = []
+    for part in parts:
+        runs = part.region.outers[0].runs
+        corners = [p for run in runs for p in run_chords(run, True, 0.01)]
+        outline = [pynest2d.Point(round(x * unit), round(y * unit)) for x, y in corners]
+        items += [pynest2d.Item(outline) for _ in range(part.count)]
+    sheet = pynest2d.Box(round((high_x - low_x) * unit), round((high_y - low_y) * unit))
+    began = time.process_time()
+    sheets = pynest2d.nest(items, sheet, round(stock.spacing * unit), pynest2d.NfpConfig())
+    seconds = round(time.process_time() - began, 1)
+    return {"libnest2d": sheets, "libnest2d_seconds": seconds}
 
 
 def main() -> None:
