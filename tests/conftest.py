@@ -24,6 +24,9 @@ settings.load_profile("sbafab")
 
 LONG = "SBAFAB_LONG" in os.environ
 """Whether only the tests marked ``long`` run, as ``.ci/run`` has them beside the suite."""
+SLOW_ROOMS = {"calibration", "models", "search", "simulators", "site", "validation"}
+"""Folders of tests that take up to a minute each: of those marked ``long`` they run first, lest a
+worker begins one when the others are done."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -46,6 +49,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left_out = [item for item in items if (item.get_closest_marker("long") is not None) != LONG]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in set(left_out)]
+    if LONG:
+        items.sort(key=lambda item: item.path.parent.name not in SLOW_ROOMS)
 
 
 READERS = ("klayout", "meerk40t", "pyogrio")
