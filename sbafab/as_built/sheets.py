@@ -38,7 +38,7 @@ from sbafab.geometry.offset import Kerf
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Material, in_order
 from sbafab.laminate.laminate import Layer, SheetPanel, freed
-from sbafab.nesting.check import check_placed
+from sbafab.nesting.check import check_placed, edge_distance
 from sbafab.nesting.records import TURNS, Stock, Turn, no_spares
 from sbafab.output.checked import stocks
 from sbafab.output.manifest import (
@@ -492,7 +492,40 @@ def _layout_problems(sheet_claim: SheetClaim, drawing: ReadBack, stock: Stock) -
         x, y = off_waste
         message = f"engraving at x {x:.3f}, y {y:.3f} is not in the waste; regenerate it"
         problems.append(_integrity_problem(sheet_claim, OutputError(message), off_waste))
+    near = _mark_near_part(drawing, sheet_claim)
+    if near is not None:
+        x, y = near
+        message = (
+            f"engraving at x {x:.3f}, y {y:.3f} is nearer to a part than "
+            f"{_mark_clearance(sheet_claim):g} mm; regenerate it"
+        )
+        problems.append(_integrity_problem(sheet_claim, OutputError(message), near))
     return problems
+
+
+MARK_CLEARANCE = 0.5
+"""mm that an index mark keeps from every part; half the spacing where that is less."""
+
+
+def _mark_clearance(sheet_claim: SheetClaim) -> float:
+    return min(MARK_CLEARANCE, sheet_claim.spacing / 2)
+
+
+def _mark_near_part(drawing: ReadBack, sheet_claim: SheetClaim) -> Point | None:
+    """Return a point of an index mark, inside the border, that is too near to a part, or None."""
+    apart, border = _mark_clearance(sheet_claim) - AGREEMENT, sheet_claim.border
+    for layer, edges in drawing.strokes:
+        if layer != ENGRAVE:
+            continue
+        for edge in edges:
+            low_x, low_y, high_x, high_y = edge.bounds
+            is_inside = min(low_x, low_y) >= border and (
+                high_x <= sheet_claim.width - border and high_y <= sheet_claim.length - border
+            )
+            around = drawing.region.index.touching(widened(edge.bounds, apart))
+            if is_inside and any(edge_distance(edge, other).value < apart for other in around):
+                return edge.start
+    return None
 
 
 def _placed_piece(box: tuple[float, float, float, float]) -> str:

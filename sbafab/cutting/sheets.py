@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.index_marks import Mark, index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import ENDING, project_text, verify_project
 from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
@@ -50,6 +51,7 @@ class SheetFile:
     ``unsorted_travel`` is what the head would travel in the nest's own order. ``label`` says
     whether the sheet's label is engraved, or found no room in the border, or was not asked for.
     ``cut_length`` has the cut that frees a roll's sheet in it; ``contours`` are those of the parts.
+    ``index_marks`` of the parts have their number engraved beside them; None if not asked for.
     """
 
     path: str
@@ -68,6 +70,7 @@ class SheetFile:
     unsorted_travel: float
     minutes: float
     label: LabelState = "engraved"
+    index_marks: int | None = None
 
     @property
     def material(self) -> Material:
@@ -86,6 +89,7 @@ def write_sheets(
     machine: Machine,
     labelled: bool = True,
     progress: Counted | None = None,
+    marked: bool = False,
 ) -> list[SheetFile]:
     """Writes ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
 
@@ -98,20 +102,30 @@ def write_sheets(
     written: list[SheetFile] = []
     for nest in nests:
         for sheet in range(nest.sheets):
-            written.append(_write_sheet(nest, sheet, folder, settings, machine, labelled))
+            marks = index_marks(nest, sheet) if marked else None
+            written.append(_write_sheet(nest, sheet, folder, settings, machine, labelled, marks))
             if progress is not None:
                 progress(len(written), total)
     return written
 
 
 def _write_sheet(
-    nest: Nest, sheet: int, folder: Path, settings: CutSettings, machine: Machine, labelled: bool
+    nest: Nest,
+    sheet: int,
+    folder: Path,
+    settings: CutSettings,
+    machine: Machine,
+    labelled: bool,
+    marks: Sequence[Mark] | None,
 ) -> SheetFile:
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
     contours = cutting_order(region, machine.heat_distance)
     width, length = nest.stock.width, nest.length(sheet)
     around = _surroundings(nest, sheet, (width, length), settings, labelled)
+    label_state: LabelState = "engraved" if around.engraved else "no room" if labelled else "off"
+    beside = tuple(stroke for mark in marks or () for stroke in mark.strokes)
+    around = around._replace(engraved=(*around.engraved, *beside))
     properties = sheet_properties(
         settings, nest.material, f"{sheet + 1} of {nest.sheets}", _parts_said(nest, placements)
     )
@@ -149,7 +163,8 @@ def _write_sheet(
         travel=moved,
         unsorted_travel=travel((*region.holes, *region.outers)),
         minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, machine),
-        label="engraved" if around.engraved else "no room" if labelled else "off",
+        label=label_state,
+        index_marks=None if marks is None else len(marks),
     )
 
 

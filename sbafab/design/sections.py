@@ -483,6 +483,9 @@ class Sheets(Section):
     """Not used: how long an engine of earlier versions looked."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
+    index_marks: bool | None = None
+    """Whether the number of its pattern is engraved into the skeleton beside each part that has
+    room for it; off by default. Wider spacing leaves more room."""
     stock: str | None = Field(default=None, min_length=1, max_length=1000)
     """A stock file beside the design: the smallest pieces that hold the parts are cut first."""
 

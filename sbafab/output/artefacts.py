@@ -210,7 +210,8 @@ def write_nested_sheets(
         return []
     label = design.sheets.label
     sheet_progress = partial(progress, "sheets")
-    sheets = write_sheets(nests, folder, settings, machine(design), label, sheet_progress)
+    marked = bool(design.sheets.index_marks)
+    sheets = write_sheets(nests, folder, settings, machine(design), label, sheet_progress, marked)
     write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
     return sheets
 

@@ -222,6 +222,11 @@ def sheet_rows(
             f"{count} {TIMES} {marked(design, pattern, marks)}"
             for design, pattern, count in sheet.counts
         ]
+        if sheet.index_marks is not None:
+            parts = sum(count for _, _, count in sheet.counts)
+            counts.append(
+                f"{sheet.index_marks} of {parts} parts have their pattern's number beside"
+            )
         rows.append(
             SheetRow(
                 sheet,
