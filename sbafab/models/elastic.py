@@ -190,6 +190,11 @@ CHAMBERS_SHUT = Model(
 )
 
 
+OUTSIDE = (
+    "outside the checked part of the balloons' map, which misses a balloon computed there by more "
+    "than 3 %"
+)
+"""What is said of a figure whose pose has balloons where a map does not hold."""
 BUCKLES = (
     "that of a straight column, which is unstable here and buckles: it may push harder, or give "
     "way to a tenth or less"
@@ -220,10 +225,30 @@ def moved_stack(together: Stack, factors: Factors, moved: Factors) -> Stack | No
     )
 
 
+PosedItem = tuple[Figure | LeftOut, Pose | None]
+"""A figure with the pose that it is taken from."""
+
+
 def stack_figures(
-    actuator: Actuator, request: PredictionRequest, stack: Stack
+    actuator: Actuator, request: PredictionRequest, stack: Stack, checks_maps: bool = False
 ) -> Iterator[Figure | LeftOut]:
-    """Yield forces, bending, times and stiffness of the stack."""
+    """Yield forces, bending, times and stiffness of the stack; with ``checks_maps`` those whose
+    balloons stand where a map does not hold say so.
+    """
+    rows = list(_posed_figures(actuator, request, stack))
+    poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
+    outside = {id(pose) for pose, holds in zip(poses, stack.hold(poses), strict=True) if not holds}
+    for item, pose in rows:
+        if isinstance(item, Figure) and id(pose) in outside:
+            trust = f"{OUTSIDE}; {item.model.trust}"
+            yield replace(item, model=replace(item.model, trust=trust))
+        else:
+            yield item
+
+
+def _posed_figures(
+    actuator: Actuator, request: PredictionRequest, stack: Stack
+) -> Iterator[PosedItem]:
     yield from _forces(actuator, request, stack)
     if actuator.form.is_parallel:
         yield from _bends(request, stack)
@@ -237,31 +262,33 @@ def stroke_at(actuator: Actuator, share: float) -> float:
     return max(share * (actuator.full_height - actuator.thickness), 0.0)
 
 
-def _forces(
-    actuator: Actuator, request: PredictionRequest, stack: Stack
-) -> Iterator[Figure | LeftOut]:
+def _forces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
             at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
+            stroke = stroke_at(actuator, share)
             try:
-                value = float(blocked_force(stack, pressure, stroke_at(actuator, share)))
+                value = float(blocked_force(stack, pressure, stroke))
             except DesignError as error:
-                yield LeftOut(f"{name}, elastic stack", str(error))
+                yield LeftOut(f"{name}, elastic stack", str(error)), None
                 continue
             model = calibrated(FORCE, request.factors)
-            if not _stands(stack, pressure, stroke_at(actuator, share)):
+            pose = _level_pose(stack, pressure, stroke)
+            if pose and not pose.stable:
                 model = replace(model, trust=f"{BUCKLES}; {model.trust}")
-            yield Figure("force", name, actuator.form.pushing * value, "N", model)
+            yield Figure("force", name, actuator.form.pushing * value, "N", model), pose
 
 
-def _stands(stack: Stack, pressure: float, stroke: float) -> bool:
-    """Return False if a column that a level plate holds at a stroke is unstable while straight."""
+def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
+    """Return the straight pose below a level plate that holds a stack at a stroke in mm; None
+    without one. A column that would buckle there is not stable.
+    """
     try:
         plate = stack.flat_height + stroke
-        return stack.pose(_pressures(stack, stack.chambers, pressure), plate=plate).stable
+        return stack.pose(_pressures(stack, stack.chambers, pressure), plate=plate)
     except DesignError:
-        return True
+        return None
 
 
 def _pressures(
@@ -275,7 +302,7 @@ def chamber_count(number: int) -> str:
     return "one chamber" if number == 1 else f"{number} chambers"
 
 
-def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     model = calibrated(BEND, request.factors)
     for pressure in request.pressures_kpa:
         for chambers in range(1, stack.chambers):
@@ -283,14 +310,14 @@ def _bends(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOu
             try:
                 pose = stack.pose(_pressures(stack, chambers, pressure))
             except DesignError as error:
-                yield LeftOut(name, str(error))
+                yield LeftOut(name, str(error)), None
                 continue
-            yield Figure("bending", name, pose.bend, "deg", model)
-            yield from _clearances(name.replace("bend at ", "", 1), request, stack, pose)
+            yield Figure("bending", name, pose.bend, "deg", model), pose
+            for figure in _clearances(name.replace("bend at ", "", 1), request, stack, pose):
+                yield figure, pose
             aside = float(np.hypot(*pose.tip[:2]))
-            yield Figure(
-                "bending", name.replace("bend", "lateral tip displacement", 1), aside, "mm", model
-            )
+            name = name.replace("bend", "lateral tip displacement", 1)
+            yield Figure("bending", name, aside, "mm", model), pose
 
 
 def _clearances(
@@ -323,7 +350,7 @@ def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
     return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
 
 
-def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
     if not request.pressures_kpa:
         return
@@ -334,15 +361,15 @@ def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[Figure | 
             name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
             pose = pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
-                yield LeftOut(name, "it does not bend so far")
+                yield LeftOut(name, "it does not bend so far"), None
                 continue
             plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
             try:
                 pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=pose)
             except DesignError as error:
-                yield LeftOut(name, str(error))
+                yield LeftOut(name, str(error)), None
                 continue
-            yield Figure("force", name, pressed.force, "N", model)
+            yield Figure("force", name, pressed.force, "N", model), pressed
 
 
 def _three(values: Array) -> tuple[float, float, float]:
@@ -380,33 +407,33 @@ def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> floa
     return line.delay + (full - empty) / flow
 
 
-def _times(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _times(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     model = calibrated(TIME, request.factors)
     until = f"{paper.FULL_KPA:g} kPa at the pump"
     name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
     try:
         time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
-        yield LeftOut(name, str(error))
+        yield LeftOut(name, str(error)), None
         return
-    yield Figure("actuation", name, time + request.factors.water_delay, "s", model)
+    yield Figure("actuation", name, time + request.factors.water_delay, "s", model), pose
     name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
-    yield Figure("actuation", name, pose.height, "mm", model)
+    yield Figure("actuation", name, pose.height, "mm", model), pose
 
 
-def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[Figure | LeftOut]:
+def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     for pressure in request.pressures_kpa[:1]:
         name = f"lateral tip stiffness at {pressure:g} kPa"
         try:
             start = stack.pose((pressure,) * stack.chambers)
             aside = (PROBE_FORCE, 0.0, 0.0)
             pushed = stack.pose(start.pressures, aside, near=start)
-            yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request)
+            yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request), start
             shut, _ = shut_stiffness(stack, pressure)
             model = calibrated(CHAMBERS_SHUT, request.factors)
-            yield Figure("stiffness", f"{name}, chambers shut", shut, "N/mm", model)
+            yield Figure("stiffness", f"{name}, chambers shut", shut, "N/mm", model), start
         except DesignError as error:
-            yield LeftOut(name, str(error))
+            yield LeftOut(name, str(error)), None
 
 
 def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """The balloons of a design as files for other programs: CSV, JSON, and Python without dependencies
 that takes numpy arrays too.
 
-Tables cover only where the map holds (``map_range``): CSV has no row elsewhere, JSON null.
+Tables cover only where the map holds, by a balloon computed at each place: CSV has no row
+elsewhere, JSON null.
 Pressures kPa, heights mm (that a balloon has risen by), forces mN, volumes ul, potentials uJ.
 """
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
 from sbafab.models.joint_chain import urdf_text
-from sbafab.models.map_range import map_range
+from sbafab.models.map_range import holds_at, map_range
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def _csv(stack: Stack, points: int) -> str:
     for number, balloon in enumerate(stack.maps, start=1):
         pressures, heights = _grid(balloon, points)
         p, h = (grid.ravel() for grid in np.meshgrid(pressures, heights, indexing="ij"))
-        holds = map_range(balloon).holds(p, h)
+        holds = holds_at(balloon, p, h)
         p, h = p[holds], h[holds]
         columns = (p, h, balloon.force(p, h), balloon.volume(p, h), balloon.potential(p, h))
         for row in zip(*(column.tolist() for column in columns), strict=True):
@@ -77,7 +78,7 @@ def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
 def _balloon(balloon: BalloonMap, points: int) -> dict[str, Any]:
     pressures, heights = _grid(balloon, points)
     p, h = np.meshgrid(pressures, heights, indexing="ij")
-    holds = map_range(balloon).holds(p, h)
+    holds = holds_at(balloon, p.ravel(), h.ravel()).reshape(p.shape)
     return {
         **_dimensions(balloon),
         "pressure": [_short(value) for value in pressures.tolist()],
@@ -118,8 +119,8 @@ force(p, h), volume(p, h), stiffness(p, h) of one balloon at a pressure p (kPa) 
 what it has risen by): mN on the plates, ul, mN/mm. Below 0 the plates pull. All three come from one
 potential W, so force = -dW/dh, volume = -dW/dp and dvolume/dh = dforce/dp. balloon is one of
 BALLOONS; LEVELS says which one each level of a chamber has, bottom to top. p, h or both may be
-numpy arrays, of shapes that numpy broadcasts. Where holds(p, h) is false the map is more than 3 %
-off, and the others warn.
+numpy arrays, of shapes that numpy broadcasts. Where holds(p, h) is false the map may be more
+than 3 % off, and the others warn.
 """
 
 import math
@@ -141,7 +142,7 @@ def _cell_holds(b, p, h):
 
 def _warn(holds):
     if not holds:
-        warnings.warn("the map is more than 3 % off here, see holds", stacklevel=4)
+        warnings.warn("the map may be more than 3 % off here, see holds", stacklevel=4)
 
 
 def _weights(u, order):

@@ -21,18 +21,22 @@ if TYPE_CHECKING:
     from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
 
-MOST_ERROR = 0.03
-"""Share by which a map may miss."""
+MOST_ERROR, CELL_ERROR = 0.03, 0.02
+"""Share by which a map may miss, and that by which it may where a cell is checked, since it may
+miss by more between these places: free heights jump where another wave begins.
+"""
 FLAT = 1e-3
 """Height in mm that stands for 0."""
 PRESSURE_CHECKS, HEIGHT_CHECKS = 37, 25
 """Balloons computed by pressure and by height."""
+PLACE_DIGITS = 6
+"""Digits behind the point to which places in kPa and mm are told apart."""
 
 
 @dataclass(frozen=True, eq=False)
 class MapRange:
     """Cells of a map between ``pressures`` (n) and ``heights`` (m), and which of them hold:
-    ``within`` (n - 1, m - 1), true where the map does at all four corners.
+    ``within`` (n - 1, m - 1), true where the map does at all four corners and in the middle.
     """
 
     pressures: Array
@@ -48,37 +52,69 @@ class MapRange:
         return np.asarray(self.within[cells[0], cells[1]])
 
 
-def scaled_range(made: BalloonMap) -> MapRange:
-    """Return where a map holds, by the map that it was stiffened from: heights are equal at equal
-    pressure over modulus.
-    """
-    base = made.base or made
-    covered = map_range(base)
-    ratio = made.scale_pressure / base.scale_pressure
-    return MapRange(ratio * covered.pressures, covered.heights, covered.within)
-
-
 @lru_cache(maxsize=64)
 def map_range(made: BalloonMap) -> MapRange:
-    """Return where a map is within MOST_ERROR of balloons between plates, as far as checked.
+    """Return where a map is within CELL_ERROR of balloons between plates, as far as checked, by the
+    map that it was stiffened from: heights are equal at equal pressure over modulus.
+    """
+    base, ratio = _base(made)
+    pressures, heights = _grid(base, np.arange(PRESSURE_CHECKS), np.arange(HEIGHT_CHECKS))
+    corners = _is_near(base, pressures, heights)
+    rows = corners[:-1] & corners[1:]
+    middle = _grid(base, np.arange(PRESSURE_CHECKS - 1) + 0.5, np.arange(HEIGHT_CHECKS - 1) + 0.5)
+    within = rows[:, :-1] & rows[:, 1:] & _is_near(base, *middle)
+    return MapRange(ratio * pressures, heights, within)
+
+
+def _base(made: BalloonMap) -> tuple[BalloonMap, float]:
+    """Return the map that one was stiffened from, and the ratio of their moduli."""
+    base = made.base or made
+    return base, made.scale_pressure / base.scale_pressure
+
+
+def _grid(made: BalloonMap, row: Array, column: Array) -> tuple[Array, Array]:
+    """Return the pressures and the heights at places counted in cells."""
+    x = row / (PRESSURE_CHECKS - 1)
+    scale = made.scale_pressure
+    pressures = scale * np.sinh(x * math.asinh(made.most_pressure / scale))
+    y = column / (HEIGHT_CHECKS - 1)
+    return np.minimum(pressures, made.most_pressure), made.most_height * (y + y**2) / 2
+
+
+def _is_near(made: BalloonMap, pressures: Array, heights: Array) -> NDArray[np.bool_]:
+    """Return where a map is within CELL_ERROR: (pressures, heights)."""
+    grids = np.meshgrid(pressures, np.maximum(heights, FLAT), indexing="ij")
+    p, h = (grid.ravel() for grid in grids)
+    return (relative_errors(made, p, h) <= CELL_ERROR).reshape(grids[0].shape)
+
+
+def relative_errors(made: BalloonMap, pressure: Array, height: Array) -> Array:
+    """Return the larger share by which a map misses force and volume of the balloons between plates
+    computed at its places (n,), heights above 0. Raises DesignError where there is no equilibrium.
 
     Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
     shares of the volume and of what a pocket holds at the least height computed.
     """
-    even = np.linspace(0, 1, PRESSURE_CHECKS)
-    scale = made.scale_pressure
-    pressures = scale * np.sinh(even * math.asinh(made.most_pressure / scale))
-    pressures[-1] = made.most_pressure
-    even = np.linspace(0, 1, HEIGHT_CHECKS)
-    heights = made.most_height * (even + even**2) / 2
-    grids = np.meshgrid(pressures, np.maximum(heights, FLAT), indexing="ij")
-    p, h = (grid.ravel() for grid in grids)
-    exact = compressed_shapes(made.balloon, p, h, tied=True)
+    exact = compressed_shapes(made.balloon, pressure, height, tied=True)
     area = math.pi * made.balloon.pocket**2
-    push = area * (p + LOW_PRESSURE) + np.abs(exact.force)
+    push = area * (pressure + LOW_PRESSURE) + np.abs(exact.force)
     room = exact.volume + area * LEAST_HEIGHT
-    near = np.abs(made.force(p, h) - exact.force) <= MOST_ERROR * push
-    near &= np.abs(made.volume(p, h) - exact.volume) <= MOST_ERROR * room
-    corners = near.reshape(grids[0].shape)
-    rows = corners[:-1] & corners[1:]
-    return MapRange(pressures, heights, rows[:, :-1] & rows[:, 1:])
+    force = np.abs(made.force(pressure, height) - exact.force) / push
+    return np.maximum(force, np.abs(made.volume(pressure, height) - exact.volume) / room)
+
+
+def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.bool_]:
+    """Return where a map is within MOST_ERROR of the balloons computed at places (n,); not where
+    one lies outside the map.
+
+    Suction counts as no pressure, and heights below FLAT as that. Balloons are those of the map
+    that this one was stiffened from. Raises DesignError where there is no equilibrium.
+    """
+    base, ratio = _base(made)
+    places = np.stack([np.maximum(pressure / ratio, 0.0), np.maximum(height, FLAT)], -1)
+    unique, back = np.unique(places.round(PLACE_DIGITS), axis=0, return_inverse=True)
+    p, h = np.minimum(unique[:, 0], base.most_pressure), unique[:, 1]
+    holds, inside = np.zeros(len(h), bool), h <= base.most_height
+    if inside.any():
+        holds[inside] = relative_errors(base, p[inside], h[inside]) <= MOST_ERROR
+    return holds[back.ravel()]

@@ -463,13 +463,14 @@ def predict(
     quick: bool = False,
 ) -> Prediction:
     """Return the figures and curves of a design of any family; ``quick`` leaves out curves and the
-    elastic stack.
+    elastic stack. With the factors given no intervals are computed, and no figure says whether it
+    lies outside the checked part of a balloon's map.
 
     Raises DesignError where the design cannot be built, or for pressures, a flow or volumes that
     are out of range.
     """
     wish = request or PredictionRequest()
-    uncertainty = None
+    uncertainty, checks_maps = None, wish.calibration is None
     if wish.calibration is None:
         uncertainty = uncertainty_of(design, wish.overrides)
         factors = factors_of(design, wish.overrides) if uncertainty is None else uncertainty.factors
@@ -484,7 +485,7 @@ def predict(
     subject = actuator_of(design, flat, wish.factors, discs and discs.form(design, discs.equal))
     check_request(subject, wish)
     together = None if quick else elastic.elastic_stack(subject, wish)
-    items = _figures(subject, wish, together)
+    items = _figures(subject, wish, together, checks_maps)
     if uncertainty is not None:
         items = uncertainty.bounded(items, partial(_moved_figures, subject, wish, together))
     relations = () if quick else tuple(_relations(subject, wish, _stack(together)))
@@ -540,14 +541,17 @@ def _stack(together: Stack | LeftOut | None) -> Stack | None:
 
 
 def _figures(
-    actuator: Actuator, request: PredictionRequest, together: Stack | LeftOut | None
+    actuator: Actuator,
+    request: PredictionRequest,
+    together: Stack | LeftOut | None,
+    checks_maps: bool = False,
 ) -> list[Figure | LeftOut]:
     """Return all figures, and the ones left out, in the order of their groups."""
     items = list(_geometric_figures(actuator, request))
     if isinstance(together, LeftOut):
         items.append(together)
     elif together is not None:
-        items += elastic.stack_figures(actuator, request, together)
+        items += elastic.stack_figures(actuator, request, together, checks_maps)
     return sorted(items, key=_group_order)
 
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.map_range import scaled_range
+from sbafab.models.map_range import holds_at
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
 from sbafab.models.stack_loads import (
@@ -269,13 +269,27 @@ class PosedStack:
 
     def within(self, pose: Pose) -> bool:
         """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
-        plates, as far as ``map_range`` checked. It takes up to seconds the first time.
+        plates that are computed there. False where one lies outside, or cannot be computed.
         """
-        pressures = np.asarray(pose.pressures)
-        return all(
-            bool(scaled_range(self.maps[kind]).holds(pressures, gaps).all())
-            for kind, gaps in zip(self.levels, pose.gaps, strict=True)
-        )
+        (holds,) = self.hold([pose])
+        return holds
+
+    def hold(self, poses: Sequence[Pose]) -> list[bool]:
+        """Return ``within`` of each pose; balloons of all poses are computed at once."""
+        if not poses:
+            return []
+        gaps = np.stack([pose.gaps for pose in poses])
+        pressures = np.array([pose.pressures for pose in poses])[:, None, :]
+        pressures = np.broadcast_to(pressures, gaps.shape)
+        holds = np.ones(len(poses), bool)
+        try:
+            for kind, balloon in enumerate(self.maps):
+                row = self.levels == kind
+                places = pressures[:, row].ravel(), gaps[:, row].ravel()
+                holds &= holds_at(balloon, *places).reshape(len(poses), -1).all(-1)
+        except DesignError:
+            return [self.within(pose) for pose in poses] if len(poses) > 1 else [False]
+        return holds.tolist()
 
     def start_freedoms(self, pressures: Sequence[float]) -> Array:
         """Return rise and tilt to start from, a row a kind of balloon: the plane nearest to the
