@@ -62,12 +62,14 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
 
 
 def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The pose asked for; with ``curves``, also those on the way to it, as lists of figures.
+    """The pose asked for; with ``curves``, also those on the way to it, as lists of figures, and
+    whether the balloons' maps hold for it.
 
     Raises DesignError for what is out of the model's range.
     """
     pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
-    yield pose_model(stack.pose(pressures, **_loads(request)))
+    final = stack.pose(pressures, **_loads(request))
+    yield pose_model(final)
     if not request.get("curves"):
         return
     most = max(pressures) or 1.0
@@ -81,7 +83,8 @@ def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         rows.append((share * most, pose.height, pose.bend, float(sum(pose.volumes))))
     names = ("pressure", "height", "bend", "volume")
     columns = zip(*rows, strict=True)
-    yield {"kind": "curves", **{name: numbers(c) for name, c in zip(names, columns, strict=False)}}
+    by_name = {name: numbers(column) for name, column in zip(names, columns, strict=False)}
+    yield {"kind": "curves", "holds": stack.within(final), **by_name}
 
 
 class Filling:

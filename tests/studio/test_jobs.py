@@ -13,6 +13,7 @@ import pytest
 
 from sbafab import api
 from sbafab.errors import DesignError
+from sbafab.models import map_range
 from sbafab.rules.deck import rule_names
 from sbafab.studio import jobs
 from sbafab.studio.app import design_in, packed
@@ -245,13 +246,19 @@ def test_a_link_holds_a_design() -> None:
 
 
 @pytest.mark.long
-def test_poses_are_the_stack_s(tmp_path: Path) -> None:
+def test_poses_are_the_stack_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = api.template("1dof-5mm")
     asked: dict[str, Any] = {"do": "motion", "pose": {"pressures": [20.0], "plate": 3.0}}
     (pose,) = answers({**job(tmp_path, text), **asked})
     theirs = api.stack(api.loads(text)).pose((20.0,), plate=3.0)
     assert pose["force"] == pytest.approx(theirs.force, rel=1e-4)
     assert pose["height"] == pytest.approx(theirs.height, abs=1e-3)
+    asked["pose"]["curves"] = True
+    pose, curves = answers({**job(tmp_path, text), **asked})
+    assert curves["holds"]
+    monkeypatch.setattr(map_range, "MOST_ERROR", 1e-9)
+    pose, curves = answers({**job(tmp_path, text), **asked})
+    assert not curves["holds"]
     with pytest.raises(DesignError, match="pressures must be 1 finite"):
         answers({**job(tmp_path, text), "do": "motion", "pose": {"pressures": [1, 2]}})
 
