@@ -58,11 +58,11 @@ def map_range(made: BalloonMap) -> MapRange:
     map that it was stiffened from: heights are equal at equal pressure over modulus.
     """
     base, ratio = _base(made)
-    pressures, heights = _grid(base, np.arange(PRESSURE_CHECKS), np.arange(HEIGHT_CHECKS))
+    pressures, heights = _grid(base, 0.0)
     corners = _is_near(base, pressures, heights)
     rows = corners[:-1] & corners[1:]
-    middle = _grid(base, np.arange(PRESSURE_CHECKS - 1) + 0.5, np.arange(HEIGHT_CHECKS - 1) + 0.5)
-    within = rows[:, :-1] & rows[:, 1:] & _is_near(base, *middle)
+    middles = _is_near(base, *(places[:-1] for places in _grid(base, 0.5)))
+    within = rows[:, :-1] & rows[:, 1:] & middles
     return MapRange(ratio * pressures, heights, within)
 
 
@@ -72,12 +72,12 @@ def _base(made: BalloonMap) -> tuple[BalloonMap, float]:
     return base, made.scale_pressure / base.scale_pressure
 
 
-def _grid(made: BalloonMap, row: Array, column: Array) -> tuple[Array, Array]:
-    """Return the pressures and the heights at places counted in cells."""
-    x = row / (PRESSURE_CHECKS - 1)
+def _grid(made: BalloonMap, offset: float) -> tuple[Array, Array]:
+    """Return the pressures and the heights of the checks, ``offset`` cells further."""
+    x = (np.arange(PRESSURE_CHECKS) + offset) / (PRESSURE_CHECKS - 1)
     scale = made.scale_pressure
     pressures = scale * np.sinh(x * math.asinh(made.most_pressure / scale))
-    y = column / (HEIGHT_CHECKS - 1)
+    y = (np.arange(HEIGHT_CHECKS) + offset) / (HEIGHT_CHECKS - 1)
     return np.minimum(pressures, made.most_pressure), made.most_height * (y + y**2) / 2
 
 
