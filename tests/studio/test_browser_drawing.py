@@ -267,3 +267,44 @@ def test_a_design_without_shapes_has_no_such_view(sketch: Sketch) -> None:
     sketch.seen.until("studio.laminate?.name === '1dof-5mm'")
     assert not sketch.page.get_by_role("tab", name="Draw").is_visible()
     assert sketch.page.locator("#tab-layers").get_attribute("aria-selected") == "true"
+
+
+def test_a_shape_gets_another_name_everywhere(sketch: Sketch) -> None:
+    sketch.page.get_by_label("Shape", exact=True).select_option("pocket")
+    sketch.type("Name of the shape", "cavity")
+    shapes = sketch.settled()
+    assert "pocket" not in shapes
+    assert shapes["mask"]["union"] == ["cavity", "strip"]
+    assert shapes["ring"] == {"offset": "cavity", "by": 1}
+    sketch.seen.until("studio.laminate && !studio.error")
+    # A layer's shape too; a name that is taken is not.
+    sketch.page.get_by_label("Shape", exact=True).select_option("film")
+    sketch.type("Name of the shape", "sheet")
+    text = tomllib.loads(sketch.seen.say("studio.text")) if sketch.settled() else {}
+    assert [layer["shape"] for layer in text["layers"]] == ["sheet", "mask", "sheet"]
+    sketch.type("Name of the shape", "mask")
+    assert "sheet" in sketch.settled()
+
+
+def test_seams_folds_and_ports_are_edited_in_forms(sketch: Sketch) -> None:
+    page = sketch.page
+    sketch.page.evaluate("text => studio.open(text)", api.template("folded"))
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    sketch.type("seam 1: Width, mm", "1.5")
+    page.get_by_label("seam 2: Tool").select_option("laser")
+    sketch.type("fold 1: Line: x y; x y, mm", "-20 -12; 20 -12.0")
+    sketch.settled()
+    text = tomllib.loads(sketch.seen.say("studio.text"))
+    assert [seam["width"] for seam in text["seams"]] == [1.5, 2]
+    assert text["seams"][1]["tool"] == "laser"
+    page.locator("summary", has_text="Ports").click()
+    page.get_by_role("button", name="Add port").click()
+    sketch.settled()
+    sketch.type("port 1: Place: x y, mm", "0 -1")
+    sketch.settled()
+    text = tomllib.loads(sketch.seen.say("studio.text"))
+    assert text["ports"] == [{"name": "port", "layers": [1, 2], "at": [0, -1]}]
+    page.get_by_role("button", name="Delete port").click()
+    sketch.settled()
+    assert "ports" not in tomllib.loads(sketch.seen.say("studio.text"))
+    assert sketch.seen.say("studio.error") is None

@@ -4,6 +4,7 @@ import { PanZoom, niceBar } from "./panzoom.js";
 import { check, inkOf, svgBlob, text } from "./layers.js";
 import { contains, pathOf } from "./shapes.js";
 import { KINDS, apex, bend, bulgeThrough, corners, dependents, edgeWords, edges, guidesThrough, handles, hasCorners, inserted, kindOf, nearestOn, outline, outward, parts, snapped, snappedBulge, tableLiteral, targetsOf, without, withCorners, writes } from "./sketch.js";
+import { JointsForm } from "./joints_form.js";
 import { NewShape } from "./new_shape.js";
 
 const GRIDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 5];
@@ -23,6 +24,7 @@ export class Draw {
       remove: el("button", { title: "Take the chosen point out (Delete)", onclick: () => this.removePoint() }, "Delete point"),
     };
     this.fresh = new NewShape(this);
+    this.joints = new JointsForm(this);
     this.bar = el("div", { class: "draw-bar" }, el("label", {}, "Shape", this.pick), el("button", { id: "new-shape", "aria-expanded": "false", onclick: () => this.fresh.toggle() }, "New shape"), el("span", { class: "grow" }), el("div", { class: "group", role: "group", "aria-label": "Chosen point" }, ...Object.values(this.tools)));
     this.svg = el("svg", { role: "img", "aria-label": "Shape in plan" });
     this.surface = el("div", { class: "surface", role: "application", "aria-label": "Drawing; keys are listed beside it" }, this.svg);
@@ -279,7 +281,7 @@ export class Draw {
     const bent = hasCorners(this.shape) && this.corner !== null && corners(this.shape)[this.corner]?.b;
     this.tools.arc.textContent = bent ? "Straighten" : "Arc";
     if (this.fresh.open) return;
-    this.side.replaceChildren(el("p", { class: "draw-why", role: "alert", hidden: true }), el("div", {}, el("h3", {}, `${this.name}: ${KINDS[kind].toLowerCase()}`), ...(hasCorners(this.shape) ? this.table() : this.sizes(kind)), ...this.placing()), el("div", {}, ...this.uses(), el("p", { class: "keys" }, HELP)));
+    this.side.replaceChildren(el("p", { class: "draw-why", role: "alert", hidden: true }), el("div", {}, el("h3", {}, `${this.name}: ${KINDS[kind].toLowerCase()}`), this.joints.renaming(), ...(hasCorners(this.shape) ? this.table() : this.sizes(kind)), ...this.placing()), el("div", {}, ...this.uses(), el("p", { class: "keys" }, HELP)));
     this.warn();
     this.side.scrollTop = scrollTop;
     if (focused) this.side.querySelector(`[data-field="${focused}"]`)?.focus();
@@ -352,7 +354,7 @@ export class Draw {
     return [
       ...(users.length ? [el("h3", {}, "Part of"), el("div", { class: "line" }, el("span", { class: "names" }, ...users.map((name) => el("button", { onclick: () => this.choose(name) }, name))))] : []),
       ...(idle ? [el("div", { class: "line" }, el("span", {}, "No layer uses this shape."), el("button", { onclick: () => { const { name } = this; this.name = null; this.studio.edit([[`shapes.${name}`, null]]); } }, "Delete shape"))] : []),
-      el("h3", {}, "Shape of each layer"), ...rows,
+      el("h3", {}, "Shape of each layer"), ...rows, ...this.joints.blocks(),
     ];
   }
   // A shape that the form beside has filled in.
