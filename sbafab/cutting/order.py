@@ -27,10 +27,10 @@ SHORTER = 1e-6
 class Machine:
     """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
 
-    cut_speed: float = 20.0
-    travel_speed: float = 200.0
-    pierce_seconds: float = 0.1
-    heat_distance: float = 3.0
+    cut_speed: float
+    travel_speed: float
+    pierce_seconds: float
+    heat_distance: float
 
 
 def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:

@@ -10,7 +10,7 @@ import shapely
 from shapely.affinity import scale
 
 from sbafab.actuators import build, load_design
-from sbafab.cutting.kerf import compensate
+from sbafab.cutting.kerf import compensate, in_chords
 from sbafab.cutting.properties import CutSettings, kerf_of, kerf_properties, kerf_suffix
 from sbafab.cutting.second_cut import laser_path
 from sbafab.errors import DesignError, OutputError
@@ -25,6 +25,17 @@ def test_disc_grows_and_its_hole_shrinks_by_half_the_kerf_as_circles() -> None:
     (outer,), (hole,) = path.outers, path.holes
     assert outer.circle == ((1.0, 2.0), pytest.approx(3.34, abs=1e-12))
     assert hole.circle == ((1.5, 2.0), pytest.approx(0.41, abs=1e-12))
+
+
+def test_chords_leave_a_mask_no_more_but_at_the_corners_of_its_part() -> None:
+    """A beam of 0.1 mm is led round the corners of a mask in arcs of its own radius: their chords
+    stay outside. Those of every other arc stay inside.
+    """
+    rounded, slot = (stadium((0.0, 0.0), 2 * radius, 4.0) for radius in (0.1, 1.5))
+    error, sides = 0.01, ({}, {"beam": 0.1})
+    inside, outside = (in_chords(rounded, "chamber-mask", error, **beam).area for beam in sides)
+    assert inside < rounded.area < outside
+    assert all(in_chords(slot, "chamber-mask", error, **beam).area < slot.area for beam in sides)
 
 
 def test_stadium_grows_by_the_closed_formula() -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 import shapely
+from svgelements import SVG
+from svgelements import Path as SvgPath
 
 from sbafab.cutting import sheets as module
 from sbafab.cutting.dxf_read import read_profile
@@ -16,7 +18,7 @@ from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.errors import OutputError
-from sbafab.geometry.region import disc, rectangle
+from sbafab.geometry.region import disc, rectangle, stadium
 from sbafab.nesting.nest import nest
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
@@ -156,6 +158,16 @@ def test_the_picture_has_the_sheets_size_and_colours(tmp_path: Path) -> None:
     assert 'width="60mm" height="80mm" viewBox="0 0 60 80"' in picture
     assert picture.count('r="5"') == picture.count('r="2"') == 2
     assert picture.index("#0000ff") < picture.index("#ff0000")
+
+
+def test_the_picture_s_arcs_are_as_round_as_the_part_s(tmp_path: Path) -> None:
+    """As svgelements reads the outline of a stadium 14 mm long and 4 mm wide."""
+    part = NestPart("demo", "P01", 1, "TPE", stadium((0.0, 0.0), 4.0, 14.0), 1)
+    (placed,) = nest([part], {"TPE": STOCK})
+    (sheet,) = write_sheets([placed], tmp_path, SETTINGS, MACHINE)
+    picture = SVG.parse(tmp_path / sheet.picture, ppi=25.4)
+    lengths = [path.length() for path in picture.elements(lambda each: isinstance(each, SvgPath))]
+    assert any(length == pytest.approx(20 + 4 * math.pi, abs=1e-3) for length in lengths)
 
 
 def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
