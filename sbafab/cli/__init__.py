@@ -30,6 +30,7 @@ SUMMARIES = {
     "nest": "Cut several designs from the same film sheets.",
     "stock": "Show what an output folder takes of the film in stock.",
     "kerf": "Compute the kerf from a filled coupon.csv.",
+    "inspect": "Compare a scan of a cut sheet with its cut file.",
     "predict": "Predict size, stroke, force, time and bending.",
     "map": "Map force and volume of the balloons.",
     "picture": "Draw the inflated actuator as picture, animation or scene.",
@@ -93,6 +94,7 @@ EXTRAS = {
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
     "quality": ("scipy", "record --charts, record --gauge"),
+    "scan": ("skimage", "sbafab inspect"),
     "studio": ("starlette", "sbafab studio"),
     "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),
 }

@@ -281,6 +281,40 @@ def _kerf() -> dict[str, Any]:
     )
 
 
+def _inspection() -> dict[str, Any]:
+    return table(
+        schema={"const": ids.INSPECTION_SCHEMA},
+        sheet=TEXT,
+        film=TEXT,
+        picture=TEXT,
+        picture_sha256=TEXT,
+        shows={"enum": ["pieces", "skeleton"]},
+        from_below=YES,
+        kerf={**of(Value), "description": "mm"},
+        kerf_in_file=TEXT,
+        scale=table(x=number(), y=number(), reference=TEXT),
+        edges=COUNT,
+        rms={**number(), "description": "mm, as all lengths"},
+        within_95=number(),
+        pixel=number(),
+        blur=number(),
+        failed=YES,
+        pieces=array(
+            table(
+                name=TEXT,
+                x=number(),
+                y=number(),
+                verdict=TEXT,
+                message=TEXT,
+                shift=number("null"),
+                turn={**number("null"), "description": "degrees"},
+                rms=number("null"),
+                largest=number("null"),
+            )
+        ),
+    )
+
+
 def _explain() -> dict[str, Any]:
     return of(Explanation, schema={"const": ids.EXPLAIN_SCHEMA}, rule=TEXT)
 
@@ -798,6 +832,9 @@ FORMATS: Mapping[str, Format] = {
         ids.COMPARISON_SCHEMA, "what `reproduce SOURCE --json` prints", _comparison
     ),
     "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
+    "inspection": Format(
+        ids.INSPECTION_SCHEMA, "what `inspect` writes, and prints with `--json`", _inspection
+    ),
     "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),
     "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain RULE --json` prints", _explain),
     "explained": Format(

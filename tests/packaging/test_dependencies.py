@@ -17,6 +17,7 @@ INSTALLED_AS = {
     "PIL": "pillow",
     "netgen": "netgen-mesher",
     "resvg_py": "resvg-py",
+    "skimage": "scikit-image",
     "tomli_w": "tomli-w",
     "yaml": "pyyaml",
     "zxingcpp": "zxing-cpp",

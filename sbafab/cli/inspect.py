@@ -1,0 +1,164 @@
+"""``sbafab inspect``: a scan or photograph of a cut sheet against the cut file."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sbafab.cli.options import LENGTH, finite, json_option
+from sbafab.cli.printing import print_facts, print_json, print_verdict
+from sbafab.errors import DesignError
+
+if TYPE_CHECKING:
+    from sbafab.inspection.inspection import Inspection
+    from sbafab.inspection.picture import Picture
+    from sbafab.inspection.scale import Reference
+
+MOST_LINES = 20
+"""Pieces amiss that are printed; the files have all."""
+
+
+@click.command()
+@click.argument("folder", metavar="FOLDER", type=click.Path(path_type=Path))
+@click.argument("picture", metavar="PICTURE", type=click.Path(path_type=Path))
+@click.option("--sheet", metavar="NAME", help="Sheet or layer in the picture, e.g. TPE_1.")
+@click.option(
+    "--dpi",
+    type=click.FloatRange(50, 20000),
+    callback=finite,
+    metavar="N",
+    help="Resolution of the scan.  [default: as the file states it]",
+)
+@click.option(
+    "--bar", type=LENGTH.read, metavar="MM", help="Length of a bar that lies beside the parts."
+)
+@click.option("--pins", is_flag=True, help="Take the scale from the pins of the sheet.")
+@click.option("--photo", is_flag=True, help="A camera's picture, with perspective.")
+@click.option(
+    "--paper",
+    type=click.Choice(["dark", "light"]),
+    default="dark",
+    show_default=True,
+    help="What the film lies on: darker or lighter than film.",
+)
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("inspection"),
+    show_default=True,
+    metavar="OUT",
+    help="Folder of the files.",
+)
+@json_option
+def inspect(  # noqa: PLR0913, PLR0917 - one an option
+    folder: Path,
+    picture: Path,
+    sheet: str | None,
+    dpi: float | None,
+    bar: float | None,
+    pins: bool,
+    photo: bool,
+    paper: str,
+    out: Path,
+    as_json: bool,
+) -> None:
+    """Compare a scan or photograph of a cut sheet with its cut file.
+
+    FOLDER is an output folder, or a cut file such as coupon.dxf. PICTURE shows the pieces in their
+    places without the waste, or the sheet that they fell out of. Measures the kerf and names
+    missing and wrong pieces. OUT receives the picture with deviations (.svg), the result (.json),
+    sizes for `sbafab kerf` (_sizes.csv) and an entry for `sbafab record --history` (_history.json).
+    """
+    if find_spec("skimage") is None or find_spec("scipy") is None:
+        raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
+    # An extra that may be missing, checked above.
+    from sbafab.inspection.cut_sheet import read_cut_sheet
+    from sbafab.inspection.inspection import inspect_picture
+    from sbafab.inspection.picture import read_picture
+
+    cut = read_cut_sheet(folder, sheet)
+    seen = read_picture(picture)
+    reference = _reference(seen, dpi, bar, pins, photo)
+    inspection = inspect_picture(seen, cut, reference, photo, paper == "dark")
+    paths = write_inspection(inspection, out)
+    if as_json:
+        print_json({**inspection.as_dict(), "files": [str(path) for path in paths]})
+    else:
+        print_inspection(inspection, paths)
+    if inspection.failed:
+        click.get_current_context().exit(1)
+
+
+def _reference(
+    picture: Picture, dpi: float | None, bar: float | None, pins: bool, photo: bool
+) -> Reference:
+    from sbafab.inspection.scale import Reference
+
+    if bar is not None and bar <= 0:
+        raise DesignError(f"--bar is {bar:g} mm; give the length of a bar, above 0")
+    if bar is not None and pins:
+        raise DesignError("give --bar or --pins, not both")
+    if photo:
+        return Reference(None if dpi is None else (dpi, dpi), bar, pins)
+    resolution = picture.dpi if dpi is None else (dpi, dpi)
+    if resolution is None and bar is None and not pins:
+        raise DesignError(
+            f"{picture.path} states no resolution; give --dpi as scanned, --bar or --pins, or "
+            "--photo to take the scale from the cut edges themselves"
+        )
+    return Reference(resolution, bar, pins)
+
+
+def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
+    """Write picture, result, entry and table of sizes; return their paths."""
+    from sbafab.inspection.inspection import drawing, history, sizes_csv
+    from sbafab.output.swap import refuse_file_as_folder, replace_text
+
+    refuse_file_as_folder(out)
+    out.mkdir(parents=True, exist_ok=True)
+    stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
+    result = json.dumps(inspection.as_dict(), indent=1, ensure_ascii=False) + "\n"
+    texts = {
+        ".json": result,
+        "_history.json": json.dumps(history(inspection), indent=1, ensure_ascii=False) + "\n",
+        ".svg": drawing(inspection),
+        "_sizes.csv": sizes_csv(inspection),
+    }
+    for ending, text in texts.items():
+        replace_text(out / f"{stem}{ending}", text)
+    return [out / f"{stem}{ending}" for ending in texts]
+
+
+def print_inspection(inspection: Inspection, paths: list[Path]) -> None:
+    """Print kerf, scale, edges and the pieces amiss, and last the verdict."""
+    kerf, scale, sheet = inspection.kerf, inspection.scale, inspection.sheet
+    low, high = kerf.interval
+    is_pieces = inspection.location.content == "pieces"
+    seen = "pieces without waste" if is_pieces else "the sheet without its pieces"
+    below = ", seen from below" if inspection.location.from_below else ""
+    print_facts(
+        [
+            ("picture", f"{seen}{below}; {inspection.pixel:.4f} mm a pixel"),
+            ("kerf", f"{kerf.value:.4f} mm, 95 % interval {low:.4f} to {high:.4f}"),
+            ("in file", f"kerf {sheet.kerf}"),
+            ("scale", f"x {scale.x:.5f}, y {scale.y:.5f}, by {scale.reference}"),
+            ("edges", f"rms {inspection.rms:.4f} mm, 95 % within {inspection.within_95:.4f} mm"),
+        ]
+    )
+    click.echo(
+        "The interval leaves out how film and paper reflect: half way in grey may lie beside the "
+        "edge, which reads as kerf"
+    )
+    for piece in inspection.amiss[:MOST_LINES]:
+        click.echo(f"{piece.name} at x {piece.x:.1f}, y {piece.y:.1f}: {piece.message}")
+    rest = len(inspection.amiss) - MOST_LINES
+    if rest > 0:
+        click.echo(f"and {rest} more")
+    click.echo(f"files: {', '.join(map(str, paths))}")
+    sound = len(inspection.pieces) - len(inspection.amiss)
+    print_verdict(f"{sheet.name}: {sound} of {len(inspection.pieces)} pieces as drawn")

@@ -1,0 +1,1 @@
+"""A picture of a cut sheet measured against the cut file."""

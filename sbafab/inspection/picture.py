@@ -1,0 +1,195 @@
+"""A picture of film on paper: its grey levels, and the outlines that are seen in it at once."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbafab.errors import DesignError
+
+Pixels = NDArray[np.float32]
+"""Grey levels, 0 to 255: rows downward, columns to the right."""
+
+MOST_BYTES = 2_000_000_000
+MOST_PIXELS = 400_000_000
+LEAST_SIDE = 100
+COARSE = 1600
+"""Pixels of the longer side of the reduced picture."""
+SPARSE = 4
+"""Step in reduced pixels at which the light is told."""
+ROUNDS = 3
+"""Rounds in which the threshold follows uneven light."""
+LEAST_CONTRAST = 12.0
+"""Grey levels between film and paper."""
+FLATBED_DPI = range(150, 9601)
+"""Resolutions that a file may state in earnest: cameras write 72 or 96."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """``pixels`` of a file with its hash; ``dpi`` along x and y as the file states it, or None."""
+
+    path: Path
+    pixels: Pixels
+    sha256: str
+    dpi: tuple[float, float] | None
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """The middle, as x and y in pixels."""
+        rows, columns = self.pixels.shape
+        return np.array([(columns - 1) / 2, (rows - 1) / 2])
+
+
+def read_picture(path: Path) -> Picture:
+    """Return the picture of a file that Pillow reads. Raises DesignError where it is none."""
+    from PIL import Image, ImageOps, UnidentifiedImageError
+
+    try:
+        if not path.is_file():
+            raise DesignError(f"{path} is no file; give the picture of the cut sheet")
+        if path.stat().st_size > MOST_BYTES:
+            raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in grey")
+        data = path.read_bytes()
+        with Image.open(path) as image:
+            columns, rows = image.size
+            if columns * rows > MOST_PIXELS:
+                raise DesignError(
+                    f"{path} has {columns * rows:,} pixels; crop it to the sheet, or scan at a "
+                    f"resolution that leaves at most {MOST_PIXELS:,}"
+                )
+            stated = image.info.get("dpi")
+            grey = _grey(ImageOps.exif_transpose(image))
+    except (UnidentifiedImageError, SyntaxError, ValueError, OSError) as error:
+        if isinstance(error, DesignError):
+            raise
+        raise DesignError(
+            f"{path} is not a picture that can be read; give a PNG, TIFF or JPEG file"
+        ) from None
+    if min(grey.shape) < LEAST_SIDE:
+        raise DesignError(
+            f"{path} is {columns} x {rows} pixels, too small to measure; scan at 600 dpi or more"
+        )
+    return Picture(path, grey, hashlib.sha256(data).hexdigest(), _resolution(stated))
+
+
+def _grey(image: Any) -> Pixels:
+    """Return grey levels of 0 to 255, of a picture of 16 bits too."""
+    if image.mode.startswith(("I", "F")):
+        levels = np.asarray(image, dtype=np.float32)
+        return levels / max(float(levels.max()), 1.0) * 255
+    return np.asarray(image.convert("L"), dtype=np.float32)
+
+
+def _resolution(stated: Any) -> tuple[float, float] | None:
+    try:
+        x, y = float(stated[0]), float(stated[1])
+    except (TypeError, ValueError, IndexError, ZeroDivisionError):
+        return None
+    # JPEG and PNG keep whole dots a centimetre or metre.
+    return (x, y) if round(x) in FLATBED_DPI and round(y) in FLATBED_DPI else None
+
+
+class Outline(NamedTuple):
+    """A closed outline: its points (n, 2) as x and y in pixels, centroid, area in square pixels.
+
+    ``is_light``: True if what it encloses is lighter than what lies round it.
+    """
+
+    points: NDArray[np.float64]
+    centroid: NDArray[np.float64]
+    area: float
+    is_light: bool
+
+
+def outlines(picture: Picture) -> list[Outline]:
+    """Return what is lighter or darker than its surroundings, largest first.
+
+    Read in the picture reduced to COARSE pixels: within a pixel of that. Raises DesignError where
+    nothing stands out.
+    """
+    from skimage import measure
+
+    factor = max(1, -(-max(picture.pixels.shape) // COARSE))
+    reduced = _reduced(picture.pixels, factor)
+    level = _level(reduced, picture.path)
+    find_contours: Any = measure.find_contours
+    results = []
+    for contour in find_contours(reduced - level, 0.0):
+        if len(contour) < 8 or not np.array_equal(contour[0], contour[-1]):
+            continue
+        # A reduced pixel's centre is the middle of its block.
+        points = contour[:-1, ::-1] * factor + (factor - 1) / 2
+        area, centroid = moments(points)
+        if abs(area) > 12 * factor**2:
+            results.append(Outline(points, centroid, abs(area), area > 0))
+    return sorted(results, key=lambda outline: -outline.area)
+
+
+def _reduced(pixels: Pixels, factor: int) -> Pixels:
+    """Return the means of blocks of ``factor`` by ``factor`` pixels."""
+    rows, columns = (side // factor * factor for side in pixels.shape)
+    blocks = pixels[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor)
+    return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float32)
+
+
+def _level(reduced: Pixels, path: Path) -> NDArray[np.float32]:
+    """Return half way between film and paper, which follows uneven light."""
+    from scipy.ndimage import gaussian_filter, map_coordinates
+    from skimage import filters
+
+    smooth = gaussian_filter(reduced, 1.0)
+    # Light changes slowly: every few pixels tell it.
+    sparse = smooth[::SPARSE, ::SPARSE]
+    threshold_otsu: Any = filters.threshold_otsu
+    level: Any = threshold_otsu(smooth)
+    width = max(sparse.shape) / 12
+    for _ in range(ROUNDS):
+        is_light = sparse > level
+        contrast = _contrast(sparse, is_light)
+        if contrast < LEAST_CONTRAST:
+            raise DesignError(
+                f"{path}: film and paper differ by {contrast:.0f} of 255 grey levels, and "
+                f"{LEAST_CONTRAST:.0f} are needed; lay the film on black paper and scan again"
+            )
+        light = _local_mean(sparse, is_light, width)
+        level = (light + _local_mean(sparse, ~is_light, width)) / 2
+    places = [np.arange(side) / SPARSE for side in reduced.shape]
+    grid = np.meshgrid(*places, indexing="ij", sparse=False)
+    return np.asarray(map_coordinates(level, grid, order=1, mode="nearest"), dtype=np.float32)
+
+
+def _contrast(smooth: Pixels, is_light: NDArray[np.bool_]) -> float:
+    if is_light.all() or not is_light.any():
+        return 0.0
+    return float(np.median(smooth[is_light]) - np.median(smooth[~is_light]))
+
+
+def _local_mean(values: Pixels, mask: NDArray[np.bool_], width: float) -> NDArray[np.float32]:
+    """Return the mean of the values in a mask, weighted by distance; far off, that of all."""
+    from scipy.ndimage import binary_erosion, gaussian_filter
+
+    inner = binary_erosion(mask)
+    weights = (inner if inner.any() else mask).astype(np.float32)
+    mean = float(values[weights > 0].mean())
+    # What lies far from the mask tends to the mean of all of it.
+    total = gaussian_filter(values * weights, width) + 1e-3 * mean
+    return np.asarray(total / (gaussian_filter(weights, width) + 1e-3))
+
+
+def moments(points: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    """Return signed area and centroid of a polygon; the area is positive counter-clockwise."""
+    origin = points[0]
+    x, y = (points - origin).T
+    after_x, after_y = np.roll(x, -1), np.roll(y, -1)
+    cross = x * after_y - after_x * y
+    area = float(cross.sum()) / 2
+    if area == 0:
+        return 0.0, points.mean(axis=0)
+    middle = np.array([((x + after_x) * cross).sum(), ((y + after_y) * cross).sum()])
+    return area, origin + middle / (6 * area)

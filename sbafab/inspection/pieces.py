@@ -1,0 +1,446 @@
+"""What lies in each place of a cut sheet: its piece, another, the piece turned over, or none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sbafab.geometry.region import Region
+from sbafab.inspection.cut_sheet import DrawnSheet, Shape
+from sbafab.inspection.edges import TOLERANCE, EdgeFit
+from sbafab.inspection.picture import Outline, Picture, moments
+from sbafab.inspection.registration import SMALLEST, Location, Points, polyline
+
+Verdict = Literal[
+    "sound",
+    "moved",
+    "turned",
+    "turned over",
+    "other piece",
+    "missing",
+    "covered",
+    "unknown",
+    "not in picture",
+]
+"""Of a place; "covered": another piece lies on it or touches it."""
+
+SOUND_SHARE = 0.9
+"""Of the places on a contour that lie within TOLERANCE."""
+SAME_AREA = 0.08
+"""Share by which a piece's area may differ from that of its shape; the kerf comes on top."""
+SAME_SHAPE = 0.2
+"""mm: the 95th percentile of the distance between an outline and its shape."""
+AS_GOOD = 0.02
+"""mm: between shapes that fit as well as this, the expected is taken."""
+ANGLE_STEP = 5
+TURNED = 5.0
+"""Degrees from which a piece is turned, no longer askew."""
+COVERED_SHARE = 0.6
+"""Of a piece's edges that show where others cover the rest."""
+REACH = 40.0
+"""mm round a place in which edges are looked at."""
+STRAY = 0.5
+"""mm off its place that is worth a word."""
+HOLE_PLACE = 0.6
+"""mm between a hole and its place."""
+
+
+@dataclass(frozen=True)
+class PieceFinding:
+    """What lies in a place, x and y mm of the sheet: ``name`` is the piece that is drawn there.
+
+    ``message`` says it in words; ``shift`` mm and ``turn`` degrees off the place, None where no
+    piece was recognised; ``rms`` and ``largest`` mm: deviations of its edges from the drawn ones,
+    apart from shift, turn and the common offset.
+    """
+
+    name: str
+    x: float
+    y: float
+    verdict: Verdict
+    message: str
+    shift: float | None = None
+    turn: float | None = None
+    rms: float | None = None
+    largest: float | None = None
+
+
+class Blob(NamedTuple):
+    """A piece or window as it is seen: outline and holes, points in mm of the sheet."""
+
+    outline: Points
+    holes: tuple[Points, ...]
+    centroid: Points
+    area: float
+
+
+class Match(NamedTuple):
+    """A shape laid on a blob: degrees counter-clockwise and mm from its own place, after it was
+    mirrored or not; ``misfit`` mm is the 95th percentile of distances.
+    """
+
+    name: str
+    is_mirrored: bool
+    turn: float
+    shift: float
+    misfit: float
+
+
+def piece_findings(
+    picture: Picture, sheet: DrawnSheet, location: Location, fit: EdgeFit, seen: Sequence[Outline]
+) -> list[PieceFinding]:
+    """Return a finding for each place of the sheet."""
+    blobs = _blobs(location, fit, seen)
+    holders = _holders(sheet, blobs)
+    is_skeleton = location.content == "skeleton"
+    findings = []
+    for number, place in enumerate(sheet.places):
+        blob = holders.get(number)
+        if _is_sound(fit, number) and (
+            blob is None or is_skeleton or not _strange_holes(place.region, blob)
+        ):
+            findings.append(_sound(fit, number, place))
+        elif blob is not None and _is_alone(sheet, number, blob):
+            findings.append(_identified(sheet, place, blob, is_skeleton))
+        else:
+            findings.append(_crowded(picture, sheet, number, fit, blobs, is_skeleton))
+    return findings
+
+
+def _is_alone(sheet: DrawnSheet, number: int, blob: Blob) -> bool:
+    """Return True if a blob reaches into no other place's middle."""
+    middles = [_middle(place.region) for other, place in enumerate(sheet.places) if other != number]
+    return not any(_is_in(blob.outline, middle) for middle in middles)
+
+
+def _middle(piece: Region) -> Points:
+    low_x, low_y, high_x, high_y = piece.bounds
+    return np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
+
+
+def _blobs(location: Location, fit: EdgeFit, seen: Sequence[Outline]) -> list[Blob]:
+    is_film = location.content == "pieces"
+    in_mm = [
+        (outline, points, *moments(points))
+        for outline in seen
+        for points in [fit.warp.inverse(outline.points)]
+    ]
+    least = SMALLEST
+    holes = [
+        (points, centroid)
+        for outline, points, area, centroid in in_mm
+        if (outline.is_light == location.is_light) != is_film and abs(area) > least
+    ]
+    return [
+        Blob(points, tuple(h for h, middle in holes if _is_in(points, middle)), centroid, abs(area))
+        for outline, points, area, centroid in in_mm
+        if (outline.is_light == location.is_light) == is_film and abs(area) > least
+    ]
+
+
+def _is_in(polygon: Points, point: Points) -> bool:
+    """Return True if a point lies in a polygon."""
+    x, y = (polygon - point).T
+    after_x, after_y = np.roll(x, -1), np.roll(y, -1)
+    crosses = (y > 0) != (after_y > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = x - y * (after_x - x) / (after_y - y)
+    return bool((crosses & (at > 0)).sum() % 2)
+
+
+def _holders(sheet: DrawnSheet, blobs: Sequence[Blob]) -> dict[int, Blob]:
+    """Return the blob in each place, the nearest pairs first."""
+    pairs = []
+    for number, place in enumerate(sheet.places):
+        low_x, low_y, high_x, high_y = place.region.bounds
+        middle = np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
+        half = np.array([high_x - low_x, high_y - low_y]) / 2 + 1.0
+        outer = abs(sum(c.area for c in place.region.outers))
+        for k, blob in enumerate(blobs):
+            off = np.abs((blob.outline.min(axis=0) + blob.outline.max(axis=0)) / 2 - middle)
+            # Dust is no piece.
+            if (off < half).all() and blob.area > 0.1 * outer:
+                pairs.append((float(np.hypot(*off)), number, k))
+    holders: dict[int, Blob] = {}
+    used: set[int] = set()
+    for _, number, k in sorted(pairs):
+        if number not in holders and k not in used:
+            holders[number] = blobs[k]
+            used.add(k)
+    return holders
+
+
+def _is_sound(fit: EdgeFit, piece: int) -> bool:
+    """Return True if every contour of a piece is seen where it is drawn."""
+    mine = fit.samples.pieces == piece
+    within = np.abs(fit.residuals[mine]) <= TOLERANCE
+    contours = fit.samples.contours[mine]
+    return all(within[contours == k].mean() >= SOUND_SHARE for k in np.unique(contours))
+
+
+def _strange_holes(piece: Region, blob: Blob) -> list[Points]:
+    """Return the holes of a blob that its piece does not have, as their middles."""
+    drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes]
+    middles = [hole.mean(axis=0) for hole in blob.holes]
+    return [m for m in middles if all(math.dist(m, d) > HOLE_PLACE for d in drawn)]
+
+
+def _shut_holes(piece: Region, blob: Blob) -> list[Points]:
+    """Return the middles of a piece's holes that a blob does not show."""
+    seen = [hole.mean(axis=0) for hole in blob.holes]
+    drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes if -hole.area > SMALLEST]
+    return [d for d in drawn if all(math.dist(m, d) > HOLE_PLACE for m in seen)]
+
+
+def _finding(place: Shape, verdict: Verdict, message: str, **more: float | None) -> PieceFinding:
+    low_x, low_y, high_x, high_y = place.region.bounds
+    x, y = round((low_x + high_x) / 2, 3), round((low_y + high_y) / 2, 3)
+    return PieceFinding(place.name, x, y, verdict, message, **more)
+
+
+def _sound(fit: EdgeFit, number: int, place: Shape) -> PieceFinding:
+    mine = fit.samples.pieces == number
+    residuals = np.abs(fit.residuals[mine & (fit.weights > 0)])
+    shift = math.hypot(*fit.displacements[number, :2])
+    turn = math.degrees(fit.displacements[number, 2])
+    rms = math.sqrt(float((residuals**2).mean())) if len(residuals) else None
+    largest = float(residuals.max()) if len(residuals) else None
+    verdict: Verdict = "sound"
+    message = ""
+    if abs(turn) > TURNED:
+        verdict, message = "turned", f"is turned by {turn:.0f} degrees"
+    elif shift > STRAY:
+        verdict = "moved"
+        message = f"lies {shift:.1f} mm off its place, turned by {turn:.1f} degrees"
+    return _finding(place, verdict, message, shift=shift, turn=turn, rms=rms, largest=largest)
+
+
+def _crowded(
+    picture: Picture,
+    sheet: DrawnSheet,
+    number: int,
+    fit: EdgeFit,
+    blobs: Sequence[Blob],
+    is_skeleton: bool,
+) -> PieceFinding:
+    """Return what lies in a place without a piece of its own outline: none, or one that others
+    cover or touch.
+    """
+    place = sheet.places[number]
+    if _reaches_out(picture, fit, place.region):
+        return _finding(place, "not in picture", "reaches out of the picture; scan all of it")
+    middle = _middle(place.region)
+    near = [
+        points
+        for blob in blobs
+        for points in (blob.outline, *blob.holes)
+        if (points.min(axis=0) < middle + REACH).all()
+        and (points.max(axis=0) > middle - REACH).all()
+    ]
+    if not any(_is_in(blob.outline, middle) for blob in blobs):
+        message = "is still in the sheet" if is_skeleton else "is missing"
+        return _finding(place, "missing", message)
+    shapes = (place, *_others(sheet, place))
+    matches = [m for shape in shapes for m in _partial_matches(shape, place, near)]
+    best = max(matches, key=lambda m: (round(m.share, 2), m.name == place.name), default=None)
+    if best is None or best.share < COVERED_SHARE:
+        return _finding(place, "unknown", "cannot be told from the pieces that it touches")
+    if best.name != place.name:
+        message = f"{best.name} lies in its place, and touches others"
+        return _finding(place, "other piece", message)
+    message = "is covered in part by another piece, or touches it"
+    verdict: Verdict = "covered"
+    if best.is_mirrored:
+        verdict, message = "turned over", "is turned over, and touches others"
+    elif abs(best.turn) > TURNED:
+        verdict = "turned"
+        message = f"is turned by {best.turn:.0f} degrees, and touches others"
+    return _finding(place, verdict, message, shift=best.shift, turn=best.turn)
+
+
+def _reaches_out(picture: Picture, fit: EdgeFit, piece: Region) -> bool:
+    low_x, low_y, high_x, high_y = piece.bounds
+    corners = [(x, y) for x in (low_x, high_x) for y in (low_y, high_y)]
+    pixels = fit.warp(np.array(corners))
+    rows, columns = picture.pixels.shape
+    return bool((pixels < 1).any() or (pixels > (columns - 2, rows - 2)).any())
+
+
+class PartialMatch(NamedTuple):
+    """A shape laid on edges of which others cover some; ``share`` of its own edges that show."""
+
+    name: str
+    is_mirrored: bool
+    turn: float
+    shift: float
+    share: float
+
+
+def _partial_matches(shape: Shape, place: Shape, near: Sequence[Points]) -> Iterator[PartialMatch]:
+    """Yield the shape, unmirrored and mirrored, laid on the edges round a place."""
+    from scipy.spatial import cKDTree
+
+    seen = np.vstack([_dense(points) for points in near])
+    tree = cKDTree(seen)
+    contours = [c for c in shape.region.contours if not c.is_hole or -c.area > SMALLEST]
+    drawn = np.vstack([polyline(contour, 0.3) for contour in contours])
+    drawn -= _middle(shape.region)
+    start = _middle(place.region)
+    for is_mirrored in (False, True):
+        arms = drawn * (-1, 1) if is_mirrored else drawn
+        guesses = sorted(
+            (-float((tree.query(arms @ _spun(a).T + start)[0] < 0.5).mean()), abs(a), a)
+            for a in np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
+        )
+        best: PartialMatch | None = None
+        for _, _, angle in guesses[:3]:
+            matrix, shift = _aligned(tree, seen, arms, (_spun(angle), start), 1.0)
+            share = float((tree.query(arms @ matrix.T + shift)[0] < SAME_SHAPE).mean())
+            turn = math.degrees(math.atan2(matrix[1, 0], matrix[0, 0]))
+            if best is None or share > best.share + 0.01:
+                off = math.dist(shift, start)
+                best = PartialMatch(shape.name, is_mirrored, turn, off, share)
+        if best is not None:
+            yield best
+
+
+def _dense(points: Points) -> Points:
+    """Return points of a closed outline with those half way between."""
+    return np.vstack([points, (points + np.roll(points, -1, axis=0)) / 2])
+
+
+def _identified(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) -> PieceFinding:
+    """Return what a blob is that is not the piece in its place as drawn."""
+    match = best_match(sheet, place, blob, is_skeleton)
+    if match is None:
+        return _finding(place, "unknown", _unknown(place, blob, is_skeleton))
+    where = {"shift": match.shift, "turn": match.turn}
+    if match.name != place.name:
+        over = ", turned over," if match.is_mirrored else ""
+        shut = "" if is_skeleton else _shut(place, blob)
+        return _finding(place, "other piece", f"{match.name}{over} lies in its place{shut}")
+    if match.is_mirrored:
+        return _finding(place, "turned over", "is turned over", **where)
+    if abs(match.turn) > TURNED:
+        return _finding(place, "turned", f"is turned by {match.turn:.0f} degrees", **where)
+    if match.shift > TOLERANCE:
+        message = f"lies {match.shift:.1f} mm off its place, turned by {match.turn:.1f} degrees"
+        return _finding(place, "moved", message, **where)
+    return _finding(place, "unknown", _unknown(place, blob, is_skeleton), **where)
+
+
+def _shut(place: Shape, blob: Blob) -> str:
+    shut = _shut_holes(place.region, blob)
+    at = " and ".join(f"x {x:.1f}, y {y:.1f}" for x, y in shut)
+    return f", or the hole at {at} is not open" if shut and len(shut) <= 2 else ""
+
+
+def _unknown(place: Shape, blob: Blob, is_skeleton: bool) -> str:
+    places = []
+    if not is_skeleton:
+        places += [f"no hole at x {x:.1f}, y {y:.1f}" for x, y in _shut_holes(place.region, blob)]
+        places += [
+            f"an opening at x {x:.1f}, y {y:.1f} that is not drawn"
+            for x, y in _strange_holes(place.region, blob)
+        ]
+    return f"has {', '.join(places[:3])}" if places else "differs from its outline and all others"
+
+
+def best_match(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) -> Match | None:
+    """Return the shape that a blob is, mirrored or not, or None; the expected where in doubt."""
+    matches = [
+        match
+        for shape in (place, *_others(sheet, place))
+        for match in _matches(shape, blob, is_skeleton)
+        if match.misfit < SAME_SHAPE
+    ]
+    if not matches:
+        return None
+    least = min(match.misfit for match in matches)
+    as_good = [match for match in matches if match.misfit <= least + AS_GOOD]
+    return min(as_good, key=lambda m: (m.name != place.name, m.is_mirrored, m.misfit))
+
+
+def _others(sheet: DrawnSheet, place: Shape) -> Iterator[Shape]:
+    expected = place.name.split(", ")
+    yield from (shape for shape in sheet.shapes if shape.name not in expected)
+
+
+def _matches(shape: Shape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
+    """Yield the shape laid on a blob, unmirrored and mirrored, if sizes and holes agree."""
+    holes = [] if is_skeleton else [h for h in shape.region.holes if -h.area > SMALLEST]
+    outer = sum(contour.area for contour in shape.region.outers)
+    room = SAME_AREA * outer + 0.15 * sum(c.length for c in shape.region.outers)
+    if len(holes) != len(blob.holes) or abs(blob.area - outer) > room:
+        return
+    contours = [*shape.region.outers, *holes]
+    drawn = np.vstack([polyline(contour, 0.15) for contour in contours])
+    seen = np.vstack([_sparse(points) for points in (blob.outline, *blob.holes)])
+    for is_mirrored in (False, True):
+        laid = drawn * (-1, 1) if is_mirrored else drawn
+        turn, shift, misfit = laid_on(laid, seen, blob.outline)
+        yield Match(shape.name, is_mirrored, turn, shift, misfit)
+
+
+def _sparse(points: Points) -> Points:
+    return points[:: max(1, len(points) // 150)]
+
+
+def laid_on(drawn: Points, seen: Points, outline: Points) -> tuple[float, float, float]:
+    """Return degrees and mm of the rigid motion that lays drawn points on seen, and the misfit.
+
+    The shift is that of the middle of the drawn points.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(seen)
+    _, middle = moments(outline)
+    start = drawn.mean(axis=0)
+    # Centroids of outlines agree whatever the turn.
+    _, centre = moments(drawn[: max(3, len(drawn))])
+    arms = drawn - centre
+
+    sparse = _sparse(arms)
+    angles = np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
+    angles = angles[np.argsort(np.abs(angles), kind="stable")]
+    costs = [float(tree.query(sparse @ _spun(a).T + middle)[0].mean()) for a in angles]
+    # Of turns that fit as well, the least.
+    best = next(a for a, c in zip(angles, costs, strict=True) if c <= min(costs) + AS_GOOD)
+    matrix, shift = _aligned(tree, seen, arms, (_spun(float(best)), middle), math.inf)
+    laid = arms @ matrix.T + shift
+    there, back = tree.query(laid)[0], cKDTree(laid).query(seen)[0]
+    misfit = float(max(np.percentile(there, 95), np.percentile(back, 95)))
+    moved = laid.mean(axis=0) - start
+    return math.degrees(math.atan2(matrix[1, 0], matrix[0, 0])), math.hypot(*moved), misfit
+
+
+def _spun(radians: float) -> NDArray[np.float64]:
+    cosine, sine = math.cos(radians), math.sin(radians)
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def _aligned(
+    tree: Any,
+    seen: Points,
+    arms: Points,
+    guess: tuple[NDArray[np.float64], Points],
+    reach: float,
+) -> tuple[NDArray[np.float64], Points]:
+    """Return turn and shift that lay points on the nearest seen within ``reach`` mm, by turns."""
+    matrix, shift = guess
+    for _ in range(12):
+        distance, nearest = tree.query(arms @ matrix.T + shift)
+        near = distance < reach
+        if near.sum() < 8:
+            break
+        target, start = seen[nearest[near]], arms[near]
+        a, b = start - start.mean(axis=0), target - target.mean(axis=0)
+        dot, cross = float((a * b).sum()), float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+        matrix = _spun(math.atan2(cross, dot))
+        shift = target.mean(axis=0) - matrix @ start.mean(axis=0)
+    return matrix, shift
