@@ -13,7 +13,7 @@ const initials = () => recall("sbafab-initials", "");
 
 function control(field, name) {
   if (field.name === "decision") return el("select", { name }, ...DECISIONS.map((word) => el("option", { value: word }, word)));
-  if (field.name === "photograph") return el("input", { name, type: "file", accept: "image/*", capture: "environment" });
+  if (field.name === "photograph") return el("input", { name, type: "file", accept: "image/*" });
   const type = DAYS.includes(field.name) ? "date" : "text";
   return el("input", { name, type, inputmode: NUMBERS.includes(field.name) ? "decimal" : false });
 }
