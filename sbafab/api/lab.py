@@ -84,7 +84,10 @@ def record_history(
 
 
 def record_sheet(source: Source, *changes: Change) -> tuple[RecordTable, ...]:
-    """Return the tables of the record page of a design: materials, steps, tests."""
+    """Return the tables of the record page of a design: materials, steps, tests.
+
+    Raises DesignError.
+    """
     return recording.record_sheet(recording.built_from(source, changes))
 
 
