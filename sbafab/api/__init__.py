@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         template,
         templates,
     )
-    from sbafab.api.lab import kerf, record, report
+    from sbafab.api.lab import kerf, record, record_history, record_sheet, report
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
     from sbafab.api.runs import cut, generate, import_design, mesh, nest, press, simulate
     from sbafab.api.search import compare, find, sweep
@@ -64,6 +64,8 @@ __all__ = [
     "press",
     "read_laminate",
     "record",
+    "record_history",
+    "record_sheet",
     "report",
     "resolved",
     "schema",
@@ -77,7 +79,7 @@ __all__ = [
 
 MODULES = {
     "checks": ("check", "check_folder", "checking", "nets_of"),
-    "lab": ("kerf", "record", "report"),
+    "lab": ("kerf", "record", "record_history", "record_sheet", "report"),
     "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
     "search": ("compare", "find", "sweep"),

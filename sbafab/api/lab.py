@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sbafab.api.designs import Source
 from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
 from sbafab.design.files import Change
+from sbafab.reports.traveller.record_sheet import RecordTable
 from sbafab.results import recording
+from sbafab.results.history import Entry, StoredEntry, entries_of, store_photograph
 from sbafab.results.records import Record
 from sbafab.results.report import Report
 from sbafab.results.report import report as report_of
@@ -52,6 +55,40 @@ def record(
     results = recording.results_of(results_by_name, table)
     built = recording.built_from(source, [*changes, tables] if tables else changes)
     return recording.record(Lab(Path(lab)), built, results, again)
+
+
+def record_history(
+    source: Source,
+    *changes: Change,
+    entries: Sequence[Mapping[str, Any]],
+    lab: str | Path = "lab.sqlite",
+    again: bool = False,
+) -> list[StoredEntry]:
+    """Record lines of the history of devices in the lab's file; return the entries added.
+
+    An entry has ``serial`` (several with commas between them) and ``date``, ``step``, ``item``,
+    ``lot``, ``expires``, ``kerf_mm``, ``temperature_c``, ``press_force_n``, ``minutes``,
+    ``decision``, ``reason``, ``photograph`` (a file, or its bytes), ``note``, ``initials``, as far
+    as they are known. Raises DesignError, OutputError.
+    """
+    lines: list[Entry] = []
+    for number, entry in enumerate(entries, start=1):
+        values = dict(entry)
+        content = values.get("photograph")
+        if isinstance(content, bytes):
+            values["photograph"] = store_photograph(Path(lab), content, f"photograph {number}")
+        step = values.get("step") or values.get("item")
+        lines += entries_of(values, f"{step}" if step else f"entry {number}")
+    built = recording.built_from(source, changes)
+    return recording.record_history(Lab(Path(lab)), built, lines, again)
+
+
+def record_sheet(source: Source, *changes: Change) -> tuple[RecordTable, ...]:
+    """Return the tables of the record page of a design: materials, steps, tests.
+
+    Raises DesignError.
+    """
+    return recording.record_sheet(recording.built_from(source, changes))
 
 
 def report(lab: str | Path = "lab.sqlite") -> Report:

@@ -23,6 +23,11 @@ from sbafab.studio.without_server import write
     help="Open the page in the browser, or only print its link.",
 )
 @click.option(
+    "--phone",
+    metavar="ADDRESS",
+    help="Serve the record page, and nothing else, at this machine's ADDRESS in the network.",
+)
+@click.option(
     "--static",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
@@ -38,6 +43,7 @@ def studio(
     source: str | None,
     port: int | None,
     browser: bool,
+    phone: str | None,
     static: Path | None,
     pyodide: Path | None,
 ) -> None:
@@ -46,7 +52,10 @@ def studio(
     Layers, rules, prediction and actuator are updated at once.
 
     The page is served on this machine only, and needs the token in its link. Ctrl-C stops it.
+    --phone prints the link as a code to scan; it goes through the network without encryption.
     """
+    if phone is not None and (static is not None or pyodide is not None):
+        raise click.UsageError("--phone serves a page; leave out --static and --pyodide")
     if static is not None:
         if source is not None:
             raise click.UsageError(
@@ -57,17 +66,21 @@ def studio(
     if pyodide is not None:
         raise click.UsageError("--pyodide goes with --static FOLDER")
     # The server comes with the extra "studio"; the page that --static writes does without it.
-    from sbafab.studio.app import serve
+    from sbafab.studio.app import ADDRESS, serve
 
     def announce(link: str) -> None:
         click.echo(f"studio: {link}")
+        if phone is not None:
+            import segno
+
+            segno.make(link, error="l", micro=False).terminal(compact=True)
         click.echo("Ctrl-C stops it.")
-        if browser:
+        if browser and phone is None:
             import webbrowser
 
             webbrowser.open(link)
 
-    serve(source, port, announce)
+    serve(source, port, announce, phone or ADDRESS)
 
 
 def _write(folder: Path, pyodide: Path | None) -> None:

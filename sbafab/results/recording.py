@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.files import assembly_sha256, load
 from sbafab.cutting.calibration import table_text
@@ -16,6 +17,9 @@ from sbafab.design.files import Change
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
+from sbafab.output.checked import press_settings
+from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.results.history import Entry, StoredEntry
 from sbafab.results.records import (
     COLUMNS,
@@ -108,6 +112,14 @@ def results_of(values: Mapping[str, Any], table: str | Path | None = None) -> li
     if result.is_empty:
         raise DesignError('say what came out, such as leak="pass" or a note')
     return [checked(result)]
+
+
+def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
+    """Return the tables of the record page of what was built; of an assembly its tests."""
+    if not isinstance(built, Design):
+        return (TESTS_TABLE,)
+    laminate = laminate_of(built)
+    return record_tables(built, laminate, schedule(laminate, press_settings(built)))
 
 
 # A batch's table as it was filled in: a row an actuator, all rows or none.

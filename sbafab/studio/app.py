@@ -1,6 +1,7 @@
 """The studio's web server: guard, routes, links with designs, and its start.
 
-It listens on this machine only. A page of another site cannot read its answers: Host must be this
+It listens on this machine only; at another address of it, where one is asked for, it answers a
+phone the record page alone. A page of another site cannot read its answers: Host must be this
 machine by number or name (so a name that is rebound to it is refused), Origin must be its own, and
 all that knows of designs takes the token of the link in a header, which no form or image can send.
 """
@@ -35,7 +36,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from sbafab import api
 from sbafab.errors import DesignError, OutputError, SbafabError, Stopped
 from sbafab.process import processors
-from sbafab.studio import forms, places
+from sbafab.studio import forms, places, record_form
 from sbafab.studio.places import RunFolder, zipped
 from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
@@ -60,8 +61,9 @@ MADE_POLICY = (
 class Guard:
     """Refuses what does not come from the studio's own page, and bounds what it may send."""
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
+    def __init__(self, app: ASGIApp, token: str, address: str = HERE[0]) -> None:
         self.app, self.token = app, token.encode()
+        self.hosts = HERE if address == HERE[0] else (*HERE, address)
         self.at_once = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -89,7 +91,7 @@ class Guard:
         """Status and reason why a request is not answered."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"").decode("latin-1")
-        if host.rpartition(":")[0] not in HERE and host not in HERE:
+        if host.rpartition(":")[0] not in self.hosts and host not in self.hosts:
             return 403, f"the studio answers to {HERE[0]} only; open the link that it printed"
         origin = headers.get(b"origin")
         if origin is not None and urlsplit(origin.decode("latin-1")).netloc != host:
@@ -200,6 +202,8 @@ class Studio:
     text: str | None = None
     """A design from a link, in place of a file."""
     template: str | None = None
+    address: str = HERE[0]
+    """Where it listens; at another address than this a phone is answered the record page alone."""
     live: WorkerPool = field(default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes()))
     mover: WorkerPool = field(
         default_factory=lambda: WorkerPool(LIVE_SECONDS, _processes(), warm=False)
@@ -213,7 +217,8 @@ class Studio:
 
     @contextlib.asynccontextmanager
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
-        self.live.start()
+        if self.address == HERE[0]:
+            self.live.start()
         try:
             yield
         finally:
@@ -229,7 +234,7 @@ def _processes() -> int:
 
 def app(studio: Studio) -> Starlette:
     """The application; every request passes the guard first."""
-    routes = [
+    editing = [
         Route("/api/start", start),
         Route("/api/template/{name}", template),
         Route("/api/file/{name}", opened_file),
@@ -241,16 +246,29 @@ def app(studio: Studio) -> Starlette:
         Route("/api/generate", generate, methods=["POST"]),
         Route("/made/{key}.zip", made_zip),
         Route("/made/{key}/{path:path}", made_file),
-        Mount("/", StaticFiles(directory=STATIC, html=True)),
     ]
     application = Starlette(
-        routes=routes,
-        middleware=[Middleware(Guard, token=studio.token)],
+        routes=[
+            *(editing if studio.address == HERE[0] else ()),
+            *record_routes(),
+            Mount("/", StaticFiles(directory=STATIC, html=True)),
+        ],
+        middleware=[Middleware(Guard, token=studio.token, address=studio.address)],
         exception_handlers={SbafabError: _refused, BusyError: _busy, TooLongError: _too_long},
         lifespan=studio.lifespan,
     )
     application.state.studio = studio
     return application
+
+
+def record_routes() -> list[Route]:
+    """Routes of the record page, all that a phone is answered."""
+    return [
+        Route("/record", record_page),
+        Route("/api/record", record_choices),
+        Route("/api/record", record_lines, methods=["POST"]),
+        Route("/api/record/sheet", record_sheet, methods=["POST"]),
+    ]
 
 
 def _studio(request: Request) -> Studio:
@@ -347,6 +365,26 @@ def _remember(studio: Studio, key: str, run: RunFolder) -> None:
         folder = studio.made.pop(oldest).folder
         if folder.is_relative_to(studio.scratch):
             shutil.rmtree(folder.parent, ignore_errors=True)
+
+
+async def record_page(_: Request) -> Response:
+    return FileResponse(STATIC / "record.html")
+
+
+async def record_choices(request: Request) -> Response:
+    return JSONResponse(record_form.choices(_studio(request).folder))
+
+
+async def record_sheet(request: Request) -> Response:
+    table = await _request_table(request)
+    folder = _studio(request).folder
+    return JSONResponse(await asyncio.to_thread(record_form.sheet, folder, table))
+
+
+async def record_lines(request: Request) -> Response:
+    table = await _request_table(request)
+    folder = _studio(request).folder
+    return JSONResponse(await asyncio.to_thread(record_form.stored, folder, table))
 
 
 async def made_file(request: Request) -> Response:
@@ -446,28 +484,39 @@ def opened(source: str | None) -> StudioStart:
     return StudioStart(folder, places.design_file(folder, path.name).name)
 
 
-def listening(port: int | None) -> socket.socket:
-    """A socket on this machine alone, at the port or, if none is asked for, at a free one."""
+def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
+    """A socket at an address of this machine, at the port or, if none is asked for, a free one."""
     for number in (PORT, 0) if port is None else (port,):
         # Only of a socket whose protocol is named does asyncio send small answers at once; others
         # wait 40 ms for the browser to acknowledge what came before.
         sock = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            sock.bind((ADDRESS, number))
+            sock.bind((address, number))
             # From now on a browser waits for the server, which is not up yet.
             sock.listen(64)
             return sock
         except OSError as error:
             sock.close()
             reason = error.strerror
+    if address != ADDRESS:
+        raise OutputError(
+            f"{address} cannot be listened on ({reason}); give this machine's address in the "
+            "network that the phone is in, such as 192.168.1.20"
+        )
     raise OutputError(f"port {port} cannot be used ({reason}); leave out --port to take a free one")
 
 
-def serve(source: str | None, port: int | None, announce: Callable[[str], None]) -> None:
+def serve(
+    source: str | None,
+    port: int | None,
+    announce: Callable[[str], None],
+    address: str = ADDRESS,
+) -> None:
     """Serves the studio until Ctrl-C; ``announce`` gets the link.
 
-    Raises DesignError, OutputError, and Stopped at the end.
+    At another ``address`` of this machine it serves the record page alone. Raises DesignError,
+    OutputError, and Stopped at the end.
     """
     try:
         import uvicorn
@@ -477,9 +526,10 @@ def serve(source: str | None, port: int | None, announce: Callable[[str], None])
             f'{error.name} is not installed; add it with pip install "sbafab[studio]"'
         ) from None
     folder, name, text, template = opened(source)
-    studio = Studio(folder, secrets.token_urlsafe(24), name, text, template)
-    sock = listening(port)
-    announce(f"http://{ADDRESS}:{sock.getsockname()[1]}/#token={studio.token}")
+    studio = Studio(folder, secrets.token_urlsafe(24), name, text, template, address)
+    sock = listening(port, address)
+    page = "" if address == ADDRESS else "record"
+    announce(f"http://{address}:{sock.getsockname()[1]}/{page}#token={studio.token}")
     config = uvicorn.Config(
         app(studio),
         log_level="warning",

@@ -33,6 +33,7 @@ from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.joints import joint_pages
 from sbafab.reports.traveller.process import order_of
+from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS, record_tables
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
 from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
 from sbafab.rules.finding import Finding
@@ -114,6 +115,8 @@ def context(work: Work) -> dict[str, Any]:
         "times": bill.times(work),
         "kerf_notes": bill.kerf_notes(work),
         "expected_sizes": bill.expected_sizes(work),
+        "record_fields": HISTORY_FIELDS,
+        "record_tables": record_tables(work.design, laminate, work.schedule),
         **panel.chapter(work),
     }
 

@@ -80,7 +80,7 @@ def record_tables(
             [str(step.step) for step in steps],
             [_nominal(step) for step in steps],
         ),
-        _table("Tests", DEVICE_FIELDS, "step", TESTS, ["" for _ in TESTS]),
+        TESTS_TABLE,
     )
     return tuple(table for table in tables if table.rows)
 
@@ -100,3 +100,7 @@ def _nominal(step: Step | SeamStep) -> str:
         return heat
     time = "" if step.minutes is None else f", {step.minutes:g} min"
     return f"{heat}, {step.force_n:.0f} N{time}"
+
+
+TESTS_TABLE = _table("Tests", DEVICE_FIELDS, "step", TESTS, ["" for _ in TESTS])
+"""The part of the record page that is the same for every device."""

@@ -36,6 +36,7 @@ async function start() {
   studio = new Studio(started);
   window.studio = studio;
   $("#notice").hidden = true;
+  $("#record").hidden = withoutServer;
   if (withoutServer) alone(started.lacks);
 
   new Form(studio);
