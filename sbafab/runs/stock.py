@@ -39,14 +39,14 @@ from sbafab.output.job import CheckedJob
 from sbafab.output.manifest import JobManifest, Manifest, SheetClaim
 from sbafab.output.swap import MANIFEST
 
-Size = Annotated[float, Millimetres(SHORTEST, 10000)]
+PieceSize = Annotated[float, Millimetres(SHORTEST, 10000)]
 CELLS = 400
 """Cells along a sheet's longer side in which its rest is sought; they are 1 mm at least."""
 LEAST_REST = 20.0
 """mm: a rest is kept if it has so much within its border, either way."""
 
 
-class Piece(Section):
+class FilmPiece(Section):
     """Equal pieces of film on the shelf: full sheets, or the rest of one."""
 
     id: str = Field(min_length=1, max_length=40)
@@ -55,10 +55,10 @@ class Piece(Section):
     """The film's product, as in films.*.product."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)]
     """The film's thickness."""
-    width: Size
-    """Size along x, as it lies on the machine."""
-    length: Size
-    """Size along y."""
+    width: PieceSize
+    """PieceSize along x, as it lies on the machine."""
+    length: PieceSize
+    """PieceSize along y."""
     count: int = Field(default=1, ge=1, le=1000)
     """How many there are."""
     rest: bool = False
@@ -83,7 +83,7 @@ class Taken(Section):
 class StockFile(Section):
     """The pieces on the shelf, and the runs that were cut from them."""
 
-    piece: tuple[Piece, ...] = Field(default=(), max_length=10_000, strict=False)
+    piece: tuple[FilmPiece, ...] = Field(default=(), max_length=10_000, strict=False)
     """The pieces."""
     taken: tuple[Taken, ...] = Field(default=(), strict=False)
     """The runs that were booked."""
@@ -138,7 +138,7 @@ def cut_from_stock(job: CheckedJob) -> CheckedJob:
 
 def _piece_for(
     design: Design, material: Material, parts: Sequence[NestPart], stock: StockFile, path: Path
-) -> Piece:
+) -> FilmPiece:
     """Return the smallest piece that holds all parts; else that of which fewest are needed."""
     film, plain = used_films(design)[material], stocks(design)[material]
     where = field(material)
@@ -158,7 +158,7 @@ def _piece_for(
             f"which the {material} parts are cut; add it, or leave sheets.stock out"
         )
     smallest_first = sorted(pieces, key=lambda piece: (piece.width * piece.length, piece.id))
-    needed: list[tuple[int, Piece]] = []
+    needed: list[tuple[int, FilmPiece]] = []
     for piece in smallest_first:
         sheet = replace(plain, width=piece.width, length=piece.length, most=piece.count)
         try:
@@ -176,7 +176,7 @@ def _piece_for(
     return min(needed, key=lambda entry: entry[0])[1]
 
 
-def _on_pieces(design: Design, pieces: Mapping[Material, Piece]) -> Design:
+def _on_pieces(design: Design, pieces: Mapping[Material, FilmPiece]) -> Design:
     """Return a design whose sheets are pieces, and that names no stock file."""
     sheets: dict[str, Sheet | None] = {"stock": None}
     films: dict[str, OtherFilm] = {}
