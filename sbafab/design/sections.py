@@ -494,8 +494,7 @@ class Sheets(Section):
     def _is_known(cls, engine: object) -> object:
         if engine == "spyrrow":
             raise ValueError(
-                'is no engine any more; set "bottom-left", which took no more sheets in any '
-                "batch measured"
+                'is no engine any more; set "bottom-left", which also lays lattices'
             )
         return engine
 
