@@ -11,7 +11,7 @@ from sbafab.cutting.calibration import Calibration, calibrated, read_measurement
 from sbafab.design.files import Change
 from sbafab.reports.traveller.record_sheet import RecordTable
 from sbafab.results import recording
-from sbafab.results.history import Entry, StoredEntry, entries_of, store_photograph
+from sbafab.results.history import HistoryEntry, StoredEntry, entries_of, store_photograph
 from sbafab.results.records import Record
 from sbafab.results.report import Report
 from sbafab.results.report import report as report_of
@@ -71,7 +71,7 @@ def record_history(
     ``decision``, ``reason``, ``photograph`` (a file, or its bytes), ``note``, ``initials``, as far
     as they are known. Raises DesignError, OutputError.
     """
-    lines: list[Entry] = []
+    lines: list[HistoryEntry] = []
     for number, entry in enumerate(entries, start=1):
         values = dict(entry)
         content = values.get("photograph")

@@ -15,7 +15,7 @@ from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
     from sbafab.inspection.inspection import Inspection
-    from sbafab.inspection.picture import Picture
+    from sbafab.inspection.picture import ScanPicture
     from sbafab.inspection.scale import Reference
 
 MOST_LINES = 20
@@ -95,7 +95,7 @@ def inspect(  # noqa: PLR0913, PLR0917 - one an option
 
 
 def _reference(
-    picture: Picture, dpi: float | None, bar: float | None, pins: bool, photo: bool
+    picture: ScanPicture, dpi: float | None, bar: float | None, pins: bool, photo: bool
 ) -> Reference:
     from sbafab.inspection.scale import Reference
 

@@ -17,17 +17,17 @@ from sbafab.output.schema_ids import (
     RECORDS_SCHEMA,
     REPORT_SCHEMA,
 )
-from sbafab.results.control_charts import Limits
+from sbafab.results.control_charts import ControlLimits
 from sbafab.results.history import (
     ENTRY_FIELDS,
-    Entry,
+    HistoryEntry,
     StoredEntry,
     entries_of,
     read_history,
     unchecked_entry,
 )
 from sbafab.results.recording import (
-    Row,
+    RecordRow,
     all_rows,
     built_from,
     found_by,
@@ -284,10 +284,10 @@ def _store(
     print_records(shown, as_json, f"added to {store.path}")
 
 
-def _entries(values: Mapping[str, Any]) -> list[Entry]:
+def _entries(values: Mapping[str, Any]) -> list[HistoryEntry]:
     """Return the lines of history that the options state."""
     serial = {"serial": values["serial"]} if values["serial"] else {}
-    lines: list[Entry] = []
+    lines: list[HistoryEntry] = []
     for text in values["entry"]:
         lines += entries_of({**serial, **_pairs(text)}, f"--entry {text!r}")
     if values["history"] is not None:
@@ -309,7 +309,7 @@ def _pairs(text: str) -> dict[str, str]:
     return dict(pairs)
 
 
-def _entry_change(values: Mapping[str, Any]) -> Entry:
+def _entry_change(values: Mapping[str, Any]) -> HistoryEntry:
     if len(values["entry"]) > 1 or not (values["entry"] or values["withdraw"]):
         raise click.UsageError("give one --entry with what is right, or --withdraw")
     pairs = _pairs(values["entry"][0]) if values["entry"] else {}
@@ -348,17 +348,17 @@ def _export(store: Lab, values: Mapping[str, Any]) -> None:
     print_verdict(f"{values['export']}: {count} device{'s' if count != 1 else ''}")
 
 
-def _limits(texts: Sequence[str]) -> dict[str, Limits]:
+def _limits(texts: Sequence[str]) -> dict[str, ControlLimits]:
     """Return limits by quantity, of texts such as ``stroke_mm=16:18``; a side may be empty."""
     limits = {}
     for text in texts:
         name, _, span = text.partition("=")
         low, colon, high = span.partition(":")
         try:
-            pair = Limits(*(float(side) if side else None for side in (low, high)))
+            pair = ControlLimits(*(float(side) if side else None for side in (low, high)))
         except ValueError:
             colon = ""
-        if not name or not colon or pair == Limits(None, None):
+        if not name or not colon or pair == ControlLimits(None, None):
             raise click.UsageError(
                 f"--limit {text!r} must be such as stroke_mm=16:18 or force_n=4:"
             )
@@ -417,7 +417,7 @@ def _print_gauge(values: Mapping[str, Any], as_json: bool) -> None:
     )
 
 
-def _width(limits: Limits | None) -> float | None:
+def _width(limits: ControlLimits | None) -> float | None:
     if limits is None or limits.low is None or limits.high is None:
         return None
     return limits.high - limits.low
@@ -529,7 +529,7 @@ def print_records(shown: Shown, as_json: bool, action: str) -> None:
 
 
 def _rows(shown: Shown, newer: Mapping[str, str]) -> dict[str, Any]:
-    def row(stored: Row) -> dict[str, Any]:
+    def row(stored: RecordRow) -> dict[str, Any]:
         build = shown.builds[stored.design_sha256]
         number = newer.get(row_number(stored), "").removeprefix("e")
         return {
@@ -545,7 +545,7 @@ def _rows(shown: Shown, newer: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _line(row: Row, design: str, newer: str | None) -> str:
+def _line(row: RecordRow, design: str, newer: str | None) -> str:
     parts = [row_words(row)]
     parts += [f"attempt {row.attempt}"] if row.attempt > 1 else []
     parts += [f"corrects {row_number(row, row.corrects)}"] if row.corrects is not None else []

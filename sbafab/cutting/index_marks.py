@@ -33,7 +33,7 @@ CHORD = 0.005
 """mm by which the outlines that are searched round may lie inside their arcs."""
 
 
-class Mark(NamedTuple):
+class IndexMark(NamedTuple):
     """The number of a pattern, its lower left corner, and its strokes."""
 
     text: str
@@ -41,7 +41,7 @@ class Mark(NamedTuple):
     strokes: tuple[Stroke, ...]
 
 
-def index_marks(nest: Nest, sheet: int) -> tuple[Mark, ...]:
+def index_marks(nest: Nest, sheet: int) -> tuple[IndexMark, ...]:
     """Return the marks of a sheet's parts, at most one for each."""
     import numpy as np
     import shapely
@@ -73,7 +73,7 @@ def index_marks(nest: Nest, sheet: int) -> tuple[Mark, ...]:
                 continue
             x, y = map(float, corners[box_number])
             taken.append(box)
-            marks.append(Mark(text, (x, y), strokes(text, (x, y), HEIGHT)))
+            marks.append(IndexMark(text, (x, y), strokes(text, (x, y), HEIGHT)))
             break
     return tuple(marks)
 

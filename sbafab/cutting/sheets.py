@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
-from sbafab.cutting.index_marks import Mark, index_marks
+from sbafab.cutting.index_marks import IndexMark, index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import ENDING, project_text, verify_project
 from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
@@ -116,7 +116,7 @@ def _write_sheet(
     settings: CutSettings,
     machine: Machine,
     labelled: bool,
-    marks: Sequence[Mark] | None,
+    marks: Sequence[IndexMark] | None,
 ) -> SheetFile:
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))

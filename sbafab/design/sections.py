@@ -493,9 +493,7 @@ class Sheets(Section):
     @classmethod
     def _is_known(cls, engine: object) -> object:
         if engine == "spyrrow":
-            raise ValueError(
-                'is no engine any more; set "bottom-left", which also lays lattices'
-            )
+            raise ValueError('is no engine any more; set "bottom-left", which also lays lattices')
         return engine
 
 

@@ -22,7 +22,7 @@ SAME_SIZE = 1e-4
 
 
 @dataclass(frozen=True)
-class Shape:
+class SheetShape:
     """A piece of a pattern: ``name`` is the pattern, such as P05."""
 
     name: str
@@ -39,8 +39,8 @@ class DrawnSheet:
     """
 
     name: str
-    places: tuple[Shape, ...]
-    shapes: tuple[Shape, ...]
+    places: tuple[SheetShape, ...]
+    shapes: tuple[SheetShape, ...]
     pins: tuple[tuple[float, float, float], ...]
     spacing: float
     kerf: str
@@ -97,33 +97,33 @@ def _layers(folder: Path, claims: Manifest | JobManifest) -> Iterator[tuple[str,
             yield path.stem, (layer.pattern, path)
 
 
-def _shapes(layers: dict[str, tuple[str, Path]]) -> Iterator[Shape]:
+def _shapes(layers: dict[str, tuple[str, Path]]) -> Iterator[SheetShape]:
     """Yield the pieces of every pattern once."""
     patterns = dict(reversed(layers.values()))
     for pattern, path in sorted(patterns.items()):
         pieces = {piece.key: piece for piece in read_profile(path).region.pieces}
-        yield from (Shape(pattern, piece) for piece in pieces.values())
+        yield from (SheetShape(pattern, piece) for piece in pieces.values())
 
 
 def _sheet(
     name: str,
     path: Path,
-    shapes: tuple[Shape, ...],
+    shapes: tuple[SheetShape, ...],
     spacing: float,
     pins: tuple[tuple[float, float, float], ...],
 ) -> DrawnSheet:
     drawing = read_profile(path)
     if not drawing.region.contours:
         raise OutputError(f"{path.name} holds no piece; give a sheet or layer with parts")
-    named: list[Shape] = []
-    unnamed: list[Shape] = []
+    named: list[SheetShape] = []
+    unnamed: list[SheetShape] = []
     for piece in drawing.region.pieces:
         matches = [shape for shape in shapes if _is_congruent(piece, shape.region)]
         if not matches:
-            matches = [Shape(f"part {len(unnamed) + 1}", piece)]
+            matches = [SheetShape(f"part {len(unnamed) + 1}", piece)]
             unnamed += matches
         label = ", ".join(dict.fromkeys(shape.name for shape in matches))
-        named.append(Shape(label, piece))
+        named.append(SheetShape(label, piece))
     properties = drawing.properties
     return DrawnSheet(
         name=name,

@@ -24,8 +24,8 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Edge, left_turn
 from sbafab.geometry.region import Region
 from sbafab.inspection.cut_sheet import DrawnSheet
-from sbafab.inspection.picture import Picture
-from sbafab.inspection.registration import SMALLEST, Location, Points, Warp
+from sbafab.inspection.picture import ScanPicture
+from sbafab.inspection.registration import SMALLEST, Location, PointArray, Warp
 
 STEP = 0.2
 """mm between measured places."""
@@ -62,8 +62,8 @@ class Samples:
     ``pieces`` number what each lies on.
     """
 
-    points: Points
-    normals: Points
+    points: PointArray
+    normals: PointArray
     curvatures: NDArray[np.float64]
     contours: NDArray[np.int64]
     pieces: NDArray[np.int64]
@@ -133,7 +133,7 @@ class Crossings(NamedTuple):
 
 
 def crossings(
-    picture: Picture,
+    picture: ScanPicture,
     warp: Warp,
     samples: Samples,
     reach: float,
@@ -218,7 +218,7 @@ class EdgeFit:
         return self.outside - self.offset
 
 
-def fitted(picture: Picture, sheet: DrawnSheet, location: Location, is_camera: bool) -> EdgeFit:
+def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camera: bool) -> EdgeFit:
     """Return the fit of the edges in a picture, of which the location is known roughly."""
     is_skeleton = location.content == "skeleton"
     samples = samples_of([place.region for place in sheet.places], is_skeleton)
@@ -251,7 +251,7 @@ def moved(samples: Samples, displacements: NDArray[np.float64]) -> Samples:
     )
 
 
-def _middles(samples: Samples, count: int) -> Points:
+def _middles(samples: Samples, count: int) -> PointArray:
     number = np.maximum(np.bincount(samples.pieces, minlength=count), 1)
     return np.column_stack(
         [np.bincount(samples.pieces, samples.points[:, k], count) / number for k in range(2)]

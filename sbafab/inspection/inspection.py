@@ -20,9 +20,9 @@ from sbafab.cutting.calibration import COLUMNS, INSTRUMENT, Value, student_t
 from sbafab.errors import DesignError
 from sbafab.inspection.cut_sheet import DrawnSheet
 from sbafab.inspection.edges import EdgeFit, fitted
-from sbafab.inspection.picture import Picture, outlines
+from sbafab.inspection.picture import ScanPicture, outlines
 from sbafab.inspection.pieces import PieceFinding, piece_findings
-from sbafab.inspection.registration import SMALLEST, Location, Points, locate
+from sbafab.inspection.registration import SMALLEST, Location, PointArray, locate
 from sbafab.inspection.scale import Reference, Scale, scale_of
 from sbafab.output.schema_ids import INSPECTION_SCHEMA
 from sbafab.spreadsheet import csv_text
@@ -46,7 +46,7 @@ class Inspection:
     """
 
     sheet: DrawnSheet
-    picture: Picture
+    picture: ScanPicture
     location: Location
     fit: EdgeFit
     scale: Scale
@@ -90,7 +90,7 @@ class Inspection:
 
 
 def inspect_picture(
-    picture: Picture,
+    picture: ScanPicture,
     sheet: DrawnSheet,
     reference: Reference,
     is_camera: bool = False,
@@ -128,7 +128,7 @@ def inspect_picture(
     )
 
 
-def _kerf(picture: Picture, fit: EdgeFit, pixel: float) -> Value:
+def _kerf(picture: ScanPicture, fit: EdgeFit, pixel: float) -> Value:
     kerf = -2 * fit.offset
     uncertainty = 2 * math.hypot(fit.uncertainty, FINEST * pixel)
     half = student_t(fit.degrees) * uncertainty
@@ -237,7 +237,7 @@ def drawing(inspection: Inspection) -> str:
     return "\n".join(lines)
 
 
-def _embedded(picture: Picture) -> str:
+def _embedded(picture: ScanPicture) -> str:
     from PIL import Image
 
     image = Image.fromarray(np.clip(picture.pixels, 0, 255).astype(np.uint8))
@@ -275,7 +275,7 @@ def _named(inspection: Inspection, factor: float, size: float) -> Iterator[str]:
             )
 
 
-def _row(x: float, y: float) -> Points:
+def _row(x: float, y: float) -> PointArray:
     return np.array([(x, y)])
 
 

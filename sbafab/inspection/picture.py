@@ -31,7 +31,7 @@ FLATBED_DPI = range(150, 9601)
 
 
 @dataclass(frozen=True)
-class Picture:
+class ScanPicture:
     """``pixels`` of a file with its hash; ``dpi`` along x and y as the file states it, or None."""
 
     path: Path
@@ -46,7 +46,7 @@ class Picture:
         return np.array([(columns - 1) / 2, (rows - 1) / 2])
 
 
-def read_picture(path: Path) -> Picture:
+def read_picture(path: Path) -> ScanPicture:
     """Return the picture of a file that Pillow reads. Raises DesignError where it is none."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
@@ -75,7 +75,7 @@ def read_picture(path: Path) -> Picture:
         raise DesignError(
             f"{path} is {columns} x {rows} pixels, too small to measure; scan at 600 dpi or more"
         )
-    return Picture(path, grey, hashlib.sha256(data).hexdigest(), _resolution(stated))
+    return ScanPicture(path, grey, hashlib.sha256(data).hexdigest(), _resolution(stated))
 
 
 def _grey(image: Any) -> Pixels:
@@ -95,7 +95,7 @@ def _resolution(stated: Any) -> tuple[float, float] | None:
     return (x, y) if round(x) in FLATBED_DPI and round(y) in FLATBED_DPI else None
 
 
-class Outline(NamedTuple):
+class PictureOutline(NamedTuple):
     """A closed outline: its points (n, 2) as x and y in pixels, centroid, area in square pixels.
 
     ``is_light``: True if what it encloses is lighter than what lies round it.
@@ -107,7 +107,7 @@ class Outline(NamedTuple):
     is_light: bool
 
 
-def outlines(picture: Picture) -> list[Outline]:
+def outlines(picture: ScanPicture) -> list[PictureOutline]:
     """Return what is lighter or darker than its surroundings, largest first.
 
     Read in the picture reduced to COARSE pixels: within a pixel of that. Raises DesignError where
@@ -127,7 +127,7 @@ def outlines(picture: Picture) -> list[Outline]:
         points = contour[:-1, ::-1] * factor + (factor - 1) / 2
         area, centroid = moments(points)
         if abs(area) > 12 * factor**2:
-            results.append(Outline(points, centroid, abs(area), area > 0))
+            results.append(PictureOutline(points, centroid, abs(area), area > 0))
     return sorted(results, key=lambda outline: -outline.area)
 
 

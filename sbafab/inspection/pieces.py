@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sbafab.geometry.region import Region
-from sbafab.inspection.cut_sheet import DrawnSheet, Shape
+from sbafab.inspection.cut_sheet import DrawnSheet, SheetShape
 from sbafab.inspection.edges import TOLERANCE, EdgeFit
-from sbafab.inspection.picture import Outline, Picture, moments
-from sbafab.inspection.registration import SMALLEST, Location, Points, polyline
+from sbafab.inspection.picture import PictureOutline, ScanPicture, moments
+from sbafab.inspection.registration import SMALLEST, Location, PointArray, polyline
 
-Verdict = Literal[
+PieceVerdict = Literal[
     "sound",
     "moved",
     "turned",
@@ -62,7 +62,7 @@ class PieceFinding:
     name: str
     x: float
     y: float
-    verdict: Verdict
+    verdict: PieceVerdict
     message: str
     shift: float | None = None
     turn: float | None = None
@@ -73,9 +73,9 @@ class PieceFinding:
 class Blob(NamedTuple):
     """A piece or window as it is seen: outline and holes, points in mm of the sheet."""
 
-    outline: Points
-    holes: tuple[Points, ...]
-    centroid: Points
+    outline: PointArray
+    holes: tuple[PointArray, ...]
+    centroid: PointArray
     area: float
 
 
@@ -92,7 +92,11 @@ class Match(NamedTuple):
 
 
 def piece_findings(
-    picture: Picture, sheet: DrawnSheet, location: Location, fit: EdgeFit, seen: Sequence[Outline]
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    location: Location,
+    fit: EdgeFit,
+    seen: Sequence[PictureOutline],
 ) -> list[PieceFinding]:
     """Return a finding for each place of the sheet."""
     blobs = _blobs(location, fit, seen)
@@ -118,12 +122,12 @@ def _is_alone(sheet: DrawnSheet, number: int, blob: Blob) -> bool:
     return not any(_is_in(blob.outline, middle) for middle in middles)
 
 
-def _middle(piece: Region) -> Points:
+def _middle(piece: Region) -> PointArray:
     low_x, low_y, high_x, high_y = piece.bounds
     return np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
 
 
-def _blobs(location: Location, fit: EdgeFit, seen: Sequence[Outline]) -> list[Blob]:
+def _blobs(location: Location, fit: EdgeFit, seen: Sequence[PictureOutline]) -> list[Blob]:
     is_film = location.content == "pieces"
     in_mm = [
         (outline, points, *moments(points))
@@ -143,7 +147,7 @@ def _blobs(location: Location, fit: EdgeFit, seen: Sequence[Outline]) -> list[Bl
     ]
 
 
-def _is_in(polygon: Points, point: Points) -> bool:
+def _is_in(polygon: PointArray, point: PointArray) -> bool:
     """Return True if a point lies in a polygon."""
     x, y = (polygon - point).T
     after_x, after_y = np.roll(x, -1), np.roll(y, -1)
@@ -183,34 +187,36 @@ def _is_sound(fit: EdgeFit, piece: int) -> bool:
     return all(within[contours == k].mean() >= SOUND_SHARE for k in np.unique(contours))
 
 
-def _strange_holes(piece: Region, blob: Blob) -> list[Points]:
+def _strange_holes(piece: Region, blob: Blob) -> list[PointArray]:
     """Return the holes of a blob that its piece does not have, as their middles."""
     drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes]
     middles = [hole.mean(axis=0) for hole in blob.holes]
     return [m for m in middles if all(math.dist(m, d) > HOLE_PLACE for d in drawn)]
 
 
-def _shut_holes(piece: Region, blob: Blob) -> list[Points]:
+def _shut_holes(piece: Region, blob: Blob) -> list[PointArray]:
     """Return the middles of a piece's holes that a blob does not show."""
     seen = [hole.mean(axis=0) for hole in blob.holes]
     drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes if -hole.area > SMALLEST]
     return [d for d in drawn if all(math.dist(m, d) > HOLE_PLACE for m in seen)]
 
 
-def _finding(place: Shape, verdict: Verdict, message: str, **more: float | None) -> PieceFinding:
+def _finding(
+    place: SheetShape, verdict: PieceVerdict, message: str, **more: float | None
+) -> PieceFinding:
     low_x, low_y, high_x, high_y = place.region.bounds
     x, y = round((low_x + high_x) / 2, 3), round((low_y + high_y) / 2, 3)
     return PieceFinding(place.name, x, y, verdict, message, **more)
 
 
-def _sound(fit: EdgeFit, number: int, place: Shape) -> PieceFinding:
+def _sound(fit: EdgeFit, number: int, place: SheetShape) -> PieceFinding:
     mine = fit.samples.pieces == number
     residuals = np.abs(fit.residuals[mine & (fit.weights > 0)])
     shift = math.hypot(*fit.displacements[number, :2])
     turn = math.degrees(fit.displacements[number, 2])
     rms = math.sqrt(float((residuals**2).mean())) if len(residuals) else None
     largest = float(residuals.max()) if len(residuals) else None
-    verdict: Verdict = "sound"
+    verdict: PieceVerdict = "sound"
     message = ""
     if abs(turn) > TURNED:
         verdict, message = "turned", f"is turned by {turn:.0f} degrees"
@@ -221,7 +227,7 @@ def _sound(fit: EdgeFit, number: int, place: Shape) -> PieceFinding:
 
 
 def _crowded(
-    picture: Picture,
+    picture: ScanPicture,
     sheet: DrawnSheet,
     number: int,
     fit: EdgeFit,
@@ -254,7 +260,7 @@ def _crowded(
         message = f"{best.name} lies in its place, and touches others"
         return _finding(place, "other piece", message)
     message = "is covered in part by another piece, or touches it"
-    verdict: Verdict = "covered"
+    verdict: PieceVerdict = "covered"
     if best.is_mirrored:
         verdict, message = "turned over", "is turned over, and touches others"
     elif abs(best.turn) > TURNED:
@@ -263,7 +269,7 @@ def _crowded(
     return _finding(place, verdict, message, shift=best.shift, turn=best.turn)
 
 
-def _reaches_out(picture: Picture, fit: EdgeFit, piece: Region) -> bool:
+def _reaches_out(picture: ScanPicture, fit: EdgeFit, piece: Region) -> bool:
     low_x, low_y, high_x, high_y = piece.bounds
     corners = [(x, y) for x in (low_x, high_x) for y in (low_y, high_y)]
     pixels = fit.warp(np.array(corners))
@@ -281,7 +287,9 @@ class PartialMatch(NamedTuple):
     share: float
 
 
-def _partial_matches(shape: Shape, place: Shape, near: Sequence[Points]) -> Iterator[PartialMatch]:
+def _partial_matches(
+    shape: SheetShape, place: SheetShape, near: Sequence[PointArray]
+) -> Iterator[PartialMatch]:
     """Yield the shape, unmirrored and mirrored, laid on the edges round a place."""
     from scipy.spatial import cKDTree
 
@@ -309,12 +317,14 @@ def _partial_matches(shape: Shape, place: Shape, near: Sequence[Points]) -> Iter
             yield best
 
 
-def _dense(points: Points) -> Points:
+def _dense(points: PointArray) -> PointArray:
     """Return points of a closed outline with those half way between."""
     return np.vstack([points, (points + np.roll(points, -1, axis=0)) / 2])
 
 
-def _identified(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) -> PieceFinding:
+def _identified(
+    sheet: DrawnSheet, place: SheetShape, blob: Blob, is_skeleton: bool
+) -> PieceFinding:
     """Return what a blob is that is not the piece in its place as drawn."""
     match = best_match(sheet, place, blob, is_skeleton)
     if match is None:
@@ -334,13 +344,13 @@ def _identified(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) 
     return _finding(place, "unknown", _unknown(place, blob, is_skeleton), **where)
 
 
-def _shut(place: Shape, blob: Blob) -> str:
+def _shut(place: SheetShape, blob: Blob) -> str:
     shut = _shut_holes(place.region, blob)
     at = " and ".join(f"x {x:.1f}, y {y:.1f}" for x, y in shut)
     return f", or the hole at {at} is not open" if shut and len(shut) <= 2 else ""
 
 
-def _unknown(place: Shape, blob: Blob, is_skeleton: bool) -> str:
+def _unknown(place: SheetShape, blob: Blob, is_skeleton: bool) -> str:
     places = []
     if not is_skeleton:
         places += [f"no hole at x {x:.1f}, y {y:.1f}" for x, y in _shut_holes(place.region, blob)]
@@ -351,7 +361,7 @@ def _unknown(place: Shape, blob: Blob, is_skeleton: bool) -> str:
     return f"has {', '.join(places[:3])}" if places else "differs from its outline and all others"
 
 
-def best_match(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) -> Match | None:
+def best_match(sheet: DrawnSheet, place: SheetShape, blob: Blob, is_skeleton: bool) -> Match | None:
     """Return the shape that a blob is, mirrored or not, or None; the expected where in doubt."""
     matches = [
         match
@@ -366,12 +376,12 @@ def best_match(sheet: DrawnSheet, place: Shape, blob: Blob, is_skeleton: bool) -
     return min(as_good, key=lambda m: (m.name != place.name, m.is_mirrored, m.misfit))
 
 
-def _others(sheet: DrawnSheet, place: Shape) -> Iterator[Shape]:
+def _others(sheet: DrawnSheet, place: SheetShape) -> Iterator[SheetShape]:
     expected = place.name.split(", ")
     yield from (shape for shape in sheet.shapes if shape.name not in expected)
 
 
-def _matches(shape: Shape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
+def _matches(shape: SheetShape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
     """Yield the shape laid on a blob, unmirrored and mirrored, if sizes and holes agree."""
     holes = [] if is_skeleton else [h for h in shape.region.holes if -h.area > SMALLEST]
     outer = sum(contour.area for contour in shape.region.outers)
@@ -387,11 +397,11 @@ def _matches(shape: Shape, blob: Blob, is_skeleton: bool) -> Iterator[Match]:
         yield Match(shape.name, is_mirrored, turn, shift, misfit)
 
 
-def _sparse(points: Points) -> Points:
+def _sparse(points: PointArray) -> PointArray:
     return points[:: max(1, len(points) // 150)]
 
 
-def laid_on(drawn: Points, seen: Points, outline: Points) -> tuple[float, float, float]:
+def laid_on(drawn: PointArray, seen: PointArray, outline: PointArray) -> tuple[float, float, float]:
     """Return degrees and mm of the rigid motion that lays drawn points on seen, and the misfit.
 
     The shift is that of the middle of the drawn points.
@@ -426,11 +436,11 @@ def _spun(radians: float) -> NDArray[np.float64]:
 
 def _aligned(
     tree: Any,
-    seen: Points,
-    arms: Points,
-    guess: tuple[NDArray[np.float64], Points],
+    seen: PointArray,
+    arms: PointArray,
+    guess: tuple[NDArray[np.float64], PointArray],
     reach: float,
-) -> tuple[NDArray[np.float64], Points]:
+) -> tuple[NDArray[np.float64], PointArray]:
     """Return turn and shift that lay points on the nearest seen within ``reach`` mm, by turns."""
     matrix, shift = guess
     for _ in range(12):

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from sbafab.errors import DesignError
 from sbafab.geometry.contour import Contour
 from sbafab.inspection.cut_sheet import DrawnSheet
-from sbafab.inspection.picture import Outline, moments
+from sbafab.inspection.picture import PictureOutline, moments
 
-Points = NDArray[np.float64]
+PointArray = NDArray[np.float64]
 """x and y, (n, 2)."""
-Side = Literal["film", "void"]
+SheetSide = Literal["film", "void"]
 """What a contour encloses."""
 Content = Literal["pieces", "skeleton"]
 """What lies in the picture: pieces without the waste, or the sheet that they fell out of."""
@@ -60,23 +60,23 @@ class Warp:
     degree: int
     coefficients: NDArray[np.float64]
 
-    def __call__(self, points: Points) -> Points:
+    def __call__(self, points: PointArray) -> PointArray:
         """Return pixels, x and y, of points in mm."""
         return projected(self.base, points + self.monomials(points) @ self.coefficients)
 
-    def monomials(self, points: Points) -> NDArray[np.float64]:
+    def monomials(self, points: PointArray) -> NDArray[np.float64]:
         """Return the values (n, k) of the monomials at points."""
         x, y = ((points - self.centre) / self.size).T
         powers = [(i, total - i) for total in range(self.degree + 1) for i in range(total + 1)]
         return np.column_stack([x**i * y**j for i, j in powers])
 
-    def pixels_per_mm(self, point: Points) -> tuple[float, float]:
+    def pixels_per_mm(self, point: PointArray) -> tuple[float, float]:
         """Return the pixels that a millimetre along x, and along y, takes at a point."""
         steps = point + CORNER_STEPS
         at, beside, above = self(steps)
         return float(np.hypot(*(beside - at)) * 1e3), float(np.hypot(*(above - at)) * 1e3)
 
-    def inverse(self, pixels: Points) -> Points:
+    def inverse(self, pixels: PointArray) -> PointArray:
         """Return the points in mm of pixels."""
         back: NDArray[np.float64] = np.asarray(np.linalg.inv(self.base), dtype=np.float64)
         aim = projected(back, pixels)
@@ -86,7 +86,7 @@ class Warp:
         return points
 
 
-def projected(matrix: NDArray[np.float64], points: Points) -> Points:
+def projected(matrix: NDArray[np.float64], points: PointArray) -> PointArray:
     """Return points under a homography."""
     after = points @ matrix[:, :2].T + matrix[:, 2]
     return after[:, :2] / after[:, 2:]
@@ -97,7 +97,7 @@ class Target(NamedTuple):
 
     centroid: tuple[float, float]
     area: float
-    side: Side
+    side: SheetSide
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Location:
 def targets_of(sheet: DrawnSheet, content: Content) -> list[Target]:
     """Return what a picture of a sheet shows: a skeleton shows no holes of pieces."""
     contours = [contour for place in sheet.places for contour in place.region.contours]
-    side: Side = "film" if content == "pieces" else "void"
+    side: SheetSide = "film" if content == "pieces" else "void"
     shown = [c for c in contours if not c.is_hole or (content == "pieces" and -c.area > SMALLEST)]
     return [
         Target(centroid_of(contour), abs(contour.area), "void" if contour.is_hole else side)
@@ -134,7 +134,7 @@ def centroid_of(contour: Contour) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def polyline(contour: Contour, step: float) -> Points:
+def polyline(contour: Contour, step: float) -> PointArray:
     """Return points along a contour, ``step`` mm apart at most."""
     return np.array(
         [
@@ -171,7 +171,7 @@ class _Pose:
 
 def locate(
     sheet: DrawnSheet,
-    seen: Sequence[Outline],
+    seen: Sequence[PictureOutline],
     size: tuple[int, int],
     pixels_per_mm: float | None,
     is_light: bool,
@@ -210,7 +210,7 @@ class _Finder:
     def __init__(
         self,
         targets: Sequence[Target],
-        seen: Sequence[Outline],
+        seen: Sequence[PictureOutline],
         size: tuple[int, int],
         pixels_per_mm: float | None,
         is_light: bool,
@@ -361,7 +361,7 @@ class _Finder:
         return math.sqrt(math.prod(warp.pixels_per_mm(np.array(warp.centre))))
 
 
-def _fitted(points: Points, pixels: Points, is_camera: bool) -> NDArray[np.float64] | None:
+def _fitted(points: PointArray, pixels: PointArray, is_camera: bool) -> NDArray[np.float64] | None:
     """Return the affine map, or the homography, of points to pixels by least squares."""
     centre, size = points.mean(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-9)
     x, y = ((points - centre) / size).T

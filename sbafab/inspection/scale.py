@@ -17,8 +17,8 @@ from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc, polygon
 from sbafab.inspection.cut_sheet import DrawnSheet
 from sbafab.inspection.edges import EdgeFit, crossings, samples_of
-from sbafab.inspection.picture import Outline, Picture, moments
-from sbafab.inspection.registration import CORNER_STEPS, Points
+from sbafab.inspection.picture import PictureOutline, ScanPicture, moments
+from sbafab.inspection.registration import CORNER_STEPS, PointArray
 
 MILLIMETRES = 25.4
 """An inch."""
@@ -56,7 +56,11 @@ class Reference:
 
 
 def scale_of(
-    picture: Picture, sheet: DrawnSheet, fit: EdgeFit, seen: Sequence[Outline], reference: Reference
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    fit: EdgeFit,
+    seen: Sequence[PictureOutline],
+    reference: Reference,
 ) -> Scale:
     """Return the film's scale by the reference. Raises DesignError where that is not seen."""
     if reference.bar is not None:
@@ -77,7 +81,11 @@ def scale_of(
 
 
 def _by_bar(
-    picture: Picture, sheet: DrawnSheet, fit: EdgeFit, seen: Sequence[Outline], length: float
+    picture: ScanPicture,
+    sheet: DrawnSheet,
+    fit: EdgeFit,
+    seen: Sequence[PictureOutline],
+    length: float,
 ) -> float:
     low_x, low_y, high_x, high_y = sheet.bounds
     for outline in seen:
@@ -101,7 +109,11 @@ def _by_bar(
 
 
 def _length(
-    picture: Picture, fit: EdgeFit, middle: Points, axes: Points, size: tuple[float, float]
+    picture: ScanPicture,
+    fit: EdgeFit,
+    middle: PointArray,
+    axes: PointArray,
+    size: tuple[float, float],
 ) -> float:
     """Return the length of a bar between its ends, mm of the cut file."""
     half = np.array([size[1] / 2, size[0] / 2])
@@ -121,7 +133,7 @@ def _length(
     return float(np.median(ends[0]) - np.median(ends[1]))
 
 
-def _by_pins(picture: Picture, sheet: DrawnSheet, fit: EdgeFit) -> float:
+def _by_pins(picture: ScanPicture, sheet: DrawnSheet, fit: EdgeFit) -> float:
     if len(sheet.pins) < LEAST_PINS:
         raise DesignError(
             f"--pins needs {LEAST_PINS} pins of {sheet.name} or more, and it has "
@@ -133,7 +145,7 @@ def _by_pins(picture: Picture, sheet: DrawnSheet, fit: EdgeFit) -> float:
     return math.sqrt(float((a**2).sum() / (b**2).sum()))
 
 
-def _pin(picture: Picture, fit: EdgeFit, pin: tuple[float, float, float]) -> Points:
+def _pin(picture: ScanPicture, fit: EdgeFit, pin: tuple[float, float, float]) -> PointArray:
     """Return the middle of a pin, mm of the cut file."""
     x, y, diameter = pin
     region: Region = disc((x, y), diameter / 2)

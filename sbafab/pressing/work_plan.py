@@ -83,7 +83,7 @@ class Times:
 
 
 @dataclass(frozen=True)
-class Entry:
+class PlanEntry:
     """A row of the plan: one task on the copies from first to last.
 
     It begins ``start`` minutes into the shift of ``day`` (from 1). Within a row the copies of what
@@ -137,7 +137,7 @@ def shop_of(design: Design) -> Shop:
 
 def work_plan(
     design: Design, laminate: Laminate, schedule: Schedule, copies: int | None = None
-) -> tuple[Entry, ...]:
+) -> tuple[PlanEntry, ...]:
     """Return all work on ``copies``, by default on the order, in the order in which it begins.
 
     Empty where nobody stated the minutes: of a step in the press, or of a seam or fold.
@@ -152,7 +152,7 @@ def work_plan(
 
 def planned(
     runs: Runs, pressed: Sequence[float], laid: Sequence[int], times: Times, shop: Shop
-) -> tuple[Entry, ...]:
+) -> tuple[PlanEntry, ...]:
     """Return the plan of runs of steps that are ``pressed`` so many minutes each.
 
     ``laid`` is the number of parts that each step lays.
@@ -271,9 +271,9 @@ class _Planner:
         self.blocks: list[_Block] = []
         self.queues: list[_Queue] = []
         self.unsorted = runs.copies
-        self.rows: list[Entry] = []
+        self.rows: list[PlanEntry] = []
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[PlanEntry, ...]:
         self._wait("cut", (1, self.runs.copies), 0)
         while self.blocks or self.queues:
             block, placed = self._first_block()
@@ -522,14 +522,14 @@ def _free(
     return next((n for n in numbers if bookings[n].is_free(start, end)), None)
 
 
-def _entry(task: TaskName, copies: tuple[int, int], start: int, ticks: int) -> Entry:
+def _entry(task: TaskName, copies: tuple[int, int], start: int, ticks: int) -> PlanEntry:
     day, within = divmod(start, DAY)
-    return Entry(task, copies, day + 1, within / TICKS, ticks / TICKS)
+    return PlanEntry(task, copies, day + 1, within / TICKS, ticks / TICKS)
 
 
-def _merged(rows: Iterable[Entry]) -> Iterator[Entry]:
+def _merged(rows: Iterable[PlanEntry]) -> Iterator[PlanEntry]:
     """Yield rows in order; one person's same work on the next copies goes on in the same row."""
-    merged: list[Entry] = []
+    merged: list[PlanEntry] = []
     latest: dict[int, int] = {}
     for row in rows:
         before = merged[latest[row.technician]] if row.technician in latest else None
@@ -546,18 +546,18 @@ def _merged(rows: Iterable[Entry]) -> Iterator[Entry]:
     yield from merged
 
 
-def _goes_on(before: Entry, row: Entry) -> bool:
+def _goes_on(before: PlanEntry, row: PlanEntry) -> bool:
     is_same = (before.task, before.cycle, before.day) == (row.task, row.cycle, row.day)
     is_next = (before.copies[1] + 1, before.end) == (row.copies[0], row.start)
     return is_same and is_next and row.task in PAUSABLE
 
 
-def _at(row: Entry) -> int:
+def _at(row: PlanEntry) -> int:
     """Return the end of a row."""
     return (row.day - 1) * DAY + _ticks(row.end)
 
 
-def _order(row: Entry) -> tuple[int, float, int, int, int]:
+def _order(row: PlanEntry) -> tuple[int, float, int, int, int]:
     return row.day, row.start, row.technician or 99, row.cycle, row.step
 
 
@@ -594,7 +594,7 @@ def plan_csv(design: Design, laminate: Laminate, schedule: Schedule) -> str | No
     return csv_text(rows)
 
 
-def _row(runs: Runs, entry: Entry, batch: str | None) -> Sequence[object]:
+def _row(runs: Runs, entry: PlanEntry, batch: str | None) -> Sequence[object]:
     return (
         entry.day,
         clock(entry.start),

@@ -12,7 +12,7 @@ from sbafab.geometry.region import coord
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import cycle_name, design_runs
 from sbafab.pressing.schedule import Schedule
-from sbafab.pressing.work_plan import Entry, Shop, TaskName, shop_of, work_plan
+from sbafab.pressing.work_plan import PlanEntry, Shop, TaskName, shop_of, work_plan
 from sbafab.reports import drawing as draw
 
 WIDTH = 180.0
@@ -54,7 +54,7 @@ def plan_svg(design: Design, laminate: Laminate, schedule: Schedule) -> str | No
     return draw.document(WIDTH, y + 6, title, drawn)
 
 
-def day_strips(entries: Sequence[Entry], shop: Shop) -> Iterator[tuple[int, float, list[str]]]:
+def day_strips(entries: Sequence[PlanEntry], shop: Shop) -> Iterator[tuple[int, float, list[str]]]:
     """Yield day, height (mm) and elements of each strip, ``WIDTH`` wide."""
     rows = [(name, [*_spans(entries, kind, number)]) for name, kind, number in _resources(shop)]
     if not any(entry.task == "cure" for entry in entries):
@@ -65,7 +65,7 @@ def day_strips(entries: Sequence[Entry], shop: Shop) -> Iterator[tuple[int, floa
         yield day, HEAD + ROW * len(rows) + FOOT, _strip(day, rows, shop, axis)
 
 
-def legend(entries: Sequence[Entry], at: tuple[float, float]) -> list[str]:
+def legend(entries: Sequence[PlanEntry], at: tuple[float, float]) -> list[str]:
     """Return the colours of the tasks in one line."""
     tasks = {entry.task for entry in entries}
     x, y = at
@@ -95,7 +95,7 @@ def _resources(shop: Shop) -> Iterator[tuple[str, str, int]]:
     yield "Adhesive", "cure", 0
 
 
-def _spans(entries: Sequence[Entry], kind: str, number: int) -> Iterator[_Bar]:
+def _spans(entries: Sequence[PlanEntry], kind: str, number: int) -> Iterator[_Bar]:
     if kind == "cure":
         cures = sorted(_span(entry) for entry in entries if entry.task == "cure")
         yield from ((start, end, "cure", "cure") for start, end in _united(cures))
@@ -106,7 +106,7 @@ def _spans(entries: Sequence[Entry], kind: str, number: int) -> Iterator[_Bar]:
             yield *_span(entry), entry.task, short or FILLS[entry.task][1]
 
 
-def _span(entry: Entry) -> tuple[float, float]:
+def _span(entry: PlanEntry) -> tuple[float, float]:
     start = (entry.day - 1) * DAY + entry.start
     return start, start + entry.minutes
 

@@ -28,7 +28,7 @@ MOST_NAMED = 8
 
 
 @dataclass(frozen=True)
-class Place:
+class TrayPlace:
     """A part on a page: where its frame's origin lies, mm from the page's lower left corner."""
 
     layer: Layer
@@ -37,11 +37,11 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class TraySheet:
     """One page of a laminate: its size in mm, its parts, and each step's heading with its place."""
 
     size: tuple[float, float]
-    places: tuple[Place, ...]
+    places: tuple[TrayPlace, ...]
     headings: tuple[tuple[Point, str], ...]
 
 
@@ -64,7 +64,7 @@ def tray_pdf(
     return pdf(pages, f"{laminate.name}: tray plan")
 
 
-def tray_sheets(laminate: Laminate) -> tuple[Sheet, ...]:
+def tray_sheets(laminate: Laminate) -> tuple[TraySheet, ...]:
     """Return the pages of one laminate; a part that is wider than the paper gets a wider page."""
     steps = [*_laid(laminate)]
     boxes = [region.bounds for _, parts in steps for _, region in parts]
@@ -95,19 +95,19 @@ class _Flow:
 
     def __init__(self, size: tuple[float, float]) -> None:
         self.size = size
-        self.sheets: list[Sheet] = []
+        self.sheets: list[TraySheet] = []
         self._clear()
 
     def _clear(self) -> None:
-        self.places: list[Place] = []
+        self.places: list[TrayPlace] = []
         self.headings: list[tuple[Point, str]] = []
         self.top = self.size[1] - HEAD
 
     def _turn_page(self) -> None:
-        self.sheets.append(Sheet(self.size, tuple(self.places), tuple(self.headings)))
+        self.sheets.append(TraySheet(self.size, tuple(self.places), tuple(self.headings)))
         self._clear()
 
-    def pages(self, steps: Sequence[tuple[str, list[tuple[Layer, Region]]]]) -> list[Sheet]:
+    def pages(self, steps: Sequence[tuple[str, list[tuple[Layer, Region]]]]) -> list[TraySheet]:
         for heading, parts in steps:
             words = heading
             for row in self._rows(parts):
@@ -141,7 +141,7 @@ class _Flow:
         for layer, region in row:
             low_x, low_y, high_x, _ = region.bounds
             at = x - low_x, self.top - high + LABEL - low_y
-            self.places.append(Place(layer, region, at))
+            self.places.append(TrayPlace(layer, region, at))
             x += high_x - low_x + GAP
         self.top -= high + GAP
 
@@ -183,7 +183,7 @@ def _head(page: PdfPage, title: str) -> None:
     page.text((SIDE + BAR + 2, y - 1), f"{BAR:g} mm", WORDS)
 
 
-def _drawn(sheet: Sheet) -> PdfPage:
+def _drawn(sheet: TraySheet) -> PdfPage:
     """Return what all laminates of a cycle share: the places with their labels."""
     page = PdfPage(*sheet.size)
     for at, words in sheet.headings:

@@ -198,7 +198,7 @@ def ewma_chart(
 # Capability.
 
 
-class Limits(NamedTuple):
+class ControlLimits(NamedTuple):
     """Specification limits of a quantity; None where there is none on that side."""
 
     low: float | None
@@ -212,7 +212,7 @@ class Capability:
     ``sigma`` is the standard deviation of all values, ``within`` that from one value to the next.
     """
 
-    limits: Limits
+    limits: ControlLimits
     count: int
     mean: float
     sigma: float
@@ -235,7 +235,7 @@ class Capability:
         }
 
 
-def capability(values: Sequence[float], limits: Limits) -> Capability:
+def capability(values: Sequence[float], limits: ControlLimits) -> Capability:
     """Return Cp and Cpk of ``values``; their spread is that of all of them.
 
     The interval of Cp is that of a normal distribution's deviation, that of Cpk Bissell's

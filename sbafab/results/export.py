@@ -20,7 +20,7 @@ from sbafab.results.history import (
     StoredEntry,
     photograph_folder,
 )
-from sbafab.results.recording import Row, all_rows, matching, row_number, row_words
+from sbafab.results.recording import RecordRow, all_rows, matching, row_number, row_words
 from sbafab.results.records import COLUMNS, Build, Record
 from sbafab.results.store import Lab
 from sbafab.spreadsheet import csv_text
@@ -39,7 +39,7 @@ class DeviceHistory:
     entries: tuple[StoredEntry, ...]
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[RecordRow]:
         return all_rows(self.records, self.entries)
 
     @property
@@ -86,7 +86,7 @@ def lab_history(lab: Lab, text: str = "", serial: str = "") -> LabHistory:
         entries = matching(text or serial, serial, entries, builds)
     if not records and not entries:
         raise DesignError(f"no device goes with {(text or serial)[:60]!r}; see --find")
-    rows: dict[tuple[str, str], list[Row]] = defaultdict(list)
+    rows: dict[tuple[str, str], list[RecordRow]] = defaultdict(list)
     for row in all_rows(records, entries):
         rows[builds[row.design_sha256].actuator, row.serial].append(row)
     devices = tuple(
@@ -140,7 +140,7 @@ def _csv_bytes(history: LabHistory) -> bytes:
     return csv_text([CSV_COLUMNS, *rows]).encode()
 
 
-def _cells(history: LabHistory, device: DeviceHistory, row: Row) -> dict[str, Any]:
+def _cells(history: LabHistory, device: DeviceHistory, row: RecordRow) -> dict[str, Any]:
     source = "entry" if isinstance(row, StoredEntry) else "result"
     cells: dict[str, Any] = {
         "row": row_number(row),

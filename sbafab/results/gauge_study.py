@@ -25,7 +25,7 @@ CATEGORIES = math.sqrt(2)
 """Times the parts' over the gauge's deviation: categories that the gauge tells apart."""
 
 
-class Reading(NamedTuple):
+class GaugeReading(NamedTuple):
     part: str
     operator: str
     reading: float
@@ -87,7 +87,7 @@ class GaugeStudy:
         }
 
 
-def read_readings(path: Path) -> list[Reading]:
+def read_readings(path: Path) -> list[GaugeReading]:
     """Return the readings of a CSV with the columns of COLUMNS. Raises DesignError."""
     lines = table_text(path).splitlines()
     separator = max(",;\t", key=lines[0].count) if lines else ","
@@ -107,11 +107,11 @@ def read_readings(path: Path) -> list[Reading]:
                 f"{path}, line {number}: part {part[:20]!r}, operator {operator[:20]!r}, reading "
                 f"{text[:20]!r}; fill in all three, the reading as a number"
             )
-        readings.append(Reading(part, operator, value))
+        readings.append(GaugeReading(part, operator, value))
     return readings
 
 
-def gauge_study(readings: Sequence[Reading], width: float | None = None) -> GaugeStudy:
+def gauge_study(readings: Sequence[GaugeReading], width: float | None = None) -> GaugeStudy:
     """Return the study of readings, as many of each part by each operator, in the same unit.
 
     ``width`` between the limits is in that unit. Raises DesignError.

@@ -41,7 +41,7 @@ MOST_TEXT = {"serial": 64, "step": 40, "item": 60, "lot": 60, "initials": 16, "r
 
 
 @dataclass(frozen=True)
-class Entry:
+class HistoryEntry:
     """A line of the history of the device ``serial``; what it does not state is empty.
 
     ``date`` (ISO) is the day of the work, ``step`` a press step's number or a test's name, ``item``
@@ -68,12 +68,12 @@ class Entry:
         """True if nothing is stated of a device but when, where and by whom."""
         return not (self.lot or self.decision or self.photograph or self.note or self.readings)
 
-    def states_the_same(self, other: Entry) -> bool:
+    def states_the_same(self, other: HistoryEntry) -> bool:
         """Return True if both state the same, whoever stored them."""
         texts = all(getattr(self, name) == getattr(other, name) for name in ENTRY_TEXTS)
         return texts and self.readings == other.readings
 
-    def changed(self, change: Entry) -> Entry:
+    def changed(self, change: HistoryEntry) -> HistoryEntry:
         """Return the entry with all that ``change`` states in its place."""
         texts = {name: getattr(change, name) for name in ENTRY_TEXTS if getattr(change, name)}
         readings = {**self.readings, **change.readings}
@@ -81,7 +81,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class StoredEntry(Entry):
+class StoredEntry(HistoryEntry):
     """An entry as it is stored: its number, when (UTC), of which design and attempt.
 
     ``corrects`` is the number of the entry in whose place it stands.
@@ -115,7 +115,7 @@ def standing_entries(entries: Sequence[StoredEntry]) -> list[StoredEntry]:
     return [entry for entry in entries if entry.id not in corrected and not entry.withdrawn]
 
 
-def checked_entry(entry: Entry, where: str = "") -> Entry:
+def checked_entry(entry: HistoryEntry, where: str = "") -> HistoryEntry:
     """The entry, with texts stripped. Raises DesignError for what cannot be meant."""
     place = f"{where}: " if where else ""
     texts = {name: getattr(entry, name).strip() for name in ENTRY_TEXTS}
@@ -136,7 +136,7 @@ def checked_entry(entry: Entry, where: str = "") -> Entry:
     return entry
 
 
-def _problems(entry: Entry) -> Iterator[str]:
+def _problems(entry: HistoryEntry) -> Iterator[str]:
     """Sentences on fields that need another one."""
     if not entry.serial:
         yield "an entry needs its serial, as on the traveller"
@@ -177,7 +177,7 @@ _COMMA = re.compile(r"\s*,\s*")
 _DECIMAL = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
 
 
-def entries_of(values: Mapping[str, Any], where: str = "") -> list[Entry]:
+def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]:
     """Return an entry for each serial of ``values``, by the names of HISTORY_FIELDS.
 
     Serials are a list, or a text with commas between them. Raises DesignError.
@@ -192,7 +192,7 @@ def entries_of(values: Mapping[str, Any], where: str = "") -> list[Entry]:
     ]
 
 
-def unchecked_entry(values: Mapping[str, Any], where: str = "") -> Entry:
+def unchecked_entry(values: Mapping[str, Any], where: str = "") -> HistoryEntry:
     """Return an entry of ``values``, which may lack what a whole one needs. Raises DesignError."""
     place = f"{where}: " if where else ""
     stated = {name: value for name, value in values.items() if value not in ("", None)}
@@ -204,7 +204,7 @@ def unchecked_entry(values: Mapping[str, Any], where: str = "") -> Entry:
             )
     readings = {n: _number(stated[n], n, place) for n in READING_NAMES if n in stated}
     texts: dict[str, Any] = {n: str(v) for n, v in stated.items() if n not in READING_NAMES}
-    return Entry(**texts, readings=readings, withdrawn=withdrawn)
+    return HistoryEntry(**texts, readings=readings, withdrawn=withdrawn)
 
 
 def _number(value: Any, name: str, place: str) -> float:
@@ -215,7 +215,7 @@ def _number(value: Any, name: str, place: str) -> float:
     return float(value.strip().replace(",", "."))
 
 
-def read_history(path: Path, defaults: Mapping[str, Any]) -> list[Entry]:
+def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
     """Return the entries of a file, with ``defaults`` where it states nothing else.
 
     CSV has a row an entry, with the names of HISTORY_FIELDS as columns. TOML and JSON have a list
@@ -226,7 +226,7 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[Entry]:
     reader = readers.get(path.suffix.lower())
     if reader is None:
         raise DesignError(f"{path} ends in none of {', '.join(readers)}; save it as one of these")
-    entries: list[Entry] = []
+    entries: list[HistoryEntry] = []
     for where, row in reader(path):
         values = {**defaults, **{name: v for name, v in row.items() if v not in ("", None)}}
         if values.get("photograph"):
@@ -325,7 +325,7 @@ def store_photograph(lab: Path, content: bytes, where: str) -> str:
     return path.name
 
 
-def with_photograph(lab: Path, entry: Entry) -> Entry:
+def with_photograph(lab: Path, entry: HistoryEntry) -> HistoryEntry:
     """Return the entry with its photograph's file stored. Raises DesignError."""
     if not entry.photograph or is_stored_photograph(entry.photograph):
         return entry

@@ -25,7 +25,7 @@ from sbafab.results.control_charts import (
     RULES,
     Capability,
     ControlChart,
-    Limits,
+    ControlLimits,
     capability,
     defects_chart,
     ewma_chart,
@@ -35,7 +35,7 @@ from sbafab.results.control_charts import (
     statistics,
 )
 from sbafab.results.history import REJECT, REWORK, StoredEntry, standing_entries
-from sbafab.results.recording import Row, all_rows
+from sbafab.results.recording import RecordRow, all_rows
 from sbafab.results.records import ERRORS, FAIL, NUMBERS, TOLERANCES, Build, Record
 from sbafab.results.report import standing
 from sbafab.results.store import Lab
@@ -45,7 +45,7 @@ CERTAIN = 0.05
 LEAK = "leak test"
 
 
-class Point(NamedTuple):
+class ChartPoint(NamedTuple):
     """A value of a series; ``when`` (day, time of the record) orders points and changes."""
 
     value: float
@@ -74,7 +74,7 @@ class Device:
         return self.when[0]
 
 
-class Change(NamedTuple):
+class ProcessChange(NamedTuple):
     """A factor that has another value than before."""
 
     when: tuple[str, str]
@@ -129,7 +129,7 @@ class ProcessControl:
     """All charts of a lab, its failures by step and reason, and the step to look at first."""
 
     sets: tuple[ChartSet, ...]
-    changes: tuple[Change, ...]
+    changes: tuple[ProcessChange, ...]
     failures: tuple[tuple[str, str, int], ...]
     suspects: tuple[Suspect, ...]
     advice: tuple[str, ...]
@@ -152,7 +152,7 @@ class ProcessControl:
         }
 
 
-def process_control(lab: Lab, limits: Mapping[str, Limits]) -> ProcessControl:
+def process_control(lab: Lab, limits: Mapping[str, ControlLimits]) -> ProcessControl:
     """Return the process control of all records of a lab.
 
     ``limits`` by quantity, such as stroke_mm or temperature_c; the tolerances of placement and
@@ -193,7 +193,7 @@ def process_control(lab: Lab, limits: Mapping[str, Limits]) -> ProcessControl:
 # Devices, series and changes from the rows.
 
 
-def _when(row: Row) -> tuple[str, str]:
+def _when(row: RecordRow) -> tuple[str, str]:
     return (row.day if isinstance(row, StoredEntry) else row.recorded[:10], row.recorded)
 
 
@@ -237,16 +237,18 @@ def _device(serial: str, records: Sequence[Record], entries: Sequence[StoredEntr
     )
 
 
-def _series(records: Sequence[Record], entries: Sequence[StoredEntry]) -> dict[str, list[Point]]:
+def _series(
+    records: Sequence[Record], entries: Sequence[StoredEntry]
+) -> dict[str, list[ChartPoint]]:
     """Return the points of each quantity, in the order of the work.
 
     A reading that one record gives to several devices is that of one press cycle: one point.
     """
-    series: dict[str, list[Point]] = defaultdict(list)
+    series: dict[str, list[ChartPoint]] = defaultdict(list)
     for entry in sorted(entries, key=_when):
         for name, value in entry.readings.items():
             where = f"step {entry.step}" if entry.step else entry.item
-            point = Point(value, _when(entry), entry.serial)
+            point = ChartPoint(value, _when(entry), entry.serial)
             points = series[f"{name}, {where}" if where else name]
             if not points or points[-1][:2] != point[:2]:
                 points.append(point)
@@ -254,10 +256,10 @@ def _series(records: Sequence[Record], entries: Sequence[StoredEntry]) -> dict[s
         for quantity in NUMBERS:
             if quantity.name in record.numbers:
                 value = record.numbers[quantity.name]
-                series[quantity.name].append(Point(value, _when(record), record.serial))
+                series[quantity.name].append(ChartPoint(value, _when(record), record.serial))
         for quantity in ERRORS:
             series[quantity.name] += [
-                Point(size, _when(record), record.serial)
+                ChartPoint(size, _when(record), record.serial)
                 for size in record.errors.get(quantity.name, ())
             ]
     return {name: points for name, points in series.items() if points}
@@ -265,7 +267,7 @@ def _series(records: Sequence[Record], entries: Sequence[StoredEntry]) -> dict[s
 
 def _changes(
     records: Sequence[Record], entries: Sequence[StoredEntry], builds: Mapping[str, Build]
-) -> Iterator[Change]:
+) -> Iterator[ProcessChange]:
     """Yield each new value of a factor: kit, operator, design, lots, initials.
 
     A value that comes back, as of two operators by turns, is no change.
@@ -283,14 +285,14 @@ def _changes(
             values = values_of[factor]
             if value and value not in values:
                 if values:
-                    yield Change(_when(row), factor, values[-1], value)
+                    yield ProcessChange(_when(row), factor, values[-1], value)
                 values.append(value)
 
 
-def _tolerances(builds: Mapping[str, Build]) -> dict[str, Limits]:
+def _tolerances(builds: Mapping[str, Build]) -> dict[str, ControlLimits]:
     """Return the limits of errors that all recorded designs keep."""
     return {
-        name: Limits(None, min(build.tolerances[name] for build in builds.values()))
+        name: ControlLimits(None, min(build.tolerances[name] for build in builds.values()))
         for name in TOLERANCES
         if builds and all(name in build.tolerances for build in builds.values())
     }
@@ -299,7 +301,9 @@ def _tolerances(builds: Mapping[str, Build]) -> dict[str, Limits]:
 # Charts.
 
 
-def _failure_sets(devices: Sequence[Device], changes: Sequence[Change]) -> Iterator[ChartSet]:
+def _failure_sets(
+    devices: Sequence[Device], changes: Sequence[ProcessChange]
+) -> Iterator[ChartSet]:
     """Yield the p and u charts, a point a day."""
     days: dict[str, list[Device]] = defaultdict(list)
     for device in devices:
@@ -317,7 +321,10 @@ def _failure_sets(devices: Sequence[Device], changes: Sequence[Change]) -> Itera
 
 
 def _value_set(
-    name: str, points: Sequence[Point], changes: Sequence[Change], limits: Limits | None
+    name: str,
+    points: Sequence[ChartPoint],
+    changes: Sequence[ProcessChange],
+    limits: ControlLimits | None,
 ) -> ChartSet:
     values = [point.value for point in points]
     charts = (individuals_chart(values), moving_range_chart(values), ewma_chart(values))
@@ -332,7 +339,7 @@ def _value_set(
 
 
 def _marks(
-    changes: Sequence[Change], whens: Sequence[tuple[str, ...]]
+    changes: Sequence[ProcessChange], whens: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[int, str], ...]:
     """Return each change at the first point that is not before it; none before the first point."""
     marks = []

@@ -20,7 +20,7 @@ from sbafab.errors import DesignError
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
-from sbafab.results.history import Entry, StoredEntry
+from sbafab.results.history import HistoryEntry, StoredEntry
 from sbafab.results.records import (
     COLUMNS,
     ERRORS,
@@ -68,7 +68,7 @@ def record(
 
 
 def record_history(
-    lab: Lab, built: Design | Assembled, entries: Sequence[Entry], is_again: bool = False
+    lab: Lab, built: Design | Assembled, entries: Sequence[HistoryEntry], is_again: bool = False
 ) -> list[StoredEntry]:
     """Store lines of the history of devices of a built design; all or none. Raises DesignError."""
     sha256, promise = _promise(lab, built)
@@ -215,12 +215,12 @@ def _number(text: str, column: str, where: str) -> float:
 _HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
 
 
-Row = Record | StoredEntry
+RecordRow = Record | StoredEntry
 """What is stored of a device."""
 Stored = TypeVar("Stored", Record, StoredEntry)
 
 
-def all_rows(records: Sequence[Record], entries: Sequence[StoredEntry]) -> list[Row]:
+def all_rows(records: Sequence[Record], entries: Sequence[StoredEntry]) -> list[RecordRow]:
     """Return entries and records in one list, entries first, as the work goes."""
     return [*entries, *records]
 
@@ -265,7 +265,7 @@ def matching(
     return [row for row in matches if serial in ("", row.serial)]
 
 
-def row_number(row: Row, number: int | None = None) -> str:
+def row_number(row: RecordRow, number: int | None = None) -> str:
     """Return the number of a record, such as 3, or of an entry of history, such as e3.
 
     ``number`` is that of another row of its kind.
@@ -274,7 +274,7 @@ def row_number(row: Row, number: int | None = None) -> str:
     return f"{sign}{row.id if number is None else number}"
 
 
-def row_words(row: Row) -> str:
+def row_words(row: RecordRow) -> str:
     """Return what a row states, in one line; units stand in the names."""
     if isinstance(row, Record):
         parts = [f"{name} {value}" for name, value in row.once.items()]

@@ -29,7 +29,7 @@ from sbafab.results.history import (
     ENTRY_TEXTS,
     READING_NAMES,
     ChainCheck,
-    Entry,
+    HistoryEntry,
     Link,
     StoredEntry,
     add_links,
@@ -198,7 +198,7 @@ class Lab:
         self,
         sha256: str,
         build: Build | None,
-        entries: Sequence[Entry],
+        entries: Sequence[HistoryEntry],
         is_again: bool = False,
     ) -> list[StoredEntry]:
         """Store lines of the history of devices of a design, all or none, as ``add`` does.
@@ -218,7 +218,7 @@ class Lab:
                 for entry in entries
             ]
 
-    def correct_entry(self, number: int, change: Entry) -> StoredEntry:
+    def correct_entry(self, number: int, change: HistoryEntry) -> StoredEntry:
         """Store an entry that repeats ``number`` but for what ``change`` states."""
         if not self.path.exists():
             raise OutputError(f"{self.path} does not exist, so there is no entry to correct")
@@ -332,7 +332,7 @@ class Lab:
         self,
         rows: sqlite3.Connection,
         sha256: str,
-        entry: Entry,
+        entry: HistoryEntry,
         corrects: int | None,
         attempt: int,
     ) -> StoredEntry:
@@ -592,7 +592,7 @@ def _entry(row: Sequence[object]) -> StoredEntry:
     return entry
 
 
-def _refuse_repeat(rows: sqlite3.Connection, entry: Entry, attempt: int) -> None:
+def _refuse_repeat(rows: sqlite3.Connection, entry: HistoryEntry, attempt: int) -> None:
     """Raise DesignError for a line that stands already, as of a form that was sent twice."""
     for stored in standing_entries(_entries(rows, "WHERE serial = ?", (entry.serial,))):
         if stored.attempt == attempt and stored.states_the_same(entry):

@@ -9,7 +9,7 @@ import pytest
 
 from sbafab.errors import DesignError
 from sbafab.results.control_charts import (
-    Limits,
+    ControlLimits,
     Signal,
     capability,
     defects_chart,
@@ -19,7 +19,7 @@ from sbafab.results.control_charts import (
     proportions_chart,
     western_electric,
 )
-from sbafab.results.gauge_study import Reading, gauge_study, read_readings
+from sbafab.results.gauge_study import GaugeReading, gauge_study, read_readings
 
 FLOW = (49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1)
 """NIST/SEMATECH e-Handbook, 6.3.2.2."""
@@ -117,10 +117,10 @@ def test_capability_is_the_textbooks() -> None:
     """Montgomery, Introduction to Statistical Quality Control, examples 8.4 and 8.5, n = 20."""
     unit = [(n - 9.5) / 9.5 for n in range(20)]
     scale = (sum(x * x for x in unit) / 19) ** 0.5
-    wide = capability([50 + 1.75 * x / scale for x in unit], Limits(38, 62))
+    wide = capability([50 + 1.75 * x / scale for x in unit], ControlLimits(38, 62))
     assert wide.cp == pytest.approx(2.29, abs=5e-3)
     assert wide.cp_interval == pytest.approx((1.57, 3.01), abs=1e-2)
-    narrow = capability([x / scale for x in unit], Limits(None, 3 * 1.33))
+    narrow = capability([x / scale for x in unit], ControlLimits(None, 3 * 1.33))
     assert (narrow.cp, narrow.cpk) == (None, pytest.approx(1.33))
     assert narrow.cpk_interval == pytest.approx((0.88, 1.78), abs=1e-2)
 
@@ -129,7 +129,7 @@ def test_capability_of_the_handbook() -> None:
     """6.1.6: limits 8 and 20, mean 16, deviation 2: Cp 1.0, Cpk 0.6667."""
     values = [16 - 2 * (2 / 3) ** 0.5, 16, 16, 16 + 2 * (2 / 3) ** 0.5]
     scale = (sum((v - 16) ** 2 for v in values) / 3) ** 0.5
-    state = capability([16 + 2 * (v - 16) / scale for v in values], Limits(8, 20))
+    state = capability([16 + 2 * (v - 16) / scale for v in values], ControlLimits(8, 20))
     assert (state.cp, state.cpk) == pytest.approx((1.0, 0.6667), abs=1e-4)
 
 
@@ -152,7 +152,7 @@ GAUGE = {
 }
 """AIAG, Measurement Systems Analysis: three appraisers, three trials, ten parts."""
 READINGS = [
-    Reading(str(part), operator, value)
+    GaugeReading(str(part), operator, value)
     for operator, trials in GAUGE.items()
     for trial in trials
     for part, value in enumerate(trial, start=1)

@@ -20,14 +20,16 @@ from PIL import Image
 from sbafab.errors import DesignError, OutputError
 from sbafab.results import store as store_module
 from sbafab.results.export import lab_history, write_history
-from sbafab.results.history import Entry, entries_of, read_history, standing_entries
+from sbafab.results.history import HistoryEntry, entries_of, read_history, standing_entries
 from sbafab.results.records import Build, LabResult
 from sbafab.results.store import Lab
 from tests.site.formats import hold
 
 Make = Callable[..., Build]
 SHA = "c0ffee" + 58 * "0"
-STEP = Entry(serial="A1", step="1", initials="AL", readings={"temperature_c": 134.5, "minutes": 20})
+STEP = HistoryEntry(
+    serial="A1", step="1", initials="AL", readings={"temperature_c": 134.5, "minutes": 20}
+)
 
 
 def picture(path: Path, colour: str = "red") -> Path:
@@ -40,10 +42,12 @@ def filled(lab: Lab, make_build: Make, tmp_path: Path) -> Lab:
     """Two devices, a correction, a photograph and two results."""
     lab.add_entries(SHA, make_build(), [STEP, replace(STEP, serial="A2")])
     lab.add(SHA, None, [LabResult("A1", "pass"), LabResult("A2", "fail")])
-    lab.correct_entry(1, Entry(readings={"temperature_c": 135.0}))
+    lab.correct_entry(1, HistoryEntry(readings={"temperature_c": 135.0}))
     photograph = str(picture(tmp_path / "rim.jpg"))
     lab.add_entries(
-        SHA, None, [Entry(serial="A2", decision="rework", reason="rim", photograph=photograph)]
+        SHA,
+        None,
+        [HistoryEntry(serial="A2", decision="rework", reason="rim", photograph=photograph)],
     )
     return lab
 
@@ -57,7 +61,7 @@ def test_lines_come_back_and_a_correction_is_a_line_of_its_own(filled: Lab) -> N
     assert entries[2].readings == {"temperature_c": 135.0, "minutes": 20.0}
     assert [entry.id for entry in standing_entries(entries)] == [2, 3, 4]
     with pytest.raises(DesignError, match="entry e1 is corrected by e3 already"):
-        filled.correct_entry(1, Entry(note="again"))
+        filled.correct_entry(1, HistoryEntry(note="again"))
     with pytest.raises(DesignError, match="A2 has this line already, entry e2"):
         filled.add_entries(SHA, None, [replace(STEP, serial="A2")])
 
@@ -237,9 +241,9 @@ def test_photographs_lie_beside_the_file_by_their_hash(filled: Lab, tmp_path: Pa
     picture(stored, "blue")
     assert name in filled.check().broken
     with pytest.raises(DesignError, match=r"no JPEG, PNG or WebP"):
-        filled.add_entries(SHA, None, [Entry(serial="A1", photograph=__file__)])
+        filled.add_entries(SHA, None, [HistoryEntry(serial="A1", photograph=__file__)])
     with pytest.raises(DesignError, match="cannot be read"):
-        filled.add_entries(SHA, None, [Entry(serial="A1", photograph="none.jpg")])
+        filled.add_entries(SHA, None, [HistoryEntry(serial="A1", photograph="none.jpg")])
 
 
 # Lines from files and forms.
@@ -345,7 +349,7 @@ def test_exports_hold_every_row_and_have_no_date_of_print(filled: Lab, tmp_path:
 
 
 def test_a_lot_that_had_expired_is_marked(lab: Lab, make_build: Make) -> None:
-    lot = Entry(serial="A1", item="TPE", lot="L7", expires="2026-01-31")
+    lot = HistoryEntry(serial="A1", item="TPE", lot="L7", expires="2026-01-31")
     days = ("2026-01-31", "2026-02-01")
     lab.add_entries(SHA, make_build(), [replace(lot, date=day) for day in days])
     assert [entry.is_expired for entry in lab.entries()] == [False, True]

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from sbafab.errors import DesignError
-from sbafab.results.control_charts import Limits
-from sbafab.results.history import Entry
+from sbafab.results.control_charts import ControlLimits
+from sbafab.results.history import HistoryEntry
 from sbafab.results.process_control import PAGE, ProcessControl, process_control, write_charts
 from sbafab.results.records import Build, LabResult
 from sbafab.results.store import Lab
@@ -23,13 +23,13 @@ Make = Callable[..., Build]
 SHA = "c0ffee" + 58 * "0"
 
 
-def lines(dice: random.Random, number: int, cold_from: int) -> list[Entry]:
+def lines(dice: random.Random, number: int, cold_from: int) -> list[HistoryEntry]:
     """A device: from ``cold_from`` on step 1 runs 4 degrees low, and the device leaks.
 
     Its lot changes at device 13, its operators take turns; neither matters.
     """
     is_cold = number >= cold_from
-    entry = Entry(date=f"2026-05-{3 + (number + 3) // 4:02d}", serial=f"B{number}")
+    entry = HistoryEntry(date=f"2026-05-{3 + (number + 3) // 4:02d}", serial=f"B{number}")
     warm = {"temperature_c": dice.gauss(134.5, 0.6) - 4 * is_cold}
     other = {"temperature_c": dice.gauss(135, 0.6)}
     decision = {"decision": "rework", "reason": "rim"} if is_cold else {"decision": "accept"}
@@ -45,7 +45,7 @@ def filled(lab: Lab, build: Build, cold_from: int, seed: int = 5) -> ProcessCont
     dice = random.Random(seed)
     rows = [line for number in range(1, 25) for line in lines(dice, number, cold_from)]
     lab.add_entries(SHA, build, rows)
-    return process_control(lab, {"temperature_c": Limits(130, 140)})
+    return process_control(lab, {"temperature_c": ControlLimits(130, 140)})
 
 
 def test_the_step_that_ran_cold_is_named_first(lab: Lab, make_build: Make, tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_two_failures_at_random_accuse_nobody(lab: Lab, make_build: Make) -> Non
 def test_a_cycle_of_several_devices_is_one_reading(lab: Lab, make_build: Make) -> None:
     for hour, value in enumerate((134.0, 135.0, 134.0)):
         then = datetime(2026, 5, 4, 8 + hour, tzinfo=UTC)
-        step = Entry(step="1", readings={"temperature_c": value}, note=f"cycle {hour}")
+        step = HistoryEntry(step="1", readings={"temperature_c": value}, note=f"cycle {hour}")
         cycle = [replace(step, serial=f"A{n}") for n in range(4)]
         Lab(lab.path, 1.0, partial(datetime.fromtimestamp, then.timestamp(), UTC)).add_entries(
             SHA, make_build(), cycle
@@ -121,9 +121,9 @@ def test_errors_are_held_against_the_stated_tolerances(lab: Lab, make_build: Mak
     lab.add(SHA, make_build(), [LabResult("A1", errors=errors)])
     [chart_set] = process_control(lab, {}).sets
     assert chart_set.capability is not None
-    assert chart_set.capability.limits == Limits(None, 0.2)
+    assert chart_set.capability.limits == ControlLimits(None, 0.2)
     with pytest.raises(DesignError, match="nothing is recorded of stroke_mm; recorded are offset"):
-        process_control(lab, {"stroke_mm": Limits(16, 18)})
+        process_control(lab, {"stroke_mm": ControlLimits(16, 18)})
 
 
 def test_too_few_records_are_one_sentence(lab: Lab, make_build: Make) -> None:

@@ -16,7 +16,7 @@ from sbafab.pressing.work_plan import (
     SORT_SHARE,
     TUBES_SHARE,
     UNPIN_SHARE,
-    Entry,
+    PlanEntry,
     clock,
     plan_times,
     serials,
@@ -161,7 +161,7 @@ def _summary(work: Work, runs: Runs) -> str:
     )
 
 
-def _charts(work: Work, entries: Sequence[Entry]) -> Iterator[str]:
+def _charts(work: Work, entries: Sequence[PlanEntry]) -> Iterator[str]:
     """Yield a chart of each day; none for a plan of more days than a reader turns pages for."""
     days = max((entry.day for entry in entries), default=0)
     if not entries or days > MOST_DAYS:
@@ -177,7 +177,7 @@ def _charts(work: Work, entries: Sequence[Entry]) -> Iterator[str]:
         yield picture.svg()
 
 
-def _plan(work: Work, entries: Sequence[Entry]) -> tuple[PlanRow, ...]:
+def _plan(work: Work, entries: Sequence[PlanEntry]) -> tuple[PlanRow, ...]:
     """Return the work of every day that takes hands, in its order."""
     hands = [entry for entry in entries if entry.technician]
     closings = {(e.cycle, e.step): e for e in entries if e.task == "press"}
@@ -197,7 +197,7 @@ def _plan(work: Work, entries: Sequence[Entry]) -> tuple[PlanRow, ...]:
     )
 
 
-def _task(work: Work, entry: Entry, closing: Entry | None) -> str:
+def _task(work: Work, entry: PlanEntry, closing: PlanEntry | None) -> str:
     """Return what a row of the plan is, with press and plate where there are several."""
     shop = shop_of(work.design)
     plate = f" {entry.plate}" if shop.plates > 1 else ""
