@@ -30,7 +30,7 @@ SUMMARIES = {
     "nest": "Cut several designs from the same film sheets.",
     "stock": "Show what an output folder takes of the film in stock.",
     "kerf": "Compute the kerf from a filled coupon.csv.",
-    "inspect": "Compare a scan of a cut sheet with its cut file.",
+    "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",
     "predict": "Predict size, stroke, force, time and bending.",
     "map": "Map force and volume of the balloons.",
     "picture": "Draw the inflated actuator as picture, animation or scene.",

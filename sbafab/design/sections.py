@@ -73,7 +73,12 @@ class Order(Section):
     @classmethod
     def _is_short_name(cls, batch: object) -> object:
         text = str(batch) if type(batch) is int else batch
-        if isinstance(text, str) and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.]{0,11}", text):
+        # What cannot be printed is named by the check that all texts have.
+        if (
+            isinstance(text, str)
+            and text.isprintable()
+            and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9.]{0,11}", text)
+        ):
             raise ValueError(
                 "must be 1 to 12 letters, digits or dots, beginning with a letter or digit"
             )

@@ -88,7 +88,7 @@ def check(measures: Measures) -> list[Finding]:
     verdict: Verdict = "pass" if good else "fail"
     finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
     holes = [_of_holes(on_holes)] if on_holes else []
-    return [finding, *_unlike(fits), *holes]
+    return [finding, *(_unlike(fits) if good else ()), *holes]
 
 
 def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
