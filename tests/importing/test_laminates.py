@@ -66,7 +66,11 @@ def holes(dxf: bytes) -> bytes:
 
 def untimed(press: bytes) -> bytes:
     """A press.json without minutes of work by hand and in all."""
-    return re.sub(rb'"(hands_minutes|total_minutes)": [0-9.nul]+', rb'"\1": null', press)
+    return re.sub(
+        rb'"(hands_minutes|estimated_build_minutes|estimate_basis)": (?:"[^"]*"|[0-9.nul]+)',
+        rb'"\1": null',
+        press,
+    )
 
 
 def imported(folder: Path, file: Path) -> Written:
