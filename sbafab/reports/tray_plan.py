@@ -23,6 +23,8 @@ GAP, WORDS, HEADING = 2.5, 2.6, 3.4
 """mm between two places, and the sizes of labels and of a step's heading."""
 LABEL = 3.6
 """mm of a place, below its part, for the label."""
+LETTER = 0.58
+"""Mean width of a label's letter, of its size: a little more than Helvetica's digits have."""
 MOST_NAMED = 8
 """Serials of a place that stand in its heading; of more, the first and the last."""
 
@@ -128,7 +130,7 @@ class _Flow:
         row: list[tuple[Layer, Region]] = []
         x = SIDE
         for layer, region in parts:
-            wide = region.bounds[2] - region.bounds[0]
+            wide = _width(layer, region)
             if row and x + wide > self.size[0] - SIDE:
                 yield row
                 row, x = [], SIDE
@@ -139,11 +141,20 @@ class _Flow:
     def _lay(self, row: Sequence[tuple[Layer, Region]], high: float) -> None:
         x = SIDE
         for layer, region in row:
-            low_x, low_y, high_x, _ = region.bounds
+            low_x, low_y = region.bounds[:2]
             at = x - low_x, self.top - high + LABEL - low_y
             self.places.append(TrayPlace(layer, region, at))
-            x += high_x - low_x + GAP
+            x += _width(layer, region) + GAP
         self.top -= high + GAP
+
+
+def _label(layer: Layer) -> str:
+    return f"{layer.index} {layer.pattern}"
+
+
+def _width(layer: Layer, region: Region) -> float:
+    """Return the width of a place, mm: that of its part or of its label, if that is wider."""
+    return max(region.bounds[2] - region.bounds[0], LETTER * WORDS * len(_label(layer)))
 
 
 def _height(region: Region) -> float:
@@ -196,5 +207,5 @@ def _drawn(sheet: TraySheet) -> PdfPage:
         low_x, low_y = place.region.bounds[:2]
         page.stroke(GREY, 0.1)
         at = place.at[0] + low_x, place.at[1] + low_y - LABEL + 0.6
-        page.text(at, f"{place.layer.index} {place.layer.pattern}", WORDS)
+        page.text(at, _label(place.layer), WORDS)
     return page
