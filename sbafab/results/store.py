@@ -122,24 +122,25 @@ CREATE TRIGGER {name} BEFORE {what} BEGIN
     SELECT RAISE(ABORT, 'records are never changed; add one that corrects');
 END
 """
+
+
+def _unchanging(*tables: str) -> dict[str, str]:
+    """Return triggers of changes to rows of these tables, by name."""
+    return {
+        f"{table}_{verb}": f"{verb} ON {table}" for table in tables for verb in ("UPDATE", "DELETE")
+    }
+
+
 # REPLACE deletes rows without asking the triggers of deletion.
 _TRIGGERS = {
-    **{
-        f"{table}_{verb}": f"{verb} ON {table}"
-        for table in ("design", "result")
-        for verb in ("UPDATE", "DELETE")
-    },
+    **_unchanging("design", "result"),
     "design_twice": "INSERT ON design WHEN EXISTS "
     "(SELECT 1 FROM design WHERE sha256 = NEW.sha256 AND generator = NEW.generator)",
     "result_twice": "INSERT ON result WHEN EXISTS "
     "(SELECT 1 FROM result WHERE id = NEW.id OR corrects = NEW.corrects)",
 }
 _TRIGGERS_ADDED = {
-    **{
-        f"{table}_{verb}": f"{verb} ON {table}"
-        for table in ("entry", "chain")
-        for verb in ("UPDATE", "DELETE")
-    },
+    **_unchanging("entry", "chain"),
     "entry_twice": "INSERT ON entry WHEN EXISTS "
     "(SELECT 1 FROM entry WHERE id = NEW.id OR corrects = NEW.corrects)",
     "chain_twice": "INSERT ON chain WHEN EXISTS (SELECT 1 FROM chain WHERE id = NEW.id "
