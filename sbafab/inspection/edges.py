@@ -230,8 +230,8 @@ def fitted(picture: ScanPicture, sheet: DrawnSheet, location: Location, is_camer
     fit: EdgeFit | None = None
     for reach in REACHES:
         laid = moved(samples, displacements)
-        seen = crossings(picture, warp, laid, min(reach, 0.9 * sheet.spacing), offset)
-        fit = _solved(laid, warp, seen, displacements, looseness)
+        measured = crossings(picture, warp, laid, min(reach, 0.9 * sheet.spacing), offset)
+        fit = _solved(laid, warp, measured, displacements, looseness)
         warp, offset, displacements = fit.warp, fit.offset, fit.displacements
         looseness = max(TIGHT, 1.5 * float(np.median(np.abs(displacements[:, :2]))))
     assert fit is not None
@@ -268,7 +268,7 @@ def _rigid(samples: Samples, count: int) -> NDArray[np.float64]:
 def _solved(
     laid: Samples,
     warp: Warp,
-    seen: Crossings,
+    measured: Crossings,
     displacements: NDArray[np.float64],
     looseness: float,
 ) -> EdgeFit:
@@ -276,10 +276,10 @@ def _solved(
     matrix, terms = _matrix(laid, warp, len(displacements))
     strength = _strength(matrix, laid, displacements, terms)
     before = np.concatenate([np.zeros(1 + 2 * terms), displacements.ravel()])
-    is_seen = np.isfinite(seen.outside)
-    outside = np.where(is_seen, seen.outside, 0.0)
+    is_seen = np.isfinite(measured.outside)
+    outside = np.where(is_seen, measured.outside, 0.0)
     weights = is_seen.astype(float)
-    scale = float(np.median(np.abs(seen.outside[is_seen]))) if is_seen.any() else 1.0
+    scale = float(np.median(np.abs(measured.outside[is_seen]))) if is_seen.any() else 1.0
     for _ in range(ROUNDS):
         weighted = matrix * weights[:, None]
         stiffness = strength * max(scale, 0.004) ** 2 * NEIGHBOURS / looseness**2
@@ -302,8 +302,8 @@ def _solved(
         uncertainty=uncertainty,
         degrees=degrees,
         displacements=displacements + solution[1 + 2 * terms :].reshape(-1, 3),
-        blur=seen.blur,
-        contrast=seen.contrast,
+        blur=measured.blur,
+        contrast=measured.contrast,
     )
 
 

@@ -101,9 +101,9 @@ def inspect_picture(
     ``is_camera``: taken with perspective. ``is_light``: film is lighter than what it lies on.
     Raises DesignError where the picture does not show the sheet, or too little of it.
     """
-    seen = outlines(picture)
+    measured = outlines(picture)
     size = picture.pixels.shape[0], picture.pixels.shape[1]
-    location = locate(sheet, seen, size, reference.pixels_per_mm, is_light, is_camera)
+    location = locate(sheet, measured, size, reference.pixels_per_mm, is_light, is_camera)
     fit = fitted(picture, sheet, location, is_camera)
     known = fit.weights > 0
     if known.sum() < FEWEST:
@@ -111,7 +111,7 @@ def inspect_picture(
             f"{picture.path.name} shows {int(known.sum())} places on edges of {sheet.name}, and "
             f"{FEWEST} are needed; scan at a higher resolution, or more of the sheet"
         )
-    scale = scale_of(picture, sheet, fit, seen, reference)
+    scale = scale_of(picture, sheet, fit, measured, reference)
     pixel = 1 / math.sqrt(math.prod(fit.warp.pixels_per_mm(np.array(fit.warp.centre))))
     residuals = np.abs(fit.residuals[known])
     return Inspection(
@@ -124,7 +124,7 @@ def inspect_picture(
         rms=math.sqrt(float((residuals**2).mean())),
         within_95=float(np.percentile(residuals, 95)),
         pixel=pixel,
-        pieces=tuple(piece_findings(picture, sheet, location, fit, seen)),
+        pieces=tuple(piece_findings(picture, sheet, location, fit, measured)),
     )
 
 
@@ -250,8 +250,8 @@ def _embedded(picture: ScanPicture) -> str:
 def _coloured(inspection: Inspection, factor: float) -> Iterator[str]:
     """Yield lines along the edges as seen, each of one colour."""
     fit = inspection.fit
-    seen = np.isfinite(fit.outside) & (fit.weights > 0)
-    kinds = np.where(seen, np.digitize(fit.residuals, STEPS), len(COLOURS))
+    measured = np.isfinite(fit.outside) & (fit.weights > 0)
+    kinds = np.where(measured, np.digitize(fit.residuals, STEPS), len(COLOURS))
     at = (fit.warp(fit.samples.points) + 0.5) * factor
     contours = fit.samples.contours
     cuts = np.nonzero((np.diff(contours) != 0) | (np.diff(kinds) != 0))[0] + 1

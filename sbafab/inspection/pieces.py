@@ -96,10 +96,10 @@ def piece_findings(
     sheet: DrawnSheet,
     location: Location,
     fit: EdgeFit,
-    seen: Sequence[PictureOutline],
+    measured: Sequence[PictureOutline],
 ) -> list[PieceFinding]:
     """Return a finding for each place of the sheet."""
-    blobs = _blobs(location, fit, seen)
+    blobs = _blobs(location, fit, measured)
     holders = _holders(sheet, blobs)
     is_skeleton = location.content == "skeleton"
     findings = []
@@ -127,11 +127,11 @@ def _middle(piece: Region) -> PointArray:
     return np.array([(low_x + high_x) / 2, (low_y + high_y) / 2])
 
 
-def _blobs(location: Location, fit: EdgeFit, seen: Sequence[PictureOutline]) -> list[Blob]:
+def _blobs(location: Location, fit: EdgeFit, measured: Sequence[PictureOutline]) -> list[Blob]:
     is_film = location.content == "pieces"
     in_mm = [
         (outline, points, *moments(points))
-        for outline in seen
+        for outline in measured
         for points in [fit.warp.inverse(outline.points)]
     ]
     least = SMALLEST
@@ -196,9 +196,9 @@ def _strange_holes(piece: Region, blob: Blob) -> list[PointArray]:
 
 def _shut_holes(piece: Region, blob: Blob) -> list[PointArray]:
     """Return the middles of a piece's holes that a blob does not show."""
-    seen = [hole.mean(axis=0) for hole in blob.holes]
+    measured = [hole.mean(axis=0) for hole in blob.holes]
     drawn = [polyline(hole, 0.2).mean(axis=0) for hole in piece.holes if -hole.area > SMALLEST]
-    return [d for d in drawn if all(math.dist(m, d) > HOLE_PLACE for m in seen)]
+    return [d for d in drawn if all(math.dist(m, d) > HOLE_PLACE for m in measured)]
 
 
 def _finding(
@@ -293,8 +293,8 @@ def _partial_matches(
     """Yield the shape, unmirrored and mirrored, laid on the edges round a place."""
     from scipy.spatial import cKDTree
 
-    seen = np.vstack([_dense(points) for points in near])
-    tree = cKDTree(seen)
+    measured = np.vstack([_dense(points) for points in near])
+    tree = cKDTree(measured)
     contours = [c for c in shape.region.contours if not c.is_hole or -c.area > SMALLEST]
     drawn = np.vstack([polyline(contour, 0.3) for contour in contours])
     drawn -= _middle(shape.region)
@@ -307,7 +307,7 @@ def _partial_matches(
         )
         best: PartialMatch | None = None
         for _, _, angle in guesses[:3]:
-            matrix, shift = _aligned(tree, seen, arms, (_spun(angle), start), 1.0)
+            matrix, shift = _aligned(tree, measured, arms, (_spun(angle), start), 1.0)
             share = float((tree.query(arms @ matrix.T + shift)[0] < SAME_SHAPE).mean())
             turn = math.degrees(math.atan2(matrix[1, 0], matrix[0, 0]))
             if best is None or share > best.share + 0.01:
@@ -390,10 +390,10 @@ def _matches(shape: SheetShape, blob: Blob, is_skeleton: bool) -> Iterator[Match
         return
     contours = [*shape.region.outers, *holes]
     drawn = np.vstack([polyline(contour, 0.15) for contour in contours])
-    seen = np.vstack([_sparse(points) for points in (blob.outline, *blob.holes)])
+    measured = np.vstack([_sparse(points) for points in (blob.outline, *blob.holes)])
     for is_mirrored in (False, True):
         laid = drawn * (-1, 1) if is_mirrored else drawn
-        turn, shift, misfit = laid_on(laid, seen, blob.outline)
+        turn, shift, misfit = laid_on(laid, measured, blob.outline)
         yield Match(shape.name, is_mirrored, turn, shift, misfit)
 
 
@@ -401,14 +401,16 @@ def _sparse(points: PointArray) -> PointArray:
     return points[:: max(1, len(points) // 150)]
 
 
-def laid_on(drawn: PointArray, seen: PointArray, outline: PointArray) -> tuple[float, float, float]:
+def laid_on(
+    drawn: PointArray, measured: PointArray, outline: PointArray
+) -> tuple[float, float, float]:
     """Return degrees and mm of the rigid motion that lays drawn points on seen, and the misfit.
 
     The shift is that of the middle of the drawn points.
     """
     from scipy.spatial import cKDTree
 
-    tree = cKDTree(seen)
+    tree = cKDTree(measured)
     _, middle = moments(outline)
     start = drawn.mean(axis=0)
     # Centroids of outlines agree whatever the turn.
@@ -421,9 +423,9 @@ def laid_on(drawn: PointArray, seen: PointArray, outline: PointArray) -> tuple[f
     costs = [float(tree.query(sparse @ _spun(a).T + middle)[0].mean()) for a in angles]
     # Of turns that fit as well, the least.
     best = next(a for a, c in zip(angles, costs, strict=True) if c <= min(costs) + AS_GOOD)
-    matrix, shift = _aligned(tree, seen, arms, (_spun(float(best)), middle), math.inf)
+    matrix, shift = _aligned(tree, measured, arms, (_spun(float(best)), middle), math.inf)
     laid = arms @ matrix.T + shift
-    there, back = tree.query(laid)[0], cKDTree(laid).query(seen)[0]
+    there, back = tree.query(laid)[0], cKDTree(laid).query(measured)[0]
     misfit = float(max(np.percentile(there, 95), np.percentile(back, 95)))
     moved = laid.mean(axis=0) - start
     return math.degrees(math.atan2(matrix[1, 0], matrix[0, 0])), math.hypot(*moved), misfit
@@ -436,7 +438,7 @@ def _spun(radians: float) -> NDArray[np.float64]:
 
 def _aligned(
     tree: Any,
-    seen: PointArray,
+    measured: PointArray,
     arms: PointArray,
     guess: tuple[NDArray[np.float64], PointArray],
     reach: float,
@@ -448,7 +450,7 @@ def _aligned(
         near = distance < reach
         if near.sum() < 8:
             break
-        target, start = seen[nearest[near]], arms[near]
+        target, start = measured[nearest[near]], arms[near]
         a, b = start - start.mean(axis=0), target - target.mean(axis=0)
         dot, cross = float((a * b).sum()), float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
         matrix = _spun(math.atan2(cross, dot))

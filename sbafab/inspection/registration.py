@@ -171,7 +171,7 @@ class _Pose:
 
 def locate(
     sheet: DrawnSheet,
-    seen: Sequence[PictureOutline],
+    measured: Sequence[PictureOutline],
     size: tuple[int, int],
     pixels_per_mm: float | None,
     is_light: bool,
@@ -186,7 +186,7 @@ def locate(
     contents: tuple[Content, ...] = ("pieces", "skeleton")
     for content in contents:
         targets = targets_of(sheet, content)
-        finder = _Finder(targets, seen, size, pixels_per_mm, is_light, is_camera)
+        finder = _Finder(targets, measured, size, pixels_per_mm, is_light, is_camera)
         pose = finder.best_pose()
         if pose is None:
             continue
@@ -210,7 +210,7 @@ class _Finder:
     def __init__(
         self,
         targets: Sequence[Target],
-        seen: Sequence[PictureOutline],
+        measured: Sequence[PictureOutline],
         size: tuple[int, int],
         pixels_per_mm: float | None,
         is_light: bool,
@@ -224,17 +224,17 @@ class _Finder:
         self.places = np.array([complex(*target.centroid) for target in targets])
         self.areas = np.array([target.area for target in targets])
         self.is_film = np.array([target.side == "film" for target in targets])
-        self.seen = seen
-        self.seen_places = np.array([complex(*outline.centroid) for outline in seen])
-        self.seen_areas = np.array([outline.area for outline in seen])
-        self.seen_film = np.array([outline.is_light == is_light for outline in seen])
+        self.measured = measured
+        self.measured_places = np.array([complex(*outline.centroid) for outline in measured])
+        self.measured_areas = np.array([outline.area for outline in measured])
+        self.measured_film = np.array([outline.is_light == is_light for outline in measured])
         spread = np.abs(self.places - self.places.mean()).max()
         # What a similarity leaves of perspective, or of tilt and unequal scales.
         self.reach = max(0.5, (0.035 if is_camera else 0.006) * float(spread))
         self.same_area = SAME_AREA * (2 if is_camera else 1)
 
     def best_pose(self) -> _Pose | None:
-        if not self.seen:
+        if not self.measured:
             return None
         best: tuple[tuple[int, int, bool, int, float], _Pose] | None = None
         for pose in self._poses():
@@ -282,17 +282,17 @@ class _Finder:
     def _poses_of(self, first: int, other: int) -> Iterator[_Pose]:
         """Yield the similarities that lay two targets on two outlines of their areas."""
         across = self.places[other] - self.places[first]
-        apart = self.seen_places[None, :] - self.seen_places[:, None]
+        apart = self.measured_places[None, :] - self.measured_places[:, None]
         stretch = np.abs(apart) / abs(across)
         with np.errstate(divide="ignore", invalid="ignore"):
             fits = stretch > 0
             for ratio in (
-                self.seen_areas[:, None] / self.areas[first] / stretch**2,
-                self.seen_areas[None, :] / self.areas[other] / stretch**2,
+                self.measured_areas[:, None] / self.areas[first] / stretch**2,
+                self.measured_areas[None, :] / self.areas[other] / stretch**2,
             ):
                 fits &= np.abs(ratio - 1) < self.same_area
-        fits &= (self.seen_film == self.is_film[first])[:, None]
-        fits &= (self.seen_film == self.is_film[other])[None, :]
+        fits &= (self.measured_film == self.is_film[first])[:, None]
+        fits &= (self.measured_film == self.is_film[other])[None, :]
         if self.scale is not None:
             fits &= np.abs(stretch / self.scale - 1) < 0.5 * SAME_AREA
         for i, j in zip(*np.nonzero(fits), strict=True):
@@ -300,19 +300,19 @@ class _Finder:
                 along = across if from_below else across.conjugate()
                 start = self.places[first] if from_below else self.places[first].conjugate()
                 scale_turn = complex(apart[i, j] / along)
-                shift = complex(self.seen_places[i] - scale_turn * start)
+                shift = complex(self.measured_places[i] - scale_turn * start)
                 yield _Pose(scale_turn, shift, from_below)
 
     def _single_poses(self) -> Iterator[_Pose]:
         """Yield upright poses of a sheet of a single outline, on outlines of that tone."""
         largest = int(self.areas.argmax())
-        for k in np.nonzero(self.seen_film == self.is_film[largest])[0][:20]:
-            scale = math.sqrt(self.seen_areas[k] / self.areas[largest])
+        for k in np.nonzero(self.measured_film == self.is_film[largest])[0][:20]:
+            scale = math.sqrt(self.measured_areas[k] / self.areas[largest])
             if self.scale is not None and abs(scale / self.scale - 1) > 0.5 * SAME_AREA:
                 continue
             for quarter in (1, 1j, -1, -1j):
                 turned = scale * quarter
-                shift = self.seen_places[k] - turned * self.places[largest].conjugate()
+                shift = self.measured_places[k] - turned * self.places[largest].conjugate()
                 yield _Pose(complex(turned), complex(shift), False)
 
     def _matches(
@@ -320,11 +320,11 @@ class _Finder:
     ) -> NDArray[np.int64]:
         """Return the index of the nearest fitting outline of each target, or -1."""
         per_mm = abs(scale)
-        distance = np.abs(pixels[:, None] - self.seen_places[None, :])
-        ratio = self.seen_areas[None, :] / (self.areas[:, None] * per_mm**2)
+        distance = np.abs(pixels[:, None] - self.measured_places[None, :])
+        ratio = self.measured_areas[None, :] / (self.areas[:, None] * per_mm**2)
         # A small hole is enlarged by the kerf by a larger share.
         room = self.same_area + 1.2 / np.sqrt(self.areas[:, None])
-        misfit = (np.abs(ratio - 1) > room) | (self.seen_film[None, :] != self.is_film[:, None])
+        misfit = (np.abs(ratio - 1) > room) | (self.measured_film[None, :] != self.is_film[:, None])
         distance[misfit] = np.inf
         nearest = distance.argmin(axis=1)
         is_near = distance[np.arange(len(nearest)), nearest] < reach * per_mm
@@ -342,8 +342,8 @@ class _Finder:
         for reach in (self.reach, self.reach, 0.5 * self.reach, max(0.4, 0.25 * self.reach)):
             known = matches >= 0
             if known.sum() >= 3:
-                seen = self.seen_places[matches[known]]
-                pixels = np.column_stack([seen.real, seen.imag])
+                measured = self.measured_places[matches[known]]
+                pixels = np.column_stack([measured.real, measured.imag])
                 base = _fitted(points[known], pixels, self.is_camera)
                 warp = warp if base is None else replace(warp, base=base)
             at = warp(points)

@@ -59,12 +59,12 @@ def scale_of(
     picture: ScanPicture,
     sheet: DrawnSheet,
     fit: EdgeFit,
-    seen: Sequence[PictureOutline],
+    measured: Sequence[PictureOutline],
     reference: Reference,
 ) -> Scale:
     """Return the film's scale by the reference. Raises DesignError where that is not seen."""
     if reference.bar is not None:
-        scale = _by_bar(picture, sheet, fit, seen, reference.bar)
+        scale = _by_bar(picture, sheet, fit, measured, reference.bar)
         return Scale(scale, scale, f"the bar of {reference.bar:g} mm")
     if reference.pins:
         scale = _by_pins(picture, sheet, fit)
@@ -84,11 +84,11 @@ def _by_bar(
     picture: ScanPicture,
     sheet: DrawnSheet,
     fit: EdgeFit,
-    seen: Sequence[PictureOutline],
+    measured: Sequence[PictureOutline],
     length: float,
 ) -> float:
     low_x, low_y, high_x, high_y = sheet.bounds
-    for outline in seen:
+    for outline in measured:
         points = fit.warp.inverse(outline.points)
         area, middle = moments(points)
         arms = points - middle
@@ -140,8 +140,8 @@ def _by_pins(picture: ScanPicture, sheet: DrawnSheet, fit: EdgeFit) -> float:
             f"{len(sheet.pins)}; give --dpi or --bar"
         )
     drawn = np.array([(x, y) for x, y, _ in sheet.pins])
-    seen = np.array([_pin(picture, fit, pin) for pin in sheet.pins])
-    a, b = drawn - drawn.mean(axis=0), seen - seen.mean(axis=0)
+    measured = np.array([_pin(picture, fit, pin) for pin in sheet.pins])
+    a, b = drawn - drawn.mean(axis=0), measured - measured.mean(axis=0)
     return math.sqrt(float((a**2).sum() / (b**2).sum()))
 
 

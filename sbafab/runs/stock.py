@@ -56,9 +56,9 @@ class FilmPiece(Section):
     thickness: Annotated[float, Millimetres(SHORTEST, 1)]
     """The film's thickness."""
     width: PieceSize
-    """PieceSize along x, as it lies on the machine."""
+    """Size along x, as it lies on the machine."""
     length: PieceSize
-    """PieceSize along y."""
+    """Size along y."""
     count: int = Field(default=1, ge=1, le=1000)
     """How many there are."""
     rest: bool = False
