@@ -65,13 +65,15 @@ def test_datum_can_be_left_out(plate: Region) -> None:
     assert read_profile(dxf_text(cutting_order(plate), {}, sheet=Surroundings())).other == ()
 
 
-def test_no_bulge_turns_more_than_a_quarter() -> None:
-    half = Arc((0.0, -2.0), (0.0, 2.0), (0.0, 0.0), 2.0, True)
-    text = dxf_text([Contour((half, Line((0.0, 2.0), (0.0, -2.0))))], {})
+@pytest.mark.parametrize("radius", [2.0, 0.25])
+def test_no_bulge_turns_more_than_a_quarter(radius: float) -> None:
+    low, high = (0.0, -radius), (0.0, radius)
+    half = Arc(low, high, (0.0, 0.0), radius, True)
+    text = dxf_text([Contour((half, Line(high, low)))], {})
     polyline = text.split("AcDbPolyline\n")[1].split("  0\n")[0]
     bulges = [float(value) for value in re.findall(r"\n 42\n(.*)", polyline)]
     assert bulges == pytest.approx([math.tan(math.pi / 8)] * 2, abs=1e-9)
-    assert math.isclose(read_profile(text).region.area, 2 * math.pi, rel_tol=1e-8)
+    assert math.isclose(read_profile(text).region.area, math.pi / 2 * radius**2, rel_tol=1e-8)
 
 
 def test_a_large_bulge_from_elsewhere_is_read_exactly(plate_text: str) -> None:

@@ -16,7 +16,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.lettering import GLYPHS, strokes, width
 from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import CutSettings
-from sbafab.cutting.sheets import SheetFile, write_sheets
+from sbafab.cutting.sheets import SheetFile, label, write_sheets
 from sbafab.errors import OutputError
 from sbafab.geometry.region import disc, rectangle, stadium
 from sbafab.nesting.nest import nest
@@ -112,6 +112,16 @@ def test_a_label_makes_way_for_pins(tmp_path: Path) -> None:
         [ring_nest(1, replace(STOCK, pins=tuple(pins)))], tmp_path, SETTINGS, MACHINE
     )
     assert full.label == "no room"
+
+
+@pytest.mark.parametrize(("gap", "stays"), [(0.1, True), (-0.1, False)])
+def test_a_label_stays_where_a_pin_s_edge_is_clear_of_it(gap: float, stays: bool) -> None:
+    """Letters are half of the border high, 3 mm, and begin at its corner; the pin is 2 mm thick."""
+    end = 6.0 + 3.0 * width("TPE", 1.0)
+    pinned = replace(STOCK, pins=((end + 1.0 + gap, 3.0, 2.0),))
+    alone = label("TPE", STOCK, 80.0)
+    assert alone
+    assert (label("TPE", pinned, 80.0) == alone) is stays
 
 
 def test_a_label_that_is_too_long_is_turned_or_wrapped(tmp_path: Path) -> None:

@@ -285,6 +285,23 @@ def test_a_pocket_with_a_hole_at_its_edge_has_no_port_of_its_own() -> None:
     assert blind_ends(axis, [*ways, Terminal((7.0, 2.2), 0.6, False)], 2.0) == []
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("longer", [0, 1])
+def test_two_blind_ends_beside_each_other_are_both_named(side: int, longer: int) -> None:
+    """A channel between two ports with two branches 0.5 mm wide, 1.5 mm apart, 6 and 4 mm long."""
+    lengths = (6.0, 4.0) if longer == 0 else (4.0, 6.0)
+    void = strip((0.0, 0.0), (10.0, 0.0), 0.5)
+    for x, length in zip((4.0, 5.5), lengths, strict=True):
+        void |= strip((x, 0.0), (x, side * length), 0.5)
+    ways = [Terminal((0.2, 0.0), 0.0, True), Terminal((9.8, 0.0), 0.0, True)]
+    ends = blind_ends(axis_of(void, 0.5), ways, 2.0)
+    assert sorted(end.at[0] for end in ends) == pytest.approx([4.0, 5.5], abs=0.2)
+    for end in ends:
+        assert end.width == pytest.approx(0.5, abs=0.05)
+        # From the channel's edge, by half of the way round it.
+        assert end.depth == pytest.approx(lengths[end.at[0] > 4.75] - 0.25, abs=0.2)
+
+
 def test_a_name_that_the_design_lacks_gets_the_nearest_or_what_to_give() -> None:
     netlist = Netlist({"a": ("p", "q"), "b": ("r", "ss"), "c": ("outlet",)})
     findings = netlist_findings(laminate_of(straight()), LIMITS, netlist, "nets.json")
