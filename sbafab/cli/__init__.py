@@ -30,6 +30,7 @@ SUMMARIES = {
     "nest": "Cut several designs from the same film sheets.",
     "stock": "Show what an output folder takes of the film in stock.",
     "kerf": "Compute the kerf from a filled coupon.csv.",
+    "recipe": "Take power and speed of a film from a filled testgrid.csv.",
     "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",
     "predict": "Predict size, stroke, force, time and bending.",
     "map": "Map force and volume of the balloons.",

@@ -499,7 +499,7 @@ def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
     """Return the separator of the columns, and their names in small letters."""
     where, line = first
     separator = max(SEPARATORS, key=line.count)
-    names = [name.lower() for name in _cells(line, separator, where)]
+    names = [name.lower() for name in row_cells(line, separator, where)]
     while names and not names[-1]:
         names.pop()
     for column in COLUMNS:
@@ -513,21 +513,22 @@ def _header(path: Path, first: tuple[str, str]) -> tuple[str, list[str]]:
 
 def _row(line: str, separator: str, count: int, where: str) -> list[str]:
     """The cells of a row: parted like the header, or what stands behind a semicolon is the last."""
-    cells = _cells(line, separator, where)
+    cells = row_cells(line, separator, where)
     if separator != "," or ";" not in line:
         return cells
-    parted = _cells(line, ";", where)
+    parted = row_cells(line, ";", where)
     while len(parted) > 1 and not parted[-1]:
         parted.pop()
     if len(parted) == count:
         return parted
-    first = _cells(parted[0], ",", where)
+    first = row_cells(parted[0], ",", where)
     if len(parted) == 2 and len(first) == count and not first[-1]:
         return [*first[:-1], parted[1]]
     return cells
 
 
-def _cells(line: str, separator: str, where: str) -> list[str]:
+def row_cells(line: str, separator: str, where: str) -> list[str]:
+    """The cells of a row of a table, blanks round them removed. Raises DesignError."""
     try:
         row: Iterator[list[str]] = csv.reader([line], delimiter=separator, strict=True)
         return [cell.strip() for cell in next(row)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -25,15 +25,18 @@ from sbafab.cutting.properties import (
     ENGRAVE,
     REFERENCE,
     CutSettings,
+    Recipes,
     file_properties,
     kerf_suffix,
 )
 from sbafab.cutting.second_cut import PATH, laser_path, marks, properties_of
 from sbafab.cutting.verify import TOLERANCE
+from sbafab.design.recipes import Recipe
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.region import Region, coord
+from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.markup import quoteattr
 
@@ -48,6 +51,9 @@ CUT_MODE = "Cut"
 """What LightBurn calls Line: the beam follows the line."""
 MOST_TURN = math.radians(45)
 POWERS = ("minPower", "maxPower", "minPower2", "maxPower2")
+PASSES = "numPasses"
+"""How often a layer is followed; LightBurn's own is once."""
+NO_RECIPES: Recipes = {}
 ORDER = {"Optimize_ByLayer": 0, "Optimize_ByGroup": -1, "Optimize_ByPriority": 1}
 """Layers in their order, then shapes in the order of the file."""
 NOT_OPTIMIZED = (
@@ -62,10 +68,78 @@ NOT_OPTIMIZED = (
     "RemoveOverlaps",
     "OptimalEntryPoint",
 )
-ADVICE = (
-    "Powers are 0: set power and speed of each layer for this film. Leave kerf offset 0 and the "
+CHECKS = (
+    "Leave kerf offset 0 and the "
     "frame (REFERENCE) without output. The engraved label must read from left to right"
 )
+ADVICE = f"Powers are 0: set power and speed of each layer for this film. {CHECKS}"
+
+
+class LaserLayer(NamedTuple):
+    """Settings of a layer of a project: power in %, speed in mm/s; at power 0 nothing is fired."""
+
+    layer: str
+    cut_index: int
+    name: str
+    power: float = 0.0
+    speed: float | None = None
+    passes: int = 1
+    is_output: bool = True
+
+    def values(self, rank: int) -> dict[str, str]:
+        """The settings as they stand in the project, at this place of the order."""
+        # A power of 0 fires nothing, where one left out is the reader's guess.
+        at_power = {} if self.speed is None else {"speed": f"{self.speed:g}", PASSES: self.passes}
+        values = {
+            "index": self.cut_index,
+            "name": self.name,
+            **dict.fromkeys(POWERS, f"{self.power:g}"),
+            **at_power,
+            "kerf": 0,
+            "priority": rank,
+            "doOutput": int(self.is_output),
+        }
+        return {name: str(value) for name, value in values.items()}
+
+
+def sheet_layers(used: Collection[str], recipes: Recipes) -> list[LaserLayer]:
+    """Return the layers of a sheet in their order, with power and speed where there is a recipe."""
+    return [_sheet_layer(layer, recipes) for layer in INDICES if layer in used]
+
+
+def _sheet_layer(layer: str, recipes: Recipes) -> LaserLayer:
+    index = INDICES[layer]
+    if layer == REFERENCE:
+        return LaserLayer(layer, index, f"{layer}: not cut", is_output=False)
+    recipe = recipes.get("engrave" if layer == ENGRAVE else "cut")
+    if recipe is None:
+        return LaserLayer(layer, index, f"{layer}: set power and speed")
+    name = f"{layer}: {recipe.settings}"
+    return LaserLayer(layer, index, name, recipe.power_percent, recipe.speed_mm_s, recipe.passes)
+
+
+def advice_of(settings: CutSettings, material: Material) -> str:
+    """Return what the user must know of a film's project: which powers are set, and from where."""
+    if settings.machine is None:
+        return ADVICE
+    recipes = settings.recipes.get(material, NO_RECIPES)
+    lines = [
+        f"To {recipe.operation} {recipe.film}, {recipe.thickness_mm:g} mm, on {recipe.machine}: "
+        f"{recipe.settings}{_measured_kerf(recipe)}. Source: {recipe.source}"
+        + (f", {recipe.date}" if recipe.date else "")
+        for recipe in recipes.values()
+    ]
+    open_ones = [name for name in ("cut", "engrave") if name not in recipes]
+    if open_ones:
+        lines.append(
+            f"There is no recipe to {' or '.join(open_ones)} this film on {settings.machine}: "
+            "those powers are 0"
+        )
+    return "\n".join((*lines, CHECKS))
+
+
+def _measured_kerf(recipe: Recipe) -> str:
+    return "" if recipe.kerf_mm is None else f", kerf {recipe.kerf_mm:g} mm"
 
 
 class LaserRun(NamedTuple):
@@ -112,14 +186,27 @@ def project_text(
     sheet: Surroundings,
     properties: Mapping[str, str],
     advice: str = ADVICE,
+    recipes: Recipes = NO_RECIPES,
 ) -> str:
     """The project of a film sheet; ``properties`` are those of its cut file, for its notes.
 
     Contours are cut in the order given, holes before outlines. Lower left corner at the origin,
     y upwards, mm.
     """
-    shapes, outlines = list(drawn(contours, sheet)), _Outlines()
-    layers = [layer for layer in INDICES if any(shape.layer == layer for shape in shapes)]
+    shapes = list(drawn(contours, sheet))
+    layers = sheet_layers({shape.layer for shape in shapes}, recipes)
+    return runs_text(layers, shapes, properties, advice)
+
+
+def runs_text(
+    layers: Sequence[LaserLayer],
+    shapes: Sequence[LaserRun],
+    properties: Mapping[str, str],
+    advice: str,
+) -> str:
+    """The project of runs on layers, both in the order of cutting; ``advice`` heads its notes."""
+    outlines = _Outlines()
+    indices = {layer.layer: layer.cut_index for layer in layers}
     prefs = {**ORDER, **{f"Optimize_{name}": 0 for name in NOT_OPTIMIZED}}
     notes = "\n".join((advice, *(f"{name}: {value}" for name, value in properties.items())))
     lines = [
@@ -130,30 +217,24 @@ def project_text(
         *(f'<{name} Value="{value}"/>' for name, value in prefs.items()),
         "</UIPrefs>",
         *(_setting(layer, rank) for rank, layer in enumerate(layers)),
-        *(_shape(serial, shape, outlines) for serial, shape in enumerate(shapes)),
+        *(
+            _shape(serial, shape, indices[shape.layer], outlines)
+            for serial, shape in enumerate(shapes)
+        ),
         f'<Notes ShowOnLoad="1" Notes={quoteattr(notes)}/>',
         "</LightBurnProject>\n",
     ]
     return "\n".join(lines)
 
 
-def _setting(layer: str, rank: int) -> str:
-    """A layer's settings: a power of 0 fires nothing, where one left out is the reader's guess."""
-    says = "not cut" if layer == REFERENCE else "set power and speed"
-    values = {
-        "index": INDICES[layer],
-        "name": f"{layer}: {says}",
-        **dict.fromkeys(POWERS, 0),
-        "kerf": 0,
-        "priority": rank,
-        "doOutput": int(layer != REFERENCE),
-    }
-    inner = "".join(f'<{name} Value="{value}"/>' for name, value in values.items())
+def _setting(layer: LaserLayer, rank: int) -> str:
+    inner = "".join(
+        f"<{name} Value={quoteattr(value)}/>" for name, value in layer.values(rank).items()
+    )
     return f'<CutSetting type="{CUT_MODE}">{inner}</CutSetting>'
 
 
-def _shape(serial: int, run: LaserRun, outlines: _Outlines) -> str:
-    index = INDICES[run.layer]
+def _shape(serial: int, run: LaserRun, index: int, outlines: _Outlines) -> str:
     if run.circle is not None:
         (x, y), radius = run.circle
         size = f'Rx="{coord(radius)}" Ry="{coord(radius)}"'
@@ -406,21 +487,33 @@ SURE = 0.99
 """Share of the tolerance: what is found within it for all shapes at once needs no other look."""
 
 
-def verify_project(path: Path, contours: Sequence[Contour], sheet: Surroundings) -> None:
+def verify_project(
+    path: Path,
+    contours: Sequence[Contour],
+    sheet: Surroundings,
+    recipes: Recipes = NO_RECIPES,
+) -> None:
     """Reads the project at ``path`` and compares it with the sheet that was meant.
 
     Every shape is on its layer, in its order, and within TOLERANCE of its contour; layers are in
-    order, the frame is not cut and no power is set. Raises OutputError with what is not, and where.
+    order, the frame is not cut and no power is set but that of a recipe. Raises OutputError with
+    what is not, and where.
     """
+    expected = list(drawn(contours, sheet))
+    verify_runs(path, sheet_layers({run.layer for run in expected}, recipes), expected)
+
+
+def verify_runs(path: Path, layers: Sequence[LaserLayer], expected: Sequence[LaserRun]) -> None:
+    """Reads the project at ``path`` and compares it with layers and runs, likewise."""
     project = read_project(path)
+    indices = {layer.layer: layer.cut_index for layer in layers}
     try:
-        expected = list(drawn(contours, sheet))
-        _check_settings(project, {run.layer for run in expected})
+        _check_settings(project, layers)
         if len(project.shapes) != len(expected):
             raise OutputError(f"it has {len(project.shapes)} shapes, not {len(expected)}")
         pairs = list(zip(project.shapes, expected, strict=True))
         for (shape, run), is_on in zip(pairs, _surely_on(pairs), strict=True):
-            if shape.index != INDICES[run.layer] or shape.is_closed != run.closed:
+            if shape.index != indices[run.layer] or shape.is_closed != run.closed:
                 x, y = shape.curves[0].start
                 raise OutputError(f"the shape at x {x:.3f}, y {y:.3f} is not one of {run.layer}")
             if not is_on:
@@ -429,21 +522,18 @@ def verify_project(path: Path, contours: Sequence[Contour], sheet: Surroundings)
         raise OutputError(f"{path.name}: {error}; regenerate it") from error
 
 
-def _check_settings(project: Project, layers: set[str]) -> None:
-    used = [layer for layer in INDICES if layer in layers]
-    if list(project.settings) != [INDICES[layer] for layer in used]:
+def _check_settings(project: Project, layers: Sequence[LaserLayer]) -> None:
+    if list(project.settings) != [layer.cut_index for layer in layers]:
         raise OutputError("its layers are others, or in another order")
-    for rank, layer in enumerate(used):
-        expected = {
-            "type": CUT_MODE,
-            "priority": str(rank),
-            "doOutput": str(int(layer != REFERENCE)),
-            **dict.fromkeys(("kerf", *POWERS), "0"),
-        }
-        setting = project.settings[INDICES[layer]]
-        for name, value in expected.items():
-            if setting.get(name) != value:
-                raise OutputError(f"{name} of layer {layer} is {setting.get(name)}, not {value}")
+    for rank, layer in enumerate(layers):
+        expected = {"type": CUT_MODE, **layer.values(rank)}
+        setting = project.settings[layer.cut_index]
+        for name in dict.fromkeys((*expected, *setting)):
+            if setting.get(name) != expected.get(name):
+                raise OutputError(
+                    f"{name} of layer {layer.layer} is {setting.get(name)}, "
+                    f"not {expected.get(name)}"
+                )
 
 
 def _surely_on(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[bool]:

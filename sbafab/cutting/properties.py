@@ -8,10 +8,13 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from sbafab.design.films import is_kerf
+from sbafab.design.recipes import Operation, Recipe
 from sbafab.errors import OutputError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.laminate.films import PTFE_WARNING, Material
 
+Recipes = Mapping[Operation, Recipe]
+"""Recipes of a film on the machine, by what they do."""
 DxfProfile = Literal["bulges", "arcs", "chords"]
 
 
@@ -50,6 +53,8 @@ class CutSettings:
     generator: str = "sbafab"
     warnings: Mapping[str, str] = field(default_factory=lambda: {"PTFE": PTFE_WARNING})
     platen: tuple[float, float] = (152.4, 152.4)
+    machine: str | None = None
+    recipes: Mapping[Material, Recipes] = field(default_factory=dict)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)

@@ -15,7 +15,13 @@ from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.index_marks import IndexMark, index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.lightburn import ENDING, project_text, verify_project
+from sbafab.cutting.lightburn import (
+    ENDING,
+    NO_RECIPES,
+    advice_of,
+    project_text,
+    verify_project,
+)
 from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
     CUT_INNER,
@@ -137,8 +143,10 @@ def _write_sheet(
     read = verify_file(path, Region(contours), properties)
     _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
-    project.write_bytes(project_text(contours, around, properties).encode())
-    verify_project(project, contours, around)
+    recipes = settings.recipes.get(nest.material, NO_RECIPES)
+    advice = advice_of(settings, nest.material)
+    project.write_bytes(project_text(contours, around, properties, advice, recipes).encode())
+    verify_project(project, contours, around, recipes)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
     picture.write_text(

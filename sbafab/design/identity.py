@@ -203,7 +203,7 @@ def cure_hours(design: Design) -> float | None:
 def _values(kit: Kit) -> Iterator[tuple[str, object]]:
     """Every key that a kit gives, and its value as a design would have it."""
     record = checked(KitFile, {"schema": SCHEMA, "name": "x", "version": "x", **kit.tables}, {})
-    usual = record.model_dump(mode="json")
+    usual = without_none(record.model_dump(mode="json"))
     for key in _dotted(kit.tables):
         yield key, _at(usual, key)
 

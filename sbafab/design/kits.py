@@ -25,9 +25,11 @@ from sbafab.design.files import (
     read_toml,
     shown,
     templates_folder,
+    toml_tables,
     write_copy,
 )
 from sbafab.design.films import FaceBondings, Films, LayerFilms, without_other_products
+from sbafab.design.recipes import Recipe
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -70,7 +72,7 @@ OF_A_DESIGN = (
     "rules.yield_builds",
 )
 """Keys in them that are no lab's to say."""
-TEXTS = ("product", "use", "warning", "plate_material", "release_film", "fitting")
+TEXTS = ("product", "use", "warning", "plate_material", "release_film", "fitting", "machine")
 """Keys that are no numbers, whatever they say."""
 Product = Annotated[str, Field(min_length=1, max_length=120)]
 
@@ -159,7 +161,10 @@ def kit_path(kit: object, folder: Path) -> Path:
 
 def read_kit(path: Path) -> Kit:
     """Return the kit of a file. Raises DesignError with one sentence for a fault in it."""
-    tables = read_toml(path)
+    return _kit(read_toml(path), path, path.read_bytes())
+
+
+def _kit(tables: Mapping[str, Any], path: Path, contents: bytes) -> Kit:
     sources: dict[str, str] = {}
     plain = _without_sources(tables, "", sources, path)
     for key in OF_A_DESIGN:
@@ -181,7 +186,7 @@ def read_kit(path: Path) -> Kit:
         sources=sources,
         tubes=record.tubes,
         adhesives=record.adhesives,
-        text=path.read_bytes(),
+        text=contents,
     )
 
 
@@ -301,3 +306,37 @@ def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
 def write_kit(file: Path) -> Path:
     """Copy the paper's kit, named after the new file. Raises DesignError if it exists."""
     return write_copy(templates_folder() / KITS / f"{DEFAULT}.toml", file)
+
+
+def recipe_toml(recipe: Recipe) -> str:
+    """Return a recipe as a table for the end of a kit or design."""
+    import tomli_w
+
+    values = {key: value for key, value in recipe.model_dump().items() if value is not None}
+    return f"[[laser.recipe]]\n{tomli_w.dumps(values)}"
+
+
+def add_recipe(path: Path, recipe: Recipe) -> bool:
+    """Add a recipe to a kit's file; return True if the kit names the recipe's machine.
+
+    The rest stays as it is, comments too. Raises DesignError where the kit cannot be read or
+    written, or has a recipe for the same film, machine and operation.
+    """
+    before = read_kit(path)
+    for table in _table(before.tables, "laser").get("recipe", ()):
+        if recipe.is_rival(Recipe.model_validate(table)):
+            raise DesignError(
+                f"{path} has a recipe to {recipe.operation} {recipe.film} of "
+                f"{recipe.thickness_mm:g} mm on {recipe.machine}; remove it first"
+            )
+    text = before.text.decode("utf-8-sig")
+    new = f"{text.rstrip()}\n\n{recipe_toml(recipe)}"
+    kit = _kit(toml_tables(new, path), path, new.encode())
+    beside = path.with_name(f".{path.name}.new")
+    try:
+        beside.write_bytes(kit.text)
+        beside.replace(path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise DesignError(f"{path} cannot be written: {error.strerror or error}") from None
+    return bool(_table(kit.tables, "laser").get("machine") == recipe.machine)

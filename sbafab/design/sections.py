@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -12,9 +12,11 @@ from pydantic import (
     Field,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
+from sbafab.design.recipes import MachineName, Recipe
 from sbafab.design.toml_table import Section, writable
 from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine
@@ -475,6 +477,21 @@ class Laser(Section):
     nothing bonds to them."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
     """What a kerf that was not measured may take off the width of a part: ours."""
+    machine: MachineName | None = None
+    """The machine whose recipes LightBurn's projects take; by default none: every power is 0."""
+    recipe: Annotated[tuple[Recipe, ...], Field(max_length=200, strict=False)] | None = None
+    """Power and speed by film, thickness and machine, a [[laser.recipe]] each."""
+
+    @model_validator(mode="after")
+    def _recipes_are_one_each(self) -> Self:
+        recipes = self.recipe or ()
+        for place, recipe in enumerate(recipes):
+            if any(recipe.is_rival(other) for other in recipes[:place]):
+                raise ValueError(
+                    f"has two recipes to {recipe.operation} {recipe.film} of "
+                    f"{recipe.thickness_mm:g} mm on {recipe.machine}; keep one"
+                )
+        return self
 
 
 class Sheets(Section):

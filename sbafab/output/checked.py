@@ -11,9 +11,10 @@ from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.order import Machine
-from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings
+from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
+from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
 from sbafab.design.sections import NOT_MEASURED, named_film
 from sbafab.errors import DesignError, GeometryError
@@ -159,7 +160,19 @@ def cut_settings(
         generator=GENERATOR,
         warnings=warnings(design),
         platen=(design.press.platen_width, design.press.platen_length),
+        machine=design.laser.machine,
+        recipes=recipes(design),
     )
+
+
+def recipes(design: Design) -> dict[Material, Recipes]:
+    """Return the recipes of each film on the design's machine; films without one are left out."""
+    laser = design.laser
+    by_film = {
+        name: recipes_for(laser.recipe or (), film, laser.machine)
+        for name, film in used_films(design).items()
+    }
+    return {name: found for name, found in by_film.items() if found}
 
 
 def press_settings(design: Design) -> PressSettings:
