@@ -2,9 +2,10 @@
 
     python -m docs.scripts.nesting        (for it alone: pip install spyrrow python-libnest2d)
 
-sparrow packs a strip as wide as a sheet; its length over a sheet's, rounded up, is the least number
-of sheets that the strip can be cut into. libnest2d puts parts by no-fit polygons, first fit.
-``area`` is a lower bound for any nester.
+sparrow packs a strip as wide as a sheet, whose length over a sheet's is rounded up; a cut at a
+sheet's end may cross parts, so it is a lower bound of what it needs. ``one_more`` is "no" if sparrow
+cannot put one copy more on a sheet than we do, for films of one shape. libnest2d puts parts by
+no-fit polygons, first fit. ``area`` is a lower bound for any nester.
 """
 
 from __future__ import annotations
@@ -12,10 +13,13 @@ from __future__ import annotations
 import csv
 import math
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+import shapely
 
 from sbafab.actuators import load_design
 from sbafab.design.files import template_names
@@ -30,14 +34,16 @@ from sbafab.nesting.records import NestPart, Stock
 from sbafab.output.checked import check, plan_design, stocks
 
 COPIES = (1, 4, 8, 20)
-SECONDS = 20
+SECONDS = 25
 """By the clock, of sparrow for each strip; the processor's time is written."""
-MOST_PARTS = 300
+MOST_PARTS = 130
 """libnest2d, whose time grows with the square of the parts, gets no more."""
+SLACK = 0.01
+"""mm by which libnest2d's parts may be nearer: its outlines are polygons."""
 TABLE = Path(__file__).parents[1] / "measured" / "nesting.csv"
 COLUMNS = (
     "design", "copies", "film", "parts", "area", "bottom_left", "sbafab", "seconds",
-    "sparrow", "sparrow_seconds", "libnest2d", "libnest2d_seconds",
+    "sparrow", "sparrow_seconds", "one_more", "libnest2d", "libnest2d_seconds",
 )  # fmt: skip
 
 
@@ -70,7 +76,12 @@ def measured(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     # One sheet, or as few as the area needs, cannot be beaten.
     if result.sheets == max(1, area):
         return row
-    return row | sparrow(parts, stock) | libnest2d(parts, stock)
+    row |= sparrow(parts, stock) | libnest2d(parts, stock)
+    if len({Region(part.region.outers) for part in parts}) == 1:
+        fullest = max(len(result.on_sheet(sheet)) for sheet in range(result.sheets))
+        length, _ = strip([replace(parts[0], count=fullest + 1)], stock)
+        row["one_more"] = "yes" if length <= stock.usable[3] - stock.usable[1] else "no"
+    return row
 
 
 def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
@@ -85,9 +96,18 @@ def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
 
 def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     """Return the sheets of the strip that sparrow packs, and its processor time."""
+    length, seconds = strip(parts, stock)
+    low, high = stock.usable[1::2]
+    # Two sheets' worth of strip lacks the gap between them.
+    sheets = math.ceil((length + stock.spacing) / (high - low + stock.spacing) - 1e-6)
+    return {"sparrow": sheets, "sparrow_seconds": round(seconds, 1)}
+
+
+def strip(parts: Sequence[NestPart], stock: Stock) -> tuple[float, float]:
+    """Return the length of the strip that sparrow packs, in mm, and its processor time in s."""
     import spyrrow
 
-    low_x, low_y, high_x, high_y = stock.usable
+    low_x, _, high_x, _ = stock.usable
     items = [
         spyrrow.Item(
             str(number),
@@ -98,7 +118,7 @@ def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
         for number, part in enumerate(parts)
     ]
     # It keeps the spacing from the strip's sides and ends, too, where a border needs none.
-    strip = spyrrow.StripPackingInstance("strip", high_x - low_x + 2 * stock.spacing, items)
+    instance = spyrrow.StripPackingInstance("strip", high_x - low_x + 2 * stock.spacing, items)
     settings = spyrrow.StripPackingConfig(
         min_items_separation=stock.spacing,
         total_computation_time=SECONDS,
@@ -106,14 +126,15 @@ def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
         seed=1,
     )
     began = time.process_time()
-    length = strip.solve(settings).width - 2 * stock.spacing
-    # Two sheets' worth of strip lacks the gap between them.
-    sheets = math.ceil((length + stock.spacing) / (high_y - low_y + stock.spacing) - 1e-6)
-    return {"sparrow": sheets, "sparrow_seconds": round(time.process_time() - began, 1)}
+    length = instance.solve(settings).width - 2 * stock.spacing
+    return length, time.process_time() - began
 
 
 def libnest2d(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
-    """Return the sheets that libnest2d takes, and its processor time; nothing for many parts."""
+    """Return the sheets that libnest2d takes, and its processor time; nothing for many parts.
+
+    The sheets are "overlap" if two of its parts are nearer than the spacing, or leave the sheet.
+    """
     import pynest2d
 
     if sum(part.count for part in parts) > MOST_PARTS:
@@ -130,7 +151,22 @@ def libnest2d(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     began = time.process_time()
     sheets = pynest2d.nest(items, sheet, round(stock.spacing * unit), pynest2d.NfpConfig())
     seconds = round(time.process_time() - began, 1)
-    return {"libnest2d": sheets, "libnest2d_seconds": seconds}
+    laid: dict[int, list[shapely.Polygon]] = defaultdict(list)
+    for item in items:
+        corners = [(point.x() / unit, point.y() / unit) for point in item.transformedContour()]
+        laid[item.binId()].append(shapely.Polygon(corners))
+    is_valid = all(_are_apart(polygons, stock) for polygons in laid.values())
+    return {"libnest2d": sheets if is_valid else "overlap", "libnest2d_seconds": seconds}
+
+
+def _are_apart(polygons: Sequence[shapely.Polygon], stock: Stock) -> bool:
+    """Return True if the polygons of a sheet keep the spacing and fit the usable area."""
+    low_x, low_y, high_x, high_y = shapely.total_bounds(polygons)
+    min_x, min_y, max_x, max_y = stock.usable
+    tree = shapely.STRtree(polygons)
+    near, _ = tree.query(polygons, "dwithin", stock.spacing - SLACK)
+    fits = high_x - low_x < max_x - min_x + SLACK and high_y - low_y < max_y - min_y + SLACK
+    return bool(fits) and len(near) == len(polygons)
 
 
 def main() -> None:

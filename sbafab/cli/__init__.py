@@ -28,7 +28,7 @@ SUMMARIES = {
     "press": "Write the heat-press schedule.",
     "mesh": "Write meshes: solid, cavities, volume and shell.",
     "nest": "Cut several designs from the same film sheets.",
-    "stock": "Show what an output folder takes of the film in stock.",
+    "stock": "Show what an output folder takes of what is in stock, and what is lacking.",
     "kerf": "Compute the kerf from a filled coupon.csv.",
     "recipe": "Take power and speed of a film from a filled testgrid.csv.",
     "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",

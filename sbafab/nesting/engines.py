@@ -1,8 +1,9 @@
-"""The nesting engine: bottom-left on a fine grid, from an empty sheet or round a lattice.
+"""The nesting engine: bottom-left on a fine grid, from an empty sheet or round copies of one shape.
 
-Each part goes to the lowest free place. Several fixed orders are tried; where the parts take more
-sheets than their area needs, they are tried round lattices of the shapes of most area, too, and
-the best result is returned. Nothing is random.
+Each part goes to the lowest free place. Several fixed orders are tried. Where the parts take more
+sheets than their area needs, they are tried round copies of the shapes of most area, too: a
+lattice, or an arrangement found by a beam search where few copies fill a sheet. The best result is
+returned. Nothing is random.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.contour import ticks
@@ -18,7 +20,7 @@ from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
-from sbafab.nesting.lattice import Lattice, lattices_of
+from sbafab.nesting.lattice import Lattice, lattice_of, lattices_of
 from sbafab.nesting.records import (
     TURNS,
     NestPart,
@@ -40,8 +42,12 @@ MANY = 600
 """Number of parts from which only the first few ways to fill a sheet are tried."""
 MOST_LATTICES = 3
 """Shapes of which a lattice is tried."""
-LEAST_COPIES = 6
-"""Copies that are worth a lattice."""
+LEAST_COPIES = 3
+"""Copies that are worth a lattice or an arrangement."""
+FEW = 16
+"""Copies on a sheet, by their area, up to which an arrangement is searched."""
+BEAM = 6
+"""Arrangements that are continued at each step of the search."""
 
 
 def bottom_left(
@@ -65,7 +71,7 @@ def bottom_left(
     if best.stuck is not None:
         raise no_place(parts[best.stuck], stock)
     if lattices and takes_lattices(parts, stock, best.sheets):
-        ways = _lattice_ways(parts, filler.lattices())
+        ways = [way for lattices in filler.lattices() for way in _lattice_ways(parts, lattices)]
         best = min([best, *map(filler.filled, ways)], key=_score)
     return best.placements
 
@@ -92,6 +98,11 @@ class _Filled:
     sheets: int
     reach: float
     stuck: int | None = None
+
+
+def _most_copies(lattice: Lattice) -> tuple[int, float]:
+    """Sort key: most copies, then least length."""
+    return -len(lattice.places), round(lattice.top, 3)
 
 
 def _score(filled: _Filled) -> tuple[bool, int, float]:
@@ -141,10 +152,19 @@ def _area_bound(shapes: Sequence[Region], counts: Mapping[int, int], stock: Stoc
 
     The usable area with half the spacing round it holds as much at most.
     """
+    grown = sum(counts[i] * _grown(shape, stock) for i, shape in enumerate(shapes))
+    return math.ceil(grown / _room(stock) - 1e-6)
+
+
+def _grown(shape: Region, stock: Stock) -> float:
+    """Return the area of a shape with half the spacing round it."""
+    return grow(shape, stock.spacing / 2).area
+
+
+def _room(stock: Stock) -> float:
+    """Return the usable area with half the spacing round it."""
     low_x, low_y, high_x, high_y = stock.usable
-    grown = sum(counts[i] * grow(shape, stock.spacing / 2).area for i, shape in enumerate(shapes))
-    usable = (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
-    return math.ceil(grown / usable - 1e-6)
+    return (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
 
 
 def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
@@ -182,20 +202,28 @@ class _Filler:
         self.forms = [[form for form in grid.forms if form.shape == shape] for shape in shape_of]
         self._started: dict[tuple[int, int], list[Cells]] = {}
 
-    def lattices(self) -> dict[int, Lattice]:
-        """Return the best lattice of each of the shapes of most area that come often enough."""
+    def lattices(self) -> list[dict[int, Lattice]]:
+        """Return copies on a sheet, for the shapes of most area that come often enough.
+
+        They are the best lattices, and the arrangements where one holds more copies.
+        """
         areas = dict.fromkeys(range(len(self.grid.shapes)), 0.0)
         counts: Counter[int] = Counter()
         for part, shape in zip(self.parts, self.shape_of, strict=True):
             areas[shape] += part.count * part.region.area
             counts[shape] += part.count
-        chosen = {}
+        straight, searched = {}, {}
         for shape in sorted(areas, key=lambda shape: -areas[shape])[:MOST_LATTICES]:
             if counts[shape] >= LEAST_COPIES:
                 laid = self._clear_lattices(self.grid.shapes[shape])
-                best = min(laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3)))
-                chosen[shape] = best
-        return chosen
+                lattice = min(
+                    laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3))
+                )
+                arrangement = self._arrangement(shape)
+                straight[shape] = lattice
+                has_more = len(arrangement.places) > len(lattice.places)
+                searched[shape] = arrangement if has_more else lattice
+        return [straight] if searched == straight else [straight, searched]
 
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""
@@ -207,6 +235,28 @@ class _Filler:
                 if not stock.pins or is_clear(placed(shape, turn, shift), stock)
             )
             yield lattice._replace(places=tuple(places))
+
+    def _arrangement(self, shape: int) -> Lattice:
+        """Return copies of a shape, found by a beam search; none if many fit a sheet.
+
+        A step puts a copy at an extreme free place. Sheets that leave most places free go on.
+        """
+        forms = [form for form in self.grid.forms if form.shape == shape]
+        sheets = [_Arrangement(tuple(self.empty[form.number] for form in forms))]
+        if _room(self.stock) > FEW * _grown(self.grid.shapes[shape], self.stock):
+            return Lattice((), 0.0)
+        best = sheets[0]
+        while sheets:
+            best = sheets[0]
+            following = {
+                step.copies: step for sheet in sheets for step in sheet.steps(self.grid, forms)
+            }
+            sheets = sorted(following.values(), key=lambda sheet: -sheet.room)[:BEAM]
+        places = []
+        for number, row, column in best.copies:
+            form = self.grid.forms[number]
+            places.append((form.turn, self.grid.shift(form, row, column)))
+        return lattice_of(self.grid.shapes[shape], places)
 
     def filled(self, way: _Way) -> _Filled:
         """Fill sheet after sheet with the remaining parts, in the way's order."""
@@ -305,6 +355,49 @@ class _Filler:
             tops.get((placement.part, placement.turn), math.inf) + placement.shift[1]
             for placement in placements
         )
+
+
+@dataclass(frozen=True)
+class _Arrangement:
+    """Copies of one shape on a sheet, each a form's number, row and column in this order.
+
+    ``maps`` are the places that each form of the shape still has.
+    """
+
+    maps: tuple[Cells, ...]
+    copies: tuple[tuple[int, int, int], ...] = ()
+
+    @cached_property
+    def room(self) -> int:
+        """Number of free places."""
+        return sum(int(np.count_nonzero(places)) for places in self.maps)
+
+    def steps(self, grid: Grid, forms: Sequence[TurnedShape]) -> Iterator[_Arrangement]:
+        """Yield the arrangements with one more copy at an extreme free place."""
+        for form, places in zip(forms, self.maps, strict=True):
+            for place in _extremes(places):
+                maps = []
+                for other, free in zip(forms, self.maps, strict=True):
+                    left = np.copy(free)
+                    strike(left, grid.clear(form, other), other, place)
+                    maps.append(left)
+                copies = sorted((*self.copies, (form.number, *place)))
+                yield _Arrangement(tuple(maps), tuple(copies))
+
+
+def _extremes(places: Cells) -> list[tuple[int, int]]:
+    """Return the ends of the outermost rows and columns that have free places."""
+    rows, columns = (np.flatnonzero(places.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return []
+    extremes = set()
+    for row in (int(rows[0]), int(rows[-1])):
+        across = np.flatnonzero(places[row])
+        extremes |= {(row, int(across[0])), (row, int(across[-1]))}
+    for column in (int(columns[0]), int(columns[-1])):
+        up = np.flatnonzero(places[:, column])
+        extremes |= {(int(up[0]), column), (int(up[-1]), column)}
+    return sorted(extremes)
 
 
 class _Free:

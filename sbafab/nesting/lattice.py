@@ -30,7 +30,7 @@ SAGITTA = 5e-4
 """mm by which the polygons of grown outlines may reach past arcs."""
 LEVEL = 1e-10
 """mm beside a corner at which an envelope is read, since it may jump there."""
-STEPS = 64
+STEPS = 96
 """Offsets that are tried between two rows, and between the two copies of a pair."""
 TABLE = 192
 """Entries of a table of distances."""
@@ -75,18 +75,19 @@ def lattices_of(
         if base in turns:
             for copies in rows.layouts((width, length)):
                 places = [(turn, (low_x + u, low_y + v)) for turn, (u, v) in copies]
-                laid.append(_lattice(shape, places))
+                laid.append(lattice_of(shape, places))
         if TURNS[base + 1] in turns and abs(width - length) > LEVEL:
             # Columns: the sheet's y is the rows' x.
             for copies in rows.layouts((length, width)):
                 places = [
                     (TURNS[(turn + 1) % 4], (high_x - v, low_y + u)) for turn, (u, v) in copies
                 ]
-                laid.append(_lattice(shape, places))
+                laid.append(lattice_of(shape, places))
     return sorted(laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3)))
 
 
-def _lattice(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
+def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
+    """Return the copies of a shape, the lowest first."""
     tops = {
         turn: placed(shape, turn, (0.0, 0.0)).bounds[3] for turn in {turn for turn, _ in places}
     }

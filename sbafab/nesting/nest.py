@@ -136,10 +136,12 @@ def from_dict(
 
 
 def _key(nests: Iterable[tuple[Stock, Sequence[NestPart], int]]) -> str:
-    """Return a hash of what was nested, and of whether lattices were tried."""
+    """Return a hash of what was nested, and of whether lattices and arrangements were tried."""
     inputs = [
         (
-            "bottom-left, lattices" if takes_lattices(parts, stock, sheets) else "bottom-left",
+            "bottom-left, lattices, arrangements"
+            if takes_lattices(parts, stock, sheets)
+            else "bottom-left",
             astuple(stock),
             [(p.design, p.pattern, p.piece, p.material, p.region.key, p.count) for p in parts],
         )

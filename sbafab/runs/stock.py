@@ -6,11 +6,14 @@ a written folder out of the file, and its rests in, each a rectangle.
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from io import StringIO
 from pathlib import Path
 from typing import Annotated
 
@@ -31,15 +34,18 @@ from sbafab.design.units import SHORTEST, Millimetres
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Bounds
 from sbafab.geometry.on_demand import np
-from sbafab.laminate.films import FIRST, Material
+from sbafab.laminate.films import FIRST, Film, Material
 from sbafab.nesting.nest import nest, of_material
 from sbafab.nesting.records import NestPart, field
 from sbafab.output.checked import RunPart, plan_design, stocks
 from sbafab.output.job import CheckedJob
 from sbafab.output.manifest import JobManifest, Manifest, SheetClaim
 from sbafab.output.swap import MANIFEST
+from sbafab.spreadsheet import csv_text
 
 PieceSize = Annotated[float, Millimetres(SHORTEST, 10000)]
+BILL = "bill.csv"
+"""The bill of materials in a batch's folder."""
 CELLS = 400
 """Cells along a sheet's longer side in which its rest is sought; they are 1 mm at least."""
 LEAST_REST = 20.0
@@ -69,6 +75,19 @@ class FilmPiece(Section):
         return f"{self.width:g} x {self.length:g} mm"
 
 
+class StockItem(Section):
+    """What else is on the shelf: tubes, pins, release film and the rest of a bill."""
+
+    item: str = Field(min_length=1, max_length=80)
+    """Its name in the bill of materials, as Tube."""
+    specification: str = Field(default="", max_length=200)
+    """Words of the bill's specification, which tell it from others of that name."""
+    count: int = Field(ge=0, le=1_000_000)
+    """How many there are."""
+    reusable: bool = False
+    """Whether a run leaves it as it was, as a base plate."""
+
+
 class Taken(Section):
     """A run that was booked."""
 
@@ -85,6 +104,8 @@ class StockFile(Section):
 
     piece: tuple[FilmPiece, ...] = Field(default=(), max_length=10_000, strict=False)
     """The pieces."""
+    item: tuple[StockItem, ...] = Field(default=(), max_length=10_000, strict=False)
+    """What else is on the shelf."""
     taken: tuple[Taken, ...] = Field(default=(), strict=False)
     """The runs that were booked."""
     rests: int = Field(default=0, ge=0)
@@ -93,6 +114,8 @@ class StockFile(Section):
 
 def read_stock(path: Path) -> StockFile:
     """Return a stock file. Raises DesignError with one sentence where it cannot be read."""
+    if not path.exists():
+        raise DesignError(f"there is no stock file {path}; write one, as docs/cutting.md shows")
     stock = checked(StockFile, read_toml(path), {}, f"{path.name}: ")
     names = [piece.id for piece in stock.piece]
     repeated = next((name for name in names if names.count(name) > 1), None)
@@ -147,11 +170,7 @@ def _piece_for(
             f"{where}.{'roll' if plain.roll else 'pins'} does not go with sheets.stock, whose "
             "pieces differ in size; leave it out, or leave sheets.stock out"
         )
-    pieces = [
-        piece
-        for piece in stock.piece
-        if piece.film == film.product and abs(piece.thickness - film.thickness) < 1e-9
-    ]
+    pieces = [piece for piece in stock.piece if _is_of(piece, film)]
     if not pieces:
         raise DesignError(
             f"{path} has no piece of film {shown(film.product)}, {film.thickness:g} mm thick, of "
@@ -225,19 +244,36 @@ class Rest:
         return f"x {self.x:g}, y {self.y:g}"
 
 
+def is_cut_from_stock(folder: Path) -> bool:
+    """Return True if the sheets of a written folder are pieces of a stock file."""
+    claims, design = _written(folder)
+    return any(_sheet_of(design, sheet.material).piece is not None for sheet in claims.sheets)
+
+
+def _written(folder: Path) -> tuple[Manifest | JobManifest, Design]:
+    """Return the manifest of a folder, and its first design, whose sheets all designs share."""
+    claims: Manifest | JobManifest = read_job(folder) if is_job(folder) else read_claims(folder)
+    first = claims.designs[0].name if isinstance(claims, JobManifest) else ""
+    return claims, load_design(folder / first / "design.toml")
+
+
+def _sheet_of(design: Design, material: Material) -> Sheet:
+    name = material.lower()
+    if name in design.films.others:
+        return design.films.others[name].sheet
+    sheet: Sheet = getattr(design.sheets, name)
+    return sheet
+
+
 def rests(folder: Path) -> Iterator[tuple[SheetClaim, str, Rest | None]]:
     """Yield each sheet of a written folder, its piece, and its rest if that is worth keeping.
 
     The cut files are read. Raises OutputError where the folder was not cut from a stock file, or
     a file is not the one that was written.
     """
-    claims: Manifest | JobManifest = read_job(folder) if is_job(folder) else read_claims(folder)
-    first = claims.designs[0].name if isinstance(claims, JobManifest) else ""
-    design = load_design(folder / first / "design.toml")
+    claims, design = _written(folder)
     for sheet in claims.sheets:
-        name = sheet.material.lower()
-        held = design.films.others[name].sheet if name in design.films.others else None
-        piece = (held or getattr(design.sheets, name)).piece
+        piece = _sheet_of(design, sheet.material).piece
         if piece is None:
             raise OutputError(
                 f"{folder} was not cut from a stock file; name it in sheets.stock of the design "
@@ -294,8 +330,102 @@ def _bars(heights: Sequence[int]) -> Iterator[tuple[int, int, int]]:
         open_bars.append((first, height))
 
 
+# The bill of materials against the stock.
+
+
+@dataclass(frozen=True)
+class Need:
+    """A counted row of a bill of materials, and how many of it are in stock."""
+
+    item: str
+    specification: str
+    needed: int
+    in_stock: int
+
+    @property
+    def lacking(self) -> int:
+        return max(0, self.needed - self.in_stock)
+
+
+def bill_against(folder: Path, stock: StockFile) -> list[Need]:
+    """Return the films of a written folder and the counted rows of its bill, against a stock.
+
+    One copy has films alone. What the stock holds goes to the first row that it serves, and what
+    is left to the next. Raises OutputError where a bill is not the one that was written.
+    """
+    return [*_film_needs(folder, stock), *(need for need, _ in _item_needs(folder, stock))]
+
+
+def _film_needs(folder: Path, stock: StockFile) -> Iterator[Need]:
+    claims, design = _written(folder)
+    films = used_films(design)
+    needed = Counter((sheet.material, sheet.width, sheet.length) for sheet in claims.sheets)
+    for (material, width, length), count in needed.items():
+        film, piece_id = films[material], _sheet_of(design, material).piece
+        pieces = (
+            piece.count
+            for piece in stock.piece
+            if _is_of(piece, film)
+            and piece_id in (None, piece.id)
+            and min(piece.width - width, piece.length - length) >= 0
+        )
+        words = f"{film.product}, {film.thickness:g} mm thick, {width:g} x {length:g} mm"
+        yield Need(f"{material} film", words, count, sum(pieces))
+
+
+def _is_of(piece: FilmPiece, film: Film) -> bool:
+    return piece.film == film.product and abs(piece.thickness - film.thickness) < 1e-9
+
+
+def _item_needs(folder: Path, stock: StockFile) -> Iterator[tuple[Need, tuple[int, ...]]]:
+    """Yield the counted rows that are no films, and how many of each stock item they take."""
+    counts = [item.count for item in stock.item]
+    for (name, words), needed in _counted_rows(folder).items():
+        serving = [
+            i
+            for i, item in enumerate(stock.item)
+            if item.item.casefold() == name.casefold()
+            and item.specification.casefold() in words.casefold()
+        ]
+        taken = [0] * len(counts)
+        in_stock = sum(counts[i] for i in serving)
+        for i in serving:
+            taken[i] = min(counts[i], needed - sum(taken))
+            counts[i] -= taken[i]
+        yield Need(name, words, needed, in_stock), tuple(taken)
+
+
+def _counted_rows(folder: Path) -> Counter[tuple[str, str]]:
+    """Return name, specification and number of the counted rows of a folder's bills; no films."""
+    counted: Counter[tuple[str, str]] = Counter()
+    claims, _ = _written(folder)
+    designs = [each.name for each in claims.designs] if isinstance(claims, JobManifest) else [""]
+    films = {f"{sheet.material} film" for sheet in claims.sheets}
+    for name in designs:
+        file = folder / name / BILL
+        if not file.exists():
+            continue
+        content = file.read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        if digest != read_claims(folder / name).files.get(BILL):
+            raise OutputError(f"{file} was changed since it was written; generate the run again")
+        for row in csv.DictReader(StringIO(content.decode())):
+            if row["needed"] and row["item"] not in films:
+                counted[row["item"], row["specification"]] += int(row["needed"])
+    return counted
+
+
+def bill_csv(needs: Sequence[Need]) -> str:
+    """Return a bill against a stock as a table."""
+    columns = ("item", "specification", "needed", "in_stock", "lacking")
+    rows = [(n.item, n.specification, n.needed, n.in_stock, n.lacking) for n in needs]
+    return csv_text([columns, *rows])
+
+
 def take(folder: Path, path: Path) -> StockFile:
     """Book a written folder out of a stock file and its rests in; return the file as written.
+
+    Items of its bill are booked out as far as there are any.
 
     Raises OutputError or DesignError, with the file unchanged, where the folder was booked before
     or its pieces are not in the file.
@@ -310,8 +440,20 @@ def take(folder: Path, path: Path) -> StockFile:
                 "generate it again"
             )
         after = _booked(stock, folder.name, digest, cut, path)
+        after = after.model_copy(update={"item": _items_left(folder, stock)})
         _write(path, after)
     return after
+
+
+def _items_left(folder: Path, stock: StockFile) -> tuple[StockItem, ...]:
+    """Return the items of a stock without those that a written folder uses up."""
+    counts = [item.count for item in stock.item]
+    for _, taken in _item_needs(folder, stock):
+        counts = [count - number for count, number in zip(counts, taken, strict=True)]
+    return tuple(
+        item if item.reusable else item.model_copy(update={"count": count})
+        for item, count in zip(stock.item, counts, strict=True)
+    )
 
 
 def _booked(

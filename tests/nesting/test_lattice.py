@@ -18,8 +18,9 @@ from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium
 from sbafab.nesting.check import check_nest
 from sbafab.nesting.lattice import Lattice, lattices_of
-from sbafab.nesting.nest import nest
+from sbafab.nesting.nest import nest, of_material
 from sbafab.nesting.records import TURNS, Nest, NestPart, Stock, placed
+from sbafab.output.checked import check, plan_design, stocks
 
 
 def best(shape: Region, spacing: float, width: float, length: float) -> Lattice:
@@ -142,3 +143,16 @@ def test_only_turns_that_the_stock_allows_are_used() -> None:
     triangle = polygon([(0.0, 0.0), (7.0, 0.0), (2.0, 11.0)])
     for laid in lattices_of(triangle, 1.0, (0.0, 0.0, 50.0, 80.0), (0, 2)):
         assert {turn for turn, _ in laid.places} <= {0, 2}
+
+
+def test_five_folded_pouches_lie_on_one_sheet() -> None:
+    """As sparrow packs them; rows hold three, and bottom-left alone four."""
+    design = load_design("folded", ("order.copies=4",))
+    parts = of_material(plan_design(check(design), ("cut",)).parts, "PE")
+    stock = stocks(design)["PE"]
+    low_x, low_y, high_x, high_y = stock.usable
+    assert len(best(parts[0].region, stock.spacing, high_x - low_x, high_y - low_y).places) == 3
+    (result,) = nest(parts, {"PE": stock})
+    assert len(result.placements) == 5
+    assert result.sheets == 1
+    judged(result)

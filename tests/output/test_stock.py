@@ -20,7 +20,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.design.files import template_text
 from sbafab.errors import DesignError, OutputError
 from sbafab.runs.run import RunRequest, generate
-from sbafab.runs.stock import largest_rectangle, read_stock, rests, take
+from sbafab.runs.stock import bill_against, largest_rectangle, read_stock, rests, take
 
 TPE = {"film": "Stretchlon 200", "thickness": 0.038}
 PTFE = {"film": "PTFE film", "thickness": 0.025}
@@ -158,7 +158,7 @@ def test_a_missing_or_broken_stock_file_is_a_sentence(shelf: Path) -> None:
     with pytest.raises(DesignError, match="is not valid TOML"):
         cut(shelf)
     shelf.unlink()
-    with pytest.raises(DesignError, match="cannot be read"):
+    with pytest.raises(DesignError, match=r"there is no stock file .*; write one"):
         cut(shelf)
 
 
@@ -185,3 +185,73 @@ def test_the_command_says_what_is_taken_and_left(
     with pytest.raises(SystemExit) as ended:
         main(["stock", str(folder), str(shelf), "--take"])
     assert ended.value.code == 2
+
+
+def batch(tmp_path: Path, items: list[dict[str, Any]]) -> tuple[Path, Path]:
+    """Return the folder of 20 copies, and a stock file with these items."""
+    shelf = tmp_path / "stock.toml"
+    pieces = [piece("full", TPE, 152.4, 152.4, 3), piece("masks", PTFE, 152.4, 152.4, 2)]
+    shelf.write_text(tomli_w.dumps({"piece": pieces, "item": items}))
+    source = tmp_path / "little.toml"
+    source.write_text(template_text("1dof-5mm"), encoding="utf-8")
+    design = load_design(source, (f"sheets.stock={shelf.name}", "order.copies=20"))
+    return generate(RunRequest(design, tmp_path / "out", ("cut", "press"))).folder, shelf
+
+
+def test_a_bill_says_what_the_stock_lacks(tmp_path: Path) -> None:
+    """20 actuators of one chamber take 20 tubes; two pins of 3 mm and two of 4 are told apart."""
+    items = [
+        {"item": "tube", "specification": "RPT040", "count": 12},
+        {"item": "Tube", "specification": "another tube", "count": 99},
+        {"item": "Dowel pins", "specification": "4 mm long", "count": 1000},
+        {"item": "Adhesive", "count": 21},
+        {"item": "Base plate", "count": 1, "reusable": True},
+    ]
+    folder, shelf = batch(tmp_path, items)
+    needs = bill_against(folder, read_stock(shelf))
+    counts = {need.item: (need.needed, need.in_stock, need.lacking) for need in needs}
+    assert counts["Tube"] == (20, 12, 8)
+    assert counts["Adhesive"] == (20, 21, 0)
+    assert counts["TPE film"] == (1, 3, 0)
+    pins = {need.specification[-40:]: need for need in needs if need.item == "Dowel pins"}
+    assert [need.lacking > 0 for need in pins.values()] == [True, False]
+    left = {(item.item, item.specification): item.count for item in take(folder, shelf).item}
+    assert left["tube", "RPT040"] == 0
+    assert left["Tube", "another tube"] == 99
+    assert left["Adhesive", ""] == 1
+    assert left["Base plate", ""] == 1
+
+
+def test_one_item_serves_two_rows_once(tmp_path: Path) -> None:
+    folder, shelf = batch(tmp_path, [{"item": "Dowel pins", "count": 5}])
+    first, second = (
+        need for need in bill_against(folder, read_stock(shelf)) if need.item == "Dowel pins"
+    )
+    assert first.in_stock == 5
+    assert second.in_stock == 0
+
+
+def test_a_changed_bill_is_refused(tmp_path: Path) -> None:
+    folder, shelf = batch(tmp_path, [])
+    bill = folder / "bill.csv"
+    bill.write_text(bill.read_text(encoding="utf-8").replace("Tube", "Hose"), encoding="utf-8")
+    with pytest.raises(OutputError, match=r"bill.csv was changed since it was written"):
+        bill_against(folder, read_stock(shelf))
+
+
+def test_the_command_writes_the_bill(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, shelf = batch(tmp_path, [])
+    out = tmp_path / "needs.csv"
+    with pytest.raises(SystemExit) as ended:
+        main(["stock", str(folder), str(shelf), "--bill", str(out)])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert (
+        "Tube, Braintree RPT040, outer diameter 1.016 mm: 20 needed, 0 in stock, 20 lacking" in said
+    )
+    assert "items lacking" in said
+    assert out.read_text(encoding="utf-8").startswith("item,specification,needed,in_stock,lacking")
+    with pytest.raises(SystemExit) as ended:
+        main(["stock", str(folder), str(tmp_path / "none.toml")])
+    assert ended.value.code == 2
+    assert "there is no stock file" in capsys.readouterr().err
