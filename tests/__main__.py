@@ -44,6 +44,8 @@ def terminal() -> tuple[list[str], dict[str, str]]:
 
 def main() -> int:
     """Every check runs beside pytest; its output comes last, so that its counts close all."""
+    # Workers and the processes that tests start would each compile all modules again.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     colour, width = terminal()
     with subprocess.Popen(
         [sys.executable, *PYTEST, *colour, *sys.argv[1:]],

@@ -153,7 +153,8 @@ def check_contours(region: Region, expected: Region, tolerance: float) -> None:
         if all(map(_same, ours, theirs)):
             continue
         for contour, nearest in _paired(ours, theirs):
-            if _same(contour, nearest):
+            # Edges whose ends, centres and radii differ by a quarter of it lie within all of it.
+            if _same(contour, nearest, tolerance / 4):
                 continue
             off, (x, y) = max(_deviation(contour, nearest), _deviation(nearest, contour))
             if off > tolerance:
@@ -178,27 +179,27 @@ def _paired(
         yield contour, theirs[rest.take(box[:2], unlike)]
 
 
-def _same(contour: Contour, second: Contour) -> bool:
-    """Return True if two contours have equal edges, from whichever vertex, but for rounding."""
+def _same(contour: Contour, second: Contour, room: float = ROUNDING) -> bool:
+    """Return True if two contours have equal edges, from whichever vertex, to within ``room``."""
     ours, theirs = contour.edges, second.edges
     if len(ours) != len(theirs):
         return False
     start = ours[0].start
-    if math.dist(theirs[0].start, start) > ROUNDING:
+    if math.dist(theirs[0].start, start) > room:
         first = min(range(len(theirs)), key=lambda i: math.dist(theirs[i].start, start))
         theirs = (*theirs[first:], *theirs[:first])
-    return all(map(_same_edge, ours, theirs))
+    return all(_same_edge(a, b, room) for a, b in zip(ours, theirs, strict=True))
 
 
-def _same_edge(a: Edge, b: Edge) -> bool:
-    if math.dist(a.start, b.start) > ROUNDING or math.dist(a.end, b.end) > ROUNDING:
+def _same_edge(a: Edge, b: Edge, room: float) -> bool:
+    if math.dist(a.start, b.start) > room or math.dist(a.end, b.end) > room:
         return False
     if isinstance(a, Line) or isinstance(b, Line):
         return isinstance(a, Line) and isinstance(b, Line)
     return (
         a.ccw == b.ccw
-        and abs(a.radius - b.radius) <= ROUNDING
-        and math.dist(a.centre, b.centre) <= ROUNDING
+        and abs(a.radius - b.radius) <= room
+        and math.dist(a.centre, b.centre) <= room
     )
 
 

@@ -228,11 +228,14 @@ class _Filler:
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""
         stock = self.stock
+        boxes = {turn: placed(shape, turn, (0.0, 0.0)).bounds for turn in TURNS}
         for lattice in lattices_of(shape, stock.spacing, self.grid.area, stock.turns):
             places = (
                 (turn, shift)
                 for turn, shift in lattice.places
-                if not stock.pins or is_clear(placed(shape, turn, shift), stock)
+                # A region is moved only where its box is near to a pin.
+                if not _is_near_pins(boxes[turn], shift, stock)
+                or is_clear(placed(shape, turn, shift), stock)
             )
             yield lattice._replace(places=tuple(places))
 
@@ -627,6 +630,17 @@ class TurnedShape:
     cells: Cells = field(repr=False)
     frame: Bounds
     bounds: Bounds
+
+
+def _is_near_pins(box: Bounds, shift: Point, stock: Stock) -> bool:
+    """Return True if a box that is moved may come nearer to a pin than the spacing."""
+    low_x, low_y, high_x, high_y = box
+    for x, y, diameter in stock.pins:
+        room = diameter / 2 + stock.spacing + ROUNDING
+        u, v = x - shift[0], y - shift[1]
+        if low_x - room < u < high_x + room and low_y - room < v < high_y + room:
+            return True
+    return False
 
 
 def is_clear(region: Region, stock: Stock) -> bool:
