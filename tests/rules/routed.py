@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from random import Random
 
 import numpy as np
@@ -154,9 +155,14 @@ def shortest(routes: Routes, tree: dict[Place, None], goal: Place, random: Rando
     return []
 
 
+@cache
+def _pouch() -> Laminate:
+    return build(load_design("pouch"))
+
+
 def laminate_of(routes: Routes) -> Laminate:
     """Return the laminate of routes: films as large as the grid, and a mask in every interface."""
-    pouch = build(load_design("pouch"))
+    pouch = _pouch()
     film, mask_film = pouch.layers[0].film, pouch.layers[1].film
     columns, rows = routes.size
     low = (-MARGIN, -MARGIN)
@@ -511,9 +517,14 @@ def flood(
 
 
 def run_maximum(label: np.ndarray, void: np.ndarray, axis: int) -> None:
-    """Give all squares of a straight run of void its largest label."""
+    """Give all squares of a straight run of void its largest label.
+
+    The squares round a sheet are no void, so that no run goes on from one line to the next.
+    """
     lines, open_lines = (label, void) if axis else (label.T, void.T)
-    edges = np.diff(open_lines.astype(np.int8), axis=1, prepend=0, append=0)
-    starts, ends = np.argwhere(edges == 1), np.argwhere(edges == -1)
-    for (row, start), (_, end) in zip(starts, ends, strict=True):
-        lines[row, start:end] = lines[row, start:end].max()
+    squares, values = open_lines.ravel(), lines.ravel()
+    ends = np.flatnonzero(np.diff(squares.astype(np.int8), prepend=0, append=0))
+    if len(ends):
+        most = np.maximum.reduceat(values, ends)[::2]
+        values[squares] = np.repeat(most, np.diff(ends)[::2])
+        lines[:] = values.reshape(lines.shape)
