@@ -10,13 +10,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from sbafab.geometry.edges import Arc, Edge, Line, Point, unit
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import Tolerances, at
+from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
+from sbafab.rules.moved_seams import STEADIER, moved_seams, straying
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, chambers_by_level, void_graph
 
@@ -51,67 +51,22 @@ def check(measures: Measures) -> list[Finding]:
     return [_failed(offences, laminate)]
 
 
-# Seams off their paths by their tools' error.
-
-
-DIRECTIONS = 8
-"""In which seams are moved; between two of them a seam is 8 % nearer than the error."""
-MOST_SINGLE = 12
-"""Seams up to which each is moved against all others; of more, every second one."""
-
-
 def _off_their_paths(measures: Measures) -> Iterator[Finding]:
     """Yield what leaks with seams off their paths, at the worst; nothing for pressed laminates."""
     laminate, tolerances = measures.laminate, measures.limits.tolerances
-    loose = [seam for gap in laminate.interfaces if not gap.pressed for seam in gap.seams]
-    if not loose:
+    words = straying(laminate, tolerances)
+    if words is None:
         return
-    errors = sorted({tolerances.of_seam(seam.tool) for seam in loose})
-    words = f"every seam off its path by up to {' or '.join(f'{error:g}' for error in errors)} mm"
-    for moved in _moved_seams(laminate, tolerances):
+    for moved in moved_seams(laminate, tolerances):
         graph = void_graph(moved)
         owners = _owners(moved, graph)
         offences = [*_missing_pockets(moved, graph, owners), *_wrong_reaches(moved, graph, owners)]
         if offences:
             fault = _failed(offences, moved)
-            remedy = (
-                "make seams wider or run them farther past edges and each other, or state a "
-                "smaller registration.seam_error that the tool keeps"
-            )
-            message = f"with {words}, {fault.message.split('; ')[0]}; {remedy}"
+            message = f"with {words}, {fault.message.split('; ')[0]}; {STEADIER}"
             yield replace(fault, message=message)
             return
     yield Finding(NAME, "pass", 0.0, 0.0, "voids", Place(), f"sealed with {words}, too")
-
-
-def _moved_seams(laminate: Laminate, tolerances: Tolerances) -> Iterator[Laminate]:
-    """Yield the laminate with its seams off their paths: all one way, and some against the rest."""
-    seams = laminate.seams
-    against = [{n} for n in range(len(seams))]
-    if len(seams) > MOST_SINGLE:
-        against = [set(range(0, len(seams), 2))]
-    for back in ({-1}, *(against if len(seams) > 1 else ())):
-        for turn in range(DIRECTIONS):
-            x, y = unit(360.0 * turn / DIRECTIONS)
-            moved = [
-                _moved_seam(seam, (-off * x, -off * y) if n in back else (off * x, off * y))
-                for n, seam in enumerate(seams)
-                if (off := tolerances.of_seam(seam.tool)) >= 0
-            ]
-            yield replace(laminate, seams=tuple(moved))
-
-
-def _moved_seam(seam: Seam, by: Point) -> Seam:
-    def off(p: Point) -> Point:
-        return p[0] + by[0], p[1] + by[1]
-
-    def moved(edge: Edge) -> Edge:
-        start, end = off(edge.start), off(edge.end)
-        if isinstance(edge, Arc):
-            return Arc(start, end, off(edge.centre), edge.radius, edge.ccw)
-        return Line(start, end)
-
-    return replace(seam, path=tuple(tuple(map(moved, chain)) for chain in seam.path))
 
 
 def _judged_by_nets(laminate: Laminate) -> list[Finding]:
