@@ -87,6 +87,20 @@ def test_a_tube_goes_between_the_films_of_its_own_chamber(sheet_files: Any) -> N
     assert "the tab's end, layers 1 and 3 for in and layers 3 and 5 for out; the PTFE" in words
 
 
+def test_chambers_of_one_net_are_filled_by_its_first_tube(sheet_files: Any) -> None:
+    """What comes out of the other is no leak between chambers."""
+    diode, gripper = words_of(page(sheet_files, "diode")), words_of(page(sheet_files, "gripper"))
+    closed = "(net through): fill by in, and keep out closed in every test below."
+    open_tubes = "While one chamber is full, watch the open tubes of the others"
+    assert closed in diode
+    assert open_tubes not in diode
+    assert "raise the chamber slowly to 5 kPa and hold for 60 s. All" in diode
+    assert "the other chambers open" not in diode
+    assert "lead into the same channels" not in gripper
+    assert open_tubes in gripper
+    assert "raise each chamber slowly to 5 kPa" in gripper
+
+
 def test_a_folded_part_comes_off_the_sheet_as_one() -> None:
     design, laminate = built("folded")
     plan = schedule(laminate, press_settings(design))

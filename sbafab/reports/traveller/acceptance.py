@@ -177,7 +177,8 @@ def _each(names: Sequence[str]) -> str:
 def leak_test(work: Work) -> list[Action]:
     """Return the paper's way to find leaks, then the proof test; pressures and times are ours."""
     holes = [port.name for port in work.laminate.tube_holes]
-    names = _boxes([*[chamber.name for chamber in work.laminate.chambers], *holes])
+    filled = _filled(work)
+    names = _boxes(filled)
     lumen = ["lumen"] if work.laminate.lumen else []
     tab = ["tab"] if work.laminate.inlets or not holes else []
     alone = work.job.copies == 1
@@ -190,7 +191,7 @@ def leak_test(work: Work) -> list[Action]:
                 "a leak between chambers.",
             )
         ]
-        if work.laminate.tube_count > 1
+        if len(filled) > 1
         else []
     )
     return [
@@ -228,16 +229,28 @@ def _vacuum_test(work: Work, names: tuple[str, ...]) -> Iterator[Action]:
         )
 
 
+def _joined(work: Work) -> dict[str, list[str]]:
+    """Return the names of chambers with an inlet and of tubes on holes, by net."""
+    laminate = work.laminate
+    tubes = {port.name for port in laminate.tube_holes} | {one.chamber for one in laminate.inlets}
+    return {net.name: [name for name in net.ports if name in tubes] for net in laminate.nets}
+
+
+def _filled(work: Work) -> list[str]:
+    """Return the chambers and tubes on holes that are filled one by one, a net's by its first."""
+    names = [chamber.name for chamber in work.laminate.chambers]
+    names += [port.name for port in work.laminate.tube_holes]
+    closed = {name for joined in _joined(work).values() for name in joined[1:]}
+    return [name for name in names if name not in closed]
+
+
 def _joined_tubes(work: Work) -> Iterator[Action]:
-    """Yield which tubes to close, for each net with a tube on a hole and one more tube."""
-    holes = {port.name for port in work.laminate.tube_holes}
-    tubes = holes | {inlet.chamber for inlet in work.laminate.inlets}
-    for net in work.laminate.nets:
-        joined = [name for name in net.ports if name in tubes]
-        if len(joined) > 1 and holes.intersection(joined):
+    """Yield which tubes to close, for each net with several."""
+    for net, joined in _joined(work).items():
+        if len(joined) > 1:
             yield Action(
-                f"Tubes of {joined_words(joined)} lead into the same channels (net {net.name}): "
-                "close all of them but one, and fill by that."
+                f"Tubes of {joined_words(joined)} lead into the same channels (net {net}): fill by "
+                f"{joined[0]}, and keep {joined_words(joined[1:])} closed in every test below."
             )
 
 
