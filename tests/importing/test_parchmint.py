@@ -417,6 +417,6 @@ def test_a_circuit_without_chambers_goes_through_to_its_traveller(tmp_path: Path
     page = " ".join(re.sub(r"<[^>]+>", "", (folder / "traveller.html").read_text()).split())
     assert "Fit the tubes Mark the holes of in1, in2 and out2 with a pen" in page
     assert "Cut 3 pieces of tubing of your choice, outer diameter 3 mm" in page
-    assert "Tubes of in2 and out2 lead into the same channels (net net2): fill by in2, and keep" in page
+    assert "Tubes of in2 and out2 lead into the same channels (net net2): fill by in2," in page
     assert "in the tube's bore;" in page.replace("&#39;", "'")
     assert "the tab" not in page.split("Fit the tubes")[1]
