@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from functools import cache
 from itertools import pairwise
@@ -13,6 +14,7 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.pressing.work_plan import plan_csv
 from sbafab.reports.traveller.job import Job
 from sbafab.reports.traveller.page import traveller_html
 
@@ -122,3 +124,17 @@ def test_every_actuator_of_a_batch_has_its_serial_number() -> None:
     assert all(len(row.findall("td/input")) == 4 for row in rows)
     leak = words_of(page.get_element_by_id("leak").getparent())
     assert "Write both results beside its serial number" in leak
+
+
+def test_the_working_days_of_a_batch_are_those_of_its_plan() -> None:
+    """The table of times states the last day of plan.csv."""
+    design = load_design("1dof-5mm", ("stack.balloons=2", "order.copies=30"))
+    laminate = build(design)
+    plan = schedule(laminate, press_settings(design))
+    page = traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1", copies=30))
+    text = plan_csv(design, laminate, plan)
+    assert text is not None
+    last = max(int(row["day"]) for row in csv.DictReader(text.splitlines()))
+    assert last > 1
+    rows = [[words_of(cell) for cell in row] for row in lxml_html.fromstring(page).iter("tr")]
+    assert [row[1] for row in rows if row[0] == "In working days"] == [str(last)]

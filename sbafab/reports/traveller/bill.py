@@ -21,6 +21,7 @@ from sbafab.cutting.properties import (
 from sbafab.design.identity import tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.pressing.cycles import batch_times
+from sbafab.pressing.work_plan import shop_of, work_plan
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.job import Job, Work
@@ -402,7 +403,7 @@ def laser_basis(work: Work) -> str:
 
 
 def _batch(work: Work) -> list[Time]:
-    """Return the row of the whole batch; empty for a single copy."""
+    """Return the rows of the whole batch; empty for a single copy."""
     runs, plan = work.runs, work.schedule
     if runs.copies == 1:
         return []
@@ -413,7 +414,20 @@ def _batch(work: Work) -> list[Time]:
         f"{units.minutes(units.product(runs.copies, plan.estimated_build_minutes))}"
     )
     row = f"All {runs.copies} copies"
-    return [Time(row, units.whole_minutes(took.total), made_of)]
+    rows = [Time(row, units.whole_minutes(took.total), made_of)]
+    days = {entry.day for entry in work_plan(work.design, work.laminate, plan, runs.copies)}
+    if days:
+        shop = shop_of(work.design)
+        means = ", ".join(
+            (
+                units.count(shop.technicians, "technician"),
+                units.count(shop.presses, "press", "presses"),
+                units.count(shop.plates, "base plate"),
+            )
+        )
+        words = f"sorting, warming, cooling, curing and tests included, see section Batch; {means}"
+        rows.append(Time("In working days", str(max(days)), words))
+    return rows
 
 
 def times(work: Work) -> list[Time]:
