@@ -187,6 +187,7 @@ def _control() -> dict[str, Any]:
     chart_set = table(
         name=TEXT,
         points=array(TEXT),
+        baseline_points={"type": ["integer", "null"], "minimum": 2},
         charts=array(chart),
         changes=array(table(point=COUNT, what=TEXT)),
         capability={**state, "type": ["object", "null"]},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -100,6 +101,13 @@ def _row_key(
     return None if match is None else (match[1] == "e", int(match[2]))
 
 
+def _day(context: click.Context, option: click.Parameter, text: str) -> str:
+    try:
+        return date.fromisoformat(text).isoformat() if text else ""
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is no day; write it such as 2026-11-30") from None
+
+
 def _history_options(command: Command) -> Command:
     """Add the options of a device's history."""
     options = (
@@ -131,6 +139,13 @@ def _history_options(command: Command) -> Command:
             type=click.Path(path_type=Path, file_okay=False),
             metavar="FOLDER",
             help="Write control charts of all records, and which step to look at first.",
+        ),
+        click.option(
+            "--baseline",
+            metavar="DAY",
+            default="",
+            callback=_day,
+            help="With --charts: control limits come from the points until this day, 2026-11-30.",
         ),
         click.option(
             "--gauge",
@@ -241,6 +256,8 @@ def _one_task(design: str | None, values: Mapping[str, Any]) -> None:
         raise click.UsageError("--withdraw goes with --correct N")
     if values["head"] and not values["verify"]:
         raise click.UsageError("--head goes with --verify")
+    if values["baseline"] and tasks != ["charts"]:
+        raise click.UsageError("--baseline goes with --charts")
     if values["limit"] and tasks not in (["charts"], ["gauge"]):
         raise click.UsageError("--limit goes with --charts and --gauge")
     _one_kind(tasks, values)
@@ -371,7 +388,7 @@ def _limits(texts: Sequence[str]) -> dict[str, ControlLimits]:
 def _write_charts(store: Lab, values: Mapping[str, Any], as_json: bool) -> None:
     from sbafab.results.process_control import PAGE, process_control, write_charts
 
-    control = process_control(store, _limits(values["limit"]))
+    control = process_control(store, _limits(values["limit"]), values["baseline"])
     write_charts(control, values["charts"])
     if as_json:
         print_json(control.as_dict())

@@ -81,19 +81,29 @@ def western_electric(z: Sequence[float], rules: Sequence[int] = tuple(RULES)) ->
                     yield Signal(last, rule)
 
 
-def proportions_chart(failures: Sequence[int], sizes: Sequence[int]) -> ControlChart:
-    """Return the p chart of ``failures`` among ``sizes`` units of each group."""
-    _check_counts(failures, sizes)
-    centre = sum(failures) / sum(sizes)
+def proportions_chart(
+    failures: Sequence[int], sizes: Sequence[int], baseline: int | None = None
+) -> ControlChart:
+    """Return the p chart of ``failures`` among ``sizes`` units of each group.
+
+    Centre and limits come from the first ``baseline`` groups, by default from all.
+    """
+    _check_counts(failures[:baseline], sizes[:baseline])
+    centre = sum(failures[:baseline]) / sum(sizes[:baseline])
     sigmas = [math.sqrt(centre * (1 - centre) / size) for size in sizes]
     values = [count / size for count, size in zip(failures, sizes, strict=True)]
     return _attributes_chart("p", values, centre, sigmas, 1.0)
 
 
-def defects_chart(defects: Sequence[int], units: Sequence[int]) -> ControlChart:
-    """Return the u chart: defects per unit, of ``defects`` on ``units`` of each group."""
-    _check_counts(defects, units)
-    centre = sum(defects) / sum(units)
+def defects_chart(
+    defects: Sequence[int], units: Sequence[int], baseline: int | None = None
+) -> ControlChart:
+    """Return the u chart: defects per unit, of ``defects`` on ``units`` of each group.
+
+    Centre and limits come from the first ``baseline`` groups, by default from all.
+    """
+    _check_counts(defects[:baseline], units[:baseline])
+    centre = sum(defects[:baseline]) / sum(units[:baseline])
     sigmas = [math.sqrt(centre / count) for count in units]
     values = [count / size for count, size in zip(defects, units, strict=True)]
     return _attributes_chart("u", values, centre, sigmas, math.inf)
@@ -133,9 +143,12 @@ def _moving_ranges(values: Sequence[float]) -> list[float]:
     return [abs(b - a) for a, b in zip(values, values[1:], strict=False)]
 
 
-def individuals_chart(values: Sequence[float]) -> ControlChart:
-    """Return the chart of single values, with limits from their moving range."""
-    centre, sigma = fmean(values), sigma_of(values)
+def individuals_chart(values: Sequence[float], baseline: int | None = None) -> ControlChart:
+    """Return the chart of single values, with limits from the moving range.
+
+    Centre and limits come from the first ``baseline`` values, by default from all.
+    """
+    centre, sigma = fmean(values[:baseline]), sigma_of(values[:baseline])
     count = len(values)
     return ControlChart(
         "individuals",
@@ -147,10 +160,13 @@ def individuals_chart(values: Sequence[float]) -> ControlChart:
     )
 
 
-def moving_range_chart(values: Sequence[float]) -> ControlChart:
-    """Return the chart of the ranges from one value to the next; its first is that to value 2."""
+def moving_range_chart(values: Sequence[float], baseline: int | None = None) -> ControlChart:
+    """Return the chart of the ranges from one value to the next; its first is that to value 2.
+
+    Centre and limit come from the first ``baseline`` values, by default from all.
+    """
     ranges = _moving_ranges(values)
-    centre, count = fmean(ranges), len(ranges)
+    centre, count = fmean(_moving_ranges(values[:baseline])), len(ranges)
     upper = D4 * centre
     signals = tuple(Signal(n, 1) for n, value in enumerate(ranges) if value > upper)
     zeros = (0.0,) * count

@@ -12,7 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 from typing import Any, NamedTuple
 
 from sbafab.errors import DesignError, OutputError
@@ -32,6 +32,7 @@ from sbafab.results.control_charts import (
     individuals_chart,
     moving_range_chart,
     proportions_chart,
+    sigma_of,
     statistics,
 )
 from sbafab.results.history import REJECT, REWORK, StoredEntry, standing_entries
@@ -96,13 +97,17 @@ class Suspect(NamedTuple):
 
 @dataclass(frozen=True)
 class ChartSet:
-    """Charts of one quantity over its points; ``marks`` are changes at points, from 0."""
+    """Charts of one quantity over its points; ``marks`` are changes at points, from 0.
+
+    Limits come from the first ``baseline`` points, or from all where it is None.
+    """
 
     name: str
     labels: tuple[str, ...]
     charts: tuple[ControlChart, ...]
     marks: tuple[tuple[int, str], ...]
     capability: Capability | None = None
+    baseline: int | None = None
 
     @property
     def signals(self) -> list[tuple[str, str, list[str]]]:
@@ -118,6 +123,7 @@ class ChartSet:
         return {
             "name": self.name,
             "points": list(self.labels),
+            "baseline_points": self.baseline,
             "charts": [chart.as_dict() for chart in self.charts],
             "changes": [{"point": point, "what": words} for point, words in self.marks],
             "capability": None if self.capability is None else self.capability.as_dict(),
@@ -152,11 +158,14 @@ class ProcessControl:
         }
 
 
-def process_control(lab: Lab, limits: Mapping[str, ControlLimits]) -> ProcessControl:
+def process_control(
+    lab: Lab, limits: Mapping[str, ControlLimits], baseline: str = ""
+) -> ProcessControl:
     """Return the process control of all records of a lab.
 
     ``limits`` by quantity, such as stroke_mm or temperature_c; the tolerances of placement and
-    cutting are taken from the designs. Raises DesignError.
+    cutting are taken from the designs. Control limits come from the points until the day
+    ``baseline``, of quantities with enough of them; else from all. Raises DesignError.
     """
     stored, builds = lab.contents()
     records, entries = standing(stored), standing_entries(lab.entries())
@@ -170,14 +179,20 @@ def process_control(lab: Lab, limits: Mapping[str, ControlLimits]) -> ProcessCon
             f"nothing is recorded of {', '.join(unknown)}; recorded are "
             f"{', '.join(sorted({name.split(', ')[0] for name in series})) or 'no numbers'}"
         )
-    sets = [*_failure_sets(devices, changes)]
+    sets = [*_failure_sets(devices, changes, baseline)]
     for name, points in series.items():
         if len(points) >= FEWEST:
-            sets.append(_value_set(name, points, changes, stated.get(name.split(", ")[0])))
+            within = stated.get(name.split(", ")[0])
+            sets.append(_value_set(name, points, changes, within, baseline))
     if not sets:
         raise DesignError(
             f"{lab.path} has too few records for a chart: two days of tested devices or {FEWEST} "
             "values of a quantity"
+        )
+    if baseline and all(chart_set.baseline is None for chart_set in sets):
+        raise DesignError(
+            f"until {baseline} there are too few points for limits: two days of tested devices or "
+            f"{FEWEST} values of a quantity; give a later day, or leave --baseline out"
         )
     failures = Counter(failure for device in devices for failure in device.failures)
     suspects = tuple(_suspects(devices))
@@ -302,7 +317,7 @@ def _tolerances(builds: Mapping[str, Build]) -> dict[str, ControlLimits]:
 
 
 def _failure_sets(
-    devices: Sequence[Device], changes: Sequence[ProcessChange]
+    devices: Sequence[Device], changes: Sequence[ProcessChange], baseline: str
 ) -> Iterator[ChartSet]:
     """Yield the p and u charts, a point a day."""
     days: dict[str, list[Device]] = defaultdict(list)
@@ -312,12 +327,20 @@ def _failure_sets(
     if len(days) < 2:
         return
     groups = [days[day] for day in sorted(days)]
+    first = _points_until(baseline, sorted(days), 2)
     sizes = [len(group) for group in groups]
     failures = [sum(bool(device.failures) for device in group) for group in groups]
     defects = [sum(device.defects for device in group) for group in groups]
     labels = tuple(f"{day}: {n} devices" for day, n in zip(sorted(days), sizes, strict=True))
-    charts = (proportions_chart(failures, sizes), defects_chart(defects, sizes))
-    yield ChartSet("failures by day", labels, charts, _marks(changes, [(d,) for d in sorted(days)]))
+    charts = (proportions_chart(failures, sizes, first), defects_chart(defects, sizes, first))
+    marks = _marks(changes, [(day,) for day in sorted(days)])
+    yield ChartSet("failures by day", labels, charts, marks, baseline=first)
+
+
+def _points_until(baseline: str, days: Sequence[str], fewest: int) -> int | None:
+    """Return the number of points until the day ``baseline``; None for fewer than ``fewest``."""
+    count = sum(day <= baseline for day in days)
+    return count if baseline and count >= fewest else None
 
 
 def _value_set(
@@ -325,9 +348,16 @@ def _value_set(
     points: Sequence[ChartPoint],
     changes: Sequence[ProcessChange],
     limits: ControlLimits | None,
+    baseline: str,
 ) -> ChartSet:
     values = [point.value for point in points]
-    charts = (individuals_chart(values), moving_range_chart(values), ewma_chart(values))
+    first = _points_until(baseline, [point.when[0] for point in points], FEWEST)
+    centre, sigma = fmean(values[:first]), sigma_of(values[:first])
+    charts = (
+        individuals_chart(values, first),
+        moving_range_chart(values, first),
+        ewma_chart(values, centre, sigma),
+    )
     is_spread = len(set(values)) > 1
     return ChartSet(
         name,
@@ -335,6 +365,7 @@ def _value_set(
         charts,
         _marks(changes, [point.when for point in points]),
         capability(values, limits) if limits is not None and is_spread else None,
+        first,
     )
 
 

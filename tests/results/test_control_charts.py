@@ -195,3 +195,17 @@ def test_readings_come_from_a_table(tmp_path: Path) -> None:
         gauge_study(READINGS[:-1])
     with pytest.raises(DesignError, match="two parts and two operators"):
         gauge_study(READINGS[:30])
+
+
+def test_limits_of_a_baseline_are_those_of_its_points_alone() -> None:
+    """The handbook's limits stay where the process shifts after them, and show it."""
+    shifted = [*FLOW, *(value + 10 for value in FLOW[:4])]
+    chart, ranges = individuals_chart(shifted, len(FLOW)), moving_range_chart(shifted, len(FLOW))
+    assert (chart.upper[0], chart.lower[0]) == pytest.approx((55.8041, 45.8159), abs=1e-4)
+    assert {signal.point for signal in chart.signals if signal.rule == 1} >= {10, 11, 12, 13}
+    assert ranges.centre[0] == pytest.approx(1.8778, abs=5e-5)
+    wafers = proportions_chart([*WAFERS, 40], [50] * 31, 30)
+    assert (wafers.upper[-1], wafers.lower[-1]) == pytest.approx((0.4102, 0.0524), abs=1e-4)
+    assert wafers.signals[-1].point == 30
+    defects = defects_chart([*DEFECTS, 90], [1] * 26, 25)
+    assert defects.centre == pytest.approx((sum(DEFECTS) / 25,) * 26)

@@ -130,3 +130,15 @@ def test_too_few_records_are_one_sentence(lab: Lab, make_build: Make) -> None:
     lab.add(SHA, make_build(), [LabResult("A1", "pass")])
     with pytest.raises(DesignError, match="too few records for a chart"):
         process_control(lab, {})
+
+
+def test_limits_of_a_baseline_show_a_later_drift(lab: Lab, make_build: Make) -> None:
+    """Step 1 runs 4 degrees low from device 17 on, the day 2026-05-08."""
+    filled(lab, make_build(), 17)
+    control = process_control(lab, {}, "2026-05-07")
+    (cold,) = (each for each in control.sets if each.name == "temperature_c, step 1")
+    assert cold.baseline == 16
+    points = {s.point for s in cold.charts[0].signals if s.rule == 1}
+    assert points == set(range(16, 24))
+    with pytest.raises(DesignError, match="until 2026-05-01 there are too few points"):
+        process_control(lab, {}, "2026-05-01")
