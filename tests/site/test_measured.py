@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shlex
 from importlib.util import find_spec
@@ -154,3 +155,19 @@ def test_mutation_testing_adds_up() -> None:
 def test_the_rules_of_the_page_are_rules_of_the_deck() -> None:
     listed = re.findall(r"^\| `([a-z-]+)` \| ", TEXTS[DOCS / "rules.md"], re.MULTILINE)
     assert set(listed) - {*AS_BUILT} <= {*rule_names()}
+
+
+def test_the_page_on_cutting_counts_the_sheets_of_the_record() -> None:
+    with (FOLDER / "nesting.csv").open(encoding="utf-8", newline="") as opened:
+        rows = list(csv.DictReader(opened))
+    totals = {
+        name: sum(max(1, int(row[name])) for row in rows)
+        for name in ("sbafab", "bottom_left", "area")
+    }
+    packed = [row for row in rows if row["sparrow"]]
+    fewer = sum(int(row["sparrow"]) < int(row["sbafab"]) for row in packed)
+    page = text("cutting")
+    assert "take {sbafab} sheets, by bottom-left alone {bottom_left}".format(**totals) in page
+    assert f"no fewer than {totals['area']}" in page
+    assert f"fewer in {fewer} of {len(packed)} films" in page
+    assert sum(row["one_more"] == "yes" for row in packed) == 2
