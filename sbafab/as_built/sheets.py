@@ -16,7 +16,7 @@ from sbafab.as_built.measures import SHARE
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.lightburn import ENDING, read_project
 from sbafab.cutting.properties import (
     CUT_SHEET,
     ENGRAVE,
@@ -27,7 +27,7 @@ from sbafab.cutting.properties import (
     limit_properties,
 )
 from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path, severed, stack_kerf
-from sbafab.cutting.sheets import FOLDER
+from sbafab.cutting.sheets import FOLDER, check_cuts
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_surroundings
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
@@ -40,7 +40,7 @@ from sbafab.laminate.films import Material, in_order
 from sbafab.laminate.laminate import Layer, SheetPanel, freed
 from sbafab.nesting.check import check_placed, edge_distance
 from sbafab.nesting.records import TURNS, Stock, Turn, no_spares
-from sbafab.output.checked import stocks
+from sbafab.output.checked import entries, stocks
 from sbafab.output.manifest import (
     FilmUseClaim,
     JobManifest,
@@ -315,6 +315,7 @@ def sheet_problems(folder: Path, order: SheetOrder) -> list[Problem]:
             bare.append(drawing)
         problems += _layout_problems(sheet_claim, drawing, stock_of[sheet_claim.material])
         problems += _number_problems(sheets[-1], drawing)
+        problems += _machine_problems(folder, sheet_claim, drawing.region, order.design)
     if bare:
         of = "the files of " + (f"{len(bare)} film sheets" if len(bare) > 1 else "a film sheet")
         problems.append(bare_problem(of, all(drawing.units for drawing in bare)))
@@ -573,6 +574,22 @@ def _number_problems(sheet: CutSheet, drawing: ReadBack) -> list[Problem]:
         for key, claimed, measured, room in agree
         if abs(claimed - measured) > room
     ]
+
+
+def _machine_problems(
+    folder: Path, sheet_claim: SheetClaim, region: Region, design: Design
+) -> list[Problem]:
+    """Return differences of a sheet's machine file from what it cuts, with lead-ins and tabs."""
+    asked = entries(design).get(sheet_claim.material)
+    if asked is None:
+        return []
+    try:
+        path = path_in_folder(folder, sheet_claim.project)
+        check_cuts(path, read_project(path).cut_runs, region, asked)
+    except OutputError as error:
+        reason = str(error).removeprefix(f"{PurePosixPath(sheet_claim.project).name}: ")
+        return [Problem(INTEGRITY, f"{sheet_claim.project}: {reason}")]
+    return []
 
 
 # Registered sheets: the parts that the second cut frees.

@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
+from sbafab.cutting.beam_check import BeamRun
+from sbafab.cutting.beam_paths import LaserRun, contour_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
 from sbafab.cutting.order import cutting_order
 from sbafab.cutting.properties import (
@@ -142,36 +144,6 @@ def _measured_kerf(recipe: Recipe) -> str:
     return "" if recipe.kerf_mm is None else f", kerf {recipe.kerf_mm:g} mm"
 
 
-class LaserRun(NamedTuple):
-    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
-
-    layer: str
-    edges: tuple[Edge, ...]
-    closed: bool
-    circle: tuple[Point, float] | None = None
-
-
-def drawn(contours: Sequence[Contour], sheet: Surroundings) -> Iterator[LaserRun]:
-    """Yield the content of a sheet in cutting order; the frame, which is not cut, comes last."""
-    for run in sheet.engraved:
-        yield _run(ENGRAVE, run)
-    for contour in contours:
-        layer = CUT_INNER if contour.is_hole else CUT_OUTER
-        yield LaserRun(layer, contour.edges, True, contour.circle)
-    for run in sheet.parting:
-        yield _run(CUT_SHEET, run)
-    for run in sheet.marks:
-        yield _run(REFERENCE, run)
-    if sheet.frame is not None:
-        x, y = sheet.frame
-        yield _run(REFERENCE, ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)))
-
-
-def _run(layer: str, run: Sequence[Point]) -> LaserRun:
-    edges = tuple(map(Line, run[:-1], run[1:]))
-    return LaserRun(layer, edges, run[0] == run[-1])
-
-
 def parts_of(edge: Edge) -> Sequence[Edge]:
     """The edge, or the pieces of an arc that become a curve each."""
     if isinstance(edge, Line):
@@ -193,7 +165,7 @@ def project_text(
     Contours are cut in the order given, holes before outlines. Lower left corner at the origin,
     y upwards, mm.
     """
-    shapes = list(drawn(contours, sheet))
+    shapes = list(drawn(contour_runs(contours), sheet))
     layers = sheet_layers({shape.layer for shape in shapes}, recipes)
     return runs_text(layers, shapes, properties, advice)
 
@@ -377,6 +349,16 @@ class Project(NamedTuple):
     settings: dict[int, dict[str, str]]
     shapes: tuple[LaserShape, ...]
 
+    @property
+    def cut_runs(self) -> list[BeamRun]:
+        """What cuts parts of a sheet, in the file's order."""
+        layers = {INDICES[layer]: layer for layer in (CUT_INNER, CUT_OUTER)}
+        return [
+            BeamRun(layers[shape.index], shape.curves)
+            for shape in self.shapes
+            if shape.index in layers
+        ]
+
 
 def read_project(path: Path) -> Project:
     """A project as this program writes it. Raises OutputError for any other file."""
@@ -499,7 +481,7 @@ def verify_project(
     order, the frame is not cut and no power is set but that of a recipe. Raises OutputError with
     what is not, and where.
     """
-    expected = list(drawn(contours, sheet))
+    expected = list(drawn(contour_runs(contours), sheet))
     verify_runs(path, sheet_layers({run.layer for run in expected}, recipes), expected)
 
 
@@ -696,8 +678,9 @@ def _offs(curve: Bezier, part: Edge) -> Iterator[tuple[float, Point]]:
 
 
 FOLDER = "sheets"
+PANEL_POWERS = "Powers are 0: set power and speed of each layer for this film"
 PANEL_ADVICE = (
-    "Powers are 0: set power and speed of each layer for this film. Leave kerf offset 0 and "
+    "Leave kerf offset 0 and "
     "REFERENCE without output. The sheet's cut corner must be at the upper {side}"
 )
 
@@ -727,12 +710,17 @@ def write_projects(
         left_edge, side = (-x1, "left") if first.is_mask else (x0, "right")
         properties = file_properties(settings, first.film.material, pattern)
         target = folder / _file_path(first, settings)
-        _write(target, paths[pattern].moved(-left_edge, -y0), Surroundings(), properties, side)
+        recipes = settings.recipes.get(first.film.material, NO_RECIPES)
+        advice = advice_of(settings, first.film.material) if recipes else PANEL_POWERS
+        advice = f"{advice}. {PANEL_ADVICE.format(side=side)}"
+        path = paths[pattern].moved(-left_edge, -y0)
+        _write(target, path, Surroundings(), properties, advice, recipes)
     drawn = marks(panel)
     moved = tuple(tuple((x - x0, y - y0) for x, y in run) for run in drawn.marks)
     path = laser_path(laminate, settings).moved(-x0, -y0)
     target = (folder / PATH).with_suffix(ENDING)
-    _write(target, path, Surroundings(marks=moved), properties_of(laminate, settings), "right")
+    advice = f"{PANEL_POWERS}. {PANEL_ADVICE.format(side='right')}"
+    _write(target, path, Surroundings(marks=moved), properties_of(laminate, settings), advice)
 
 
 def _file_path(layer: Layer, settings: CutSettings) -> str:
@@ -741,10 +729,15 @@ def _file_path(layer: Layer, settings: CutSettings) -> str:
 
 
 def _write(
-    target: Path, path: Region, around: Surroundings, properties: Mapping[str, str], side: str
+    target: Path,
+    path: Region,
+    around: Surroundings,
+    properties: Mapping[str, str],
+    advice: str,
+    recipes: Recipes = NO_RECIPES,
 ) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     contours = cutting_order(path)
-    text = project_text(contours, around, properties, PANEL_ADVICE.format(side=side))
+    text = project_text(contours, around, properties, advice, recipes)
     target.write_bytes(text.encode())
-    verify_project(target, contours, around)
+    verify_project(target, contours, around, recipes)

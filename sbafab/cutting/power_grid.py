@@ -15,16 +15,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
+from sbafab.cutting.beam_paths import LaserRun, stroke_run
 from sbafab.cutting.calibration import SEPARATORS, row_cells, table_text
 from sbafab.cutting.dxf_write import layered_text
 from sbafab.cutting.lettering import Stroke, strokes, width
-from sbafab.cutting.lightburn import LaserLayer, LaserRun, runs_text, verify_runs
+from sbafab.cutting.lightburn import LaserLayer, runs_text, verify_runs
 from sbafab.cutting.properties import ENGRAVE, coupon_properties
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.design.files import checked
 from sbafab.design.recipes import Operation, Recipe
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.edges import Line, Point
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import coord
 from sbafab.spreadsheet import TEXT_MARK, csv_text
 
@@ -174,10 +175,7 @@ class PowerGrid:
     @property
     def runs(self) -> list[LaserRun]:
         """The same as LightBurn's project has them."""
-        return [
-            LaserRun(layer, tuple(map(Line, run[:-1], run[1:])), run[0] == run[-1])
-            for layer, run in self.lines
-        ]
+        return [stroke_run(layer, run) for layer, run in self.lines]
 
     @property
     def layers(self) -> list[LaserLayer]:

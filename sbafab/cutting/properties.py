@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+from sbafab.cutting.entries import Entries
 from sbafab.design.films import is_kerf
 from sbafab.design.recipes import Operation, Recipe
 from sbafab.errors import OutputError
@@ -55,6 +56,7 @@ class CutSettings:
     platen: tuple[float, float] = (152.4, 152.4)
     machine: str | None = None
     recipes: Mapping[Material, Recipes] = field(default_factory=dict)
+    entries: Mapping[Material, Entries] = field(default_factory=dict)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)

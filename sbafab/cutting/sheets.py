@@ -5,22 +5,27 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from sbafab.cutting.beam_check import BeamRun, check_beam_runs
+from sbafab.cutting.beam_paths import beam_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
+from sbafab.cutting.entries import PLAIN, Entries
 from sbafab.cutting.index_marks import IndexMark, index_marks
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.cutting.lightburn import (
     ENDING,
     NO_RECIPES,
     advice_of,
-    project_text,
-    verify_project,
+    read_project,
+    runs_text,
+    sheet_layers,
+    verify_runs,
 )
 from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
@@ -143,10 +148,7 @@ def _write_sheet(
     read = verify_file(path, Region(contours), properties)
     _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
-    recipes = settings.recipes.get(nest.material, NO_RECIPES)
-    advice = advice_of(settings, nest.material)
-    project.write_bytes(project_text(contours, around, properties, advice, recipes).encode())
-    verify_project(project, contours, around, recipes)
+    _write_project(project, _Layout(nest, sheet, contours, around), settings, properties)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
     picture.write_text(
@@ -174,6 +176,40 @@ def _write_sheet(
         label=label_state,
         index_marks=None if marks is None else len(marks),
     )
+
+
+class _Layout(NamedTuple):
+    """A sheet of a nest: its contours in cutting order, and what surrounds them."""
+
+    nest: Nest
+    sheet: int
+    contours: Sequence[Contour]
+    around: Surroundings
+
+
+def _write_project(
+    path: Path, layout: _Layout, settings: CutSettings, properties: Mapping[str, str]
+) -> None:
+    """Write a sheet's LightBurn project, with lead-ins, overcuts and tabs where asked for."""
+    material, around = layout.nest.material, layout.around
+    entries = settings.entries.get(material, PLAIN)
+    name = f"{material} sheet {layout.sheet + 1}"
+    cuts = beam_runs(layout.contours, entries, around, layout.nest.stock.pins, name)
+    runs = list(drawn(cuts, around))
+    layers = sheet_layers({run.layer for run in runs}, settings.recipes.get(material, NO_RECIPES))
+    notes = {**properties, **entries.properties}
+    path.write_bytes(runs_text(layers, runs, notes, advice_of(settings, material)).encode())
+    verify_runs(path, layers, runs)
+    if not entries.is_plain:
+        check_cuts(path, read_project(path).cut_runs, Region(tuple(layout.contours)), entries)
+
+
+def check_cuts(path: Path, cuts: Sequence[BeamRun], region: Region, entries: Entries) -> None:
+    """Raises OutputError with the file where its cuts are not the region's contours as asked."""
+    try:
+        check_beam_runs(cuts, region, entries)
+    except OutputError as error:
+        raise OutputError(f"{path.name}: {error}; regenerate it") from error
 
 
 def _surroundings(

@@ -83,6 +83,22 @@ class Sheet(Section):
     """Sheets that may be used."""
     piece: str | None = Field(default=None, max_length=40)
     """The piece of the stock file that a run cuts; the run writes it, with width and length."""
+    lead_in: Annotated[float, Millimetres(0.01, 20)] | None = None
+    """Length of the straight line in the waste by which the beam comes to each contour, in machine
+    files; by default none."""
+    overcut: Annotated[float, Millimetres(0.01, 20)] | None = None
+    """How far the beam follows a contour past its start, in machine files; by default not."""
+    tab_width: Annotated[float, Millimetres(0.01, 20)] | None = None
+    """Width of the tabs of film that hold an outline in the skeleton, in machine files; by default
+    there are none. A tab's rest stays on the part."""
+    tabs: int | None = Field(default=None, ge=1, le=50)
+    """Tabs of each outline; 3 unless given."""
+
+    @model_validator(mode="after")
+    def _tabs_have_a_width(self) -> Self:
+        if self.tabs is not None and self.tab_width is None:
+            raise ValueError("has tabs without tab_width; add tab_width, or remove tabs")
+        return self
 
 
 FaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
+from sbafab.cutting.entries import Entries
 from sbafab.cutting.kerf import compensated_paths
 from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
@@ -18,7 +19,7 @@ from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
 from sbafab.design.sections import NOT_MEASURED, named_film
 from sbafab.errors import DesignError, GeometryError
-from sbafab.geometry.offset import Kerf
+from sbafab.geometry.offset import Kerf, widths
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
@@ -162,6 +163,7 @@ def cut_settings(
         platen=(design.press.platen_width, design.press.platen_length),
         machine=design.laser.machine,
         recipes=recipes(design),
+        entries=entries(design),
     )
 
 
@@ -226,9 +228,39 @@ def machine(design: Design) -> Machine:
 
 def stocks(design: Design) -> dict[Material, Stock]:
     """Return the film sheets by material."""
-    sheets = {"TPE": design.sheets.tpe, "PTFE": design.sheets.ptfe}
-    sheets |= {material(name): film.sheet for name, film in design.films.others.items()}
-    return {name: _stock(sheets[name], kerf) for name, kerf in _kerfs(design).items()}
+    sheets = _sheets(design)
+    return {name: _stock(sheets[name][1], kerf) for name, kerf in _kerfs(design).items()}
+
+
+def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
+    """The sheet of every film, by material, and the table that describes it."""
+    sheets = {"TPE": ("sheets.tpe", design.sheets.tpe), "PTFE": ("sheets.ptfe", design.sheets.ptfe)}
+    others = design.films.others.items()
+    return sheets | {material(name): (f"films.{name}.sheet", film.sheet) for name, film in others}
+
+
+USUAL_TABS = 3
+
+
+def entries(design: Design) -> dict[Material, Entries]:
+    """Return lead-ins, overcuts and tabs of the films that have any."""
+    kerfs, found = kerf_widths(design), {}
+    for name, (key, sheet) in _sheets(design).items():
+        if sheet.lead_in is sheet.overcut is sheet.tab_width is None:
+            continue
+        kerf = kerfs.get(name)
+        width = max(widths(kerf)) if kerf is not None else 0.0
+        found[name] = Entries(
+            lead_in=sheet.lead_in or 0.0,
+            overcut=sheet.overcut or 0.0,
+            tab_width=sheet.tab_width or 0.0,
+            tabs=(sheet.tabs or USUAL_TABS) if sheet.tab_width else 0,
+            kerf=width,
+            # Two cuts that keep two kerfs apart leave one of film between them.
+            clearance=2 * (width or design.laser.unknown_kerf),
+            key=key,
+        )
+    return found
 
 
 def _stock(sheet: Sheet, kerf: object) -> Stock:

@@ -1,0 +1,297 @@
+"""What the beam follows on a film sheet: contours, where asked with lead-ins, overcuts and tabs.
+
+A lead-in is a straight line in the waste that ends on the contour at a right angle, or at half of
+one: inside a hole, outside an outline. An overcut follows the contour on past its start. A tab is a
+stretch of an outline that is not cut, so that the part stays in the skeleton; holes have none, for
+what falls out of them is waste. Tabs lie where the outline is smooth, clear of corners and of the
+start. Only machine files have these: the sheet's own DXF and the layer files stay the design.
+"""
+
+from __future__ import annotations
+
+import bisect
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate
+from typing import NamedTuple
+
+from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.entries import Entries
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, CUT_SHEET, ENGRAVE, REFERENCE
+from sbafab.errors import DesignError
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to, left_turn, meeting_points
+from sbafab.geometry.nearby import EdgeIndex, widened
+from sbafab.geometry.region import Region
+from sbafab.nesting.check import edge_distance
+
+CORNER = math.radians(10)
+"""A turn from edge to edge by more is a corner."""
+TRIED = 32
+"""Places along a contour where a lead-in is tried, after the middles of its longest edges."""
+STEPS = 60
+"""Places between one tab and the next where the tab is tried."""
+DEPTHS = (0.25, 0.5, 0.75, 1.0)
+"""Of a lead-in from its end, where its distance from its own contour is looked at."""
+TILTED = math.sqrt(0.5)
+SHARE = 0.99 * TILTED
+"""Least distance from the own contour at a depth, as a share of that depth."""
+TINY = 1e-7
+"""mm; no edge is cut so short."""
+
+
+class LaserRun(NamedTuple):
+    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
+
+    layer: str
+    edges: tuple[Edge, ...]
+    closed: bool
+    circle: tuple[Point, float] | None = None
+
+
+KeepOff = tuple[float, float, float]
+"""x, y and diameter of a pin that holds the sheet down."""
+
+
+def drawn(cuts: Iterable[LaserRun], sheet: Surroundings) -> Iterator[LaserRun]:
+    """Yield the content of a sheet in cutting order; the frame, which is not cut, comes last."""
+    for run in sheet.engraved:
+        yield stroke_run(ENGRAVE, run)
+    yield from cuts
+    for run in sheet.parting:
+        yield stroke_run(CUT_SHEET, run)
+    for run in sheet.marks:
+        yield stroke_run(REFERENCE, run)
+    if sheet.frame is not None:
+        x, y = sheet.frame
+        yield stroke_run(REFERENCE, ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)))
+
+
+def stroke_run(layer: str, run: Sequence[Point]) -> LaserRun:
+    """Return a run of straight lines; one that ends where it began is closed."""
+    edges = tuple(map(Line, run[:-1], run[1:]))
+    return LaserRun(layer, edges, run[0] == run[-1])
+
+
+def contour_runs(contours: Iterable[Contour]) -> Iterator[LaserRun]:
+    """Yield contours as they are, on the layer of holes or of outlines."""
+    for contour in contours:
+        yield LaserRun(_layer(contour), contour.edges, True, contour.circle)
+
+
+def _layer(contour: Contour) -> str:
+    return CUT_INNER if contour.is_hole else CUT_OUTER
+
+
+def beam_runs(
+    contours: Sequence[Contour],
+    entries: Entries,
+    sheet: Surroundings,
+    pins: Sequence[KeepOff] = (),
+    name: str = "the sheet",
+) -> list[LaserRun]:
+    """Return what the beam follows of the contours of the sheet called ``name``, in their order.
+
+    Raises DesignError with the place where a lead-in or a tab finds none.
+    """
+    if entries.is_plain:
+        return list(contour_runs(contours))
+    waste = _Waste(contours, entries.clearance, sheet, pins)
+    runs: list[LaserRun] = []
+    for contour in contours:
+        lap = _Lap(contour)
+        start, lead = 0.0, None
+        if entries.lead_in:
+            start, lead = _lead_in(lap, entries, waste, name)
+            waste.add(lead)
+        runs += _contour_runs(lap, start, lead, entries, name)
+    return runs
+
+
+def _contour_runs(
+    lap: _Lap, start: float, lead: Line | None, entries: Entries, name: str
+) -> Iterator[LaserRun]:
+    """Yield the runs of a contour that is begun at a place along it, mm from its first vertex."""
+    contour, end = lap.contour, start + lap.length + entries.overcut
+    tabs = [] if contour.is_hole or not entries.tabs else _tabs(lap, start, entries, name)
+    if lead is None and not tabs and not entries.overcut:
+        yield from contour_runs([contour])
+        return
+    half = entries.gap / 2
+    stops = [start, *(side for tab in tabs for side in (tab - half, tab + half)), end]
+    for first, last in zip(stops[::2], stops[1::2], strict=True):
+        edges = lap.stretch(first, last)
+        yield LaserRun(
+            _layer(contour), (*([lead] if lead and first == start else []), *edges), False
+        )
+
+
+class _Lap:
+    """Places along a contour by their way from its first vertex, mm."""
+
+    def __init__(self, contour: Contour) -> None:
+        self.contour = contour
+        self._edges = contour.edges
+        self._ends = [*accumulate(edge.length for edge in self._edges)]
+        self.length = self._ends[-1]
+
+    def place(self, way: float) -> tuple[Edge, Point]:
+        """The edge at a place, and the point."""
+        number, rest = self._number(way % self.length)
+        edge = self._edges[number]
+        return edge, edge.at(min(1.0, rest / edge.length))
+
+    def _number(self, way: float) -> tuple[int, float]:
+        number = min(bisect.bisect_right(self._ends, way), len(self._ends) - 1)
+        return number, way - (self._ends[number] - self._edges[number].length)
+
+    def stretch(self, first: float, last: float) -> list[Edge]:
+        """The edges from one place to another that is ahead of it, by up to two laps."""
+        number, rest = self._number(first % self.length)
+        edges, left = [], last - first
+        while left > TINY:
+            edge = self._edges[number % len(self._edges)]
+            taken = min(edge.length - rest, left)
+            if taken > TINY:
+                a, b = rest / edge.length, (rest + taken) / edge.length
+                start = edge.start if a <= 0 else edge.at(a)
+                end = edge.end if b >= 1 - 1e-12 else edge.at(b)
+                edges.append(edge if taken == edge.length else edge.part(start, end))
+            left -= taken
+            number, rest = number + 1, 0.0
+        return edges
+
+    @property
+    def middles(self) -> list[float]:
+        """The middles of the edges, longest edges first, then places all along."""
+        spans = zip(self._edges, self._ends, strict=True)
+        longest = sorted(spans, key=lambda span: -round(span[0].length, 6))[:TRIED]
+        middles = [end - edge.length / 2 for edge, end in longest]
+        return [*middles, *(self.length * k / TRIED for k in range(TRIED))]
+
+    def is_smooth(self, first: float, last: float, tight: float) -> bool:
+        """Return True if a stretch has no corner, and no arc of a radius below ``tight``."""
+        edges = self.stretch(first % self.length, first % self.length + last - first)
+        bent = any(isinstance(edge, Arc) and edge.radius < tight for edge in edges)
+        turns = map(left_turn, edges, edges[1:])
+        return not bent and all(abs(turn) <= CORNER for turn in turns)
+
+
+class _Waste:
+    """What lead-ins keep off: contours, engraving, parting cut, frame, pins and other lead-ins."""
+
+    def __init__(
+        self,
+        contours: Sequence[Contour],
+        clearance: float,
+        sheet: Surroundings,
+        pins: Sequence[KeepOff],
+    ) -> None:
+        self._region = Region(tuple(contours))
+        strokes = [*sheet.engraved, *sheet.parting, *sheet.marks]
+        others = [edge for run in strokes for edge in stroke_run(ENGRAVE, run).edges]
+        self._others = EdgeIndex(others) if others else None
+        self._clearance, self._frame, self._pins = clearance, sheet.frame, pins
+        self._leads: list[Line] = []
+
+    def add(self, lead: Line) -> None:
+        self._leads.append(lead)
+
+    def takes(self, lead: Line, contour: Contour) -> bool:
+        """Return True if a lead-in to a contour keeps off everything."""
+        reach = self._clearance
+        box = widened(lead.bounds, reach)
+        own = set(contour.edges)
+        near = [*self._region.index.touching(box)]
+        if any(edge_distance(lead, edge).value < reach for edge in near if edge not in own):
+            return False
+        if not self._leaves(lead, [edge for edge in near if edge in own]):
+            return False
+        if self._others and any(
+            edge_distance(lead, edge).value < reach for edge in self._others.touching(box)
+        ):
+            return False
+        if any(edge_distance(lead, other).value < reach for other in self._leads_near(lead)):
+            return False
+        low_x, low_y, high_x, high_y = box
+        width, length = self._frame or (math.inf, math.inf)
+        is_inside = self._frame is None or (
+            min(low_x, low_y) >= 0 and high_x <= width and high_y <= length
+        )
+        return is_inside and all(
+            distance_to(lead, (x, y)) >= diameter / 2 + reach for x, y, diameter in self._pins
+        )
+
+    def _leads_near(self, lead: Line) -> Iterator[Line]:
+        low_x, low_y, high_x, high_y = widened(lead.bounds, self._clearance)
+        for other in self._leads:
+            a, b, c, d = other.bounds
+            if a <= high_x and c >= low_x and b <= high_y and d >= low_y:
+                yield other
+
+    def _leaves(self, lead: Line, own: Sequence[Edge]) -> bool:
+        """Return True if a lead-in comes to its contour at its end alone."""
+        for depth in DEPTHS:
+            p = lead.at(1 - depth)
+            least = min(SHARE * depth * lead.length, self._clearance)
+            if any(distance_to(edge, p) < least for edge in own):
+                return False
+        return all(
+            math.dist(p, lead.end) <= 1e-5 for edge in own for p in meeting_points(lead, edge)
+        )
+
+
+def _lead_in(lap: _Lap, entries: Entries, waste: _Waste, name: str) -> tuple[float, Line]:
+    """The first place along a contour where a lead-in has room, and the lead-in."""
+    length = entries.lead_in
+    for way in lap.middles:
+        edge, (x, y) = lap.place(way)
+        ux, uy = edge.direction((x, y))
+        # The film lies to the left of every contour, the waste to the right.
+        for across, back in ((1.0, 0.0), (TILTED, TILTED)):
+            p = (
+                x + length * (across * uy - back * ux),
+                y + length * (-across * ux - back * uy),
+            )
+            lead = Line(p, (x, y))
+            if waste.takes(lead, lap.contour):
+                return way, lead
+    low_x, low_y, high_x, high_y = lap.contour.bounds
+    kind = "hole" if lap.contour.is_hole else "outline"
+    raise DesignError(
+        f"{entries.key}.lead_in = {length:g} has no room at the {kind} about "
+        f"x {(low_x + high_x) / 2:.1f}, y {(low_y + high_y) / 2:.1f} of {name}, "
+        f"{entries.clearance:g} mm clear of other cuts; make it shorter, or {entries.key}.spacing "
+        "larger"
+    )
+
+
+def _tabs(lap: _Lap, start: float, entries: Entries, name: str) -> list[float]:
+    """The middles of an outline's tabs, in the order of cutting; evenly spread where it can be."""
+    gap, pitch = entries.gap, lap.length / entries.tabs
+    # A gap's width from a corner, from the start and the overcut, and from another tab.
+    first, last = start + entries.overcut + 1.5 * gap, start + lap.length - 1.5 * gap
+    tabs: list[float] = []
+    for number in range(entries.tabs):
+        target = start + (number + 0.5) * pitch
+        tries = (
+            target + sign * step * pitch / STEPS for step in range(STEPS // 2) for sign in (1, -1)
+        )
+        tab = next(
+            (
+                way
+                for way in tries
+                if max(first, tabs[-1] + 2 * gap if tabs else first) <= way <= last
+                and lap.is_smooth(way - 1.5 * gap, way + 1.5 * gap, gap)
+            ),
+            None,
+        )
+        if tab is None:
+            low_x, low_y, high_x, high_y = lap.contour.bounds
+            raise DesignError(
+                f"{entries.key}.tabs = {entries.tabs} of {entries.tab_width:g} mm have no room on "
+                f"the outline about x {(low_x + high_x) / 2:.1f}, y {(low_y + high_y) / 2:.1f} of "
+                f"{name}, clear of corners and of the start; ask for fewer or narrower tabs"
+            )
+        tabs.append(tab)
+    return tabs

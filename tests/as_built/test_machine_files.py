@@ -1,0 +1,111 @@
+"""Machine files read back from the disk: lead-ins, overcuts and tabs as asked, and nothing else."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from sbafab.actuators import load_design
+from sbafab.as_built.check import read_folder
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.runs.run import RunRequest, generate
+from tests.as_built.doctoring import Doctor
+
+ASKED = [
+    *("stack.balloons=2", "rules.yield_builds=100", "sheets.tpe.lead_in=0.4"),
+    *("sheets.tpe.overcut=0.3", "sheets.tpe.tab_width=0.5", "sheets.ptfe.tab_width=0.4"),
+]
+PROJECT = "sheets/TPE_1.lbrn2"
+_SHAPE = r'<Shape Type="Path" CutIndex="{index}".*?</Shape>\n'
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Cut files of a 1-DoF actuator of two balloons, with tabs, and lead-ins in the TPE."""
+    out = tmp_path_factory.mktemp("held")
+    return generate(RunRequest(load_design("1dof-5mm", ASKED), out, ("cut",))).folder
+
+
+@pytest.fixture
+def folder(held: Path, tmp_path: Path) -> Doctor:
+    return Doctor(Path(shutil.copytree(held, tmp_path / "1dof-5mm")))
+
+
+def test_a_good_folder_says_what_was_asked(folder: Doctor) -> None:
+    assert not read_folder(folder.folder).problems
+    text = (folder.folder / PROJECT).read_text()
+    assert "LEAD_IN: 0.4 mm" in text
+    assert "OVERCUT: 0.3 mm" in text
+    assert "TABS: 3 an outline, 0.5 mm wide, 0.5 mm uncut" in text
+    # The sheet's drawing and the layer files are the design, as they are without all this.
+    plain = [word for word in ASKED if not word.startswith("sheets")]
+    other = generate(
+        RunRequest(load_design("1dof-5mm", plain), folder.folder.parent / "plain", ("cut",))
+    ).folder
+    for path in [*other.glob("layers/*.dxf"), *other.glob("sheets/*.dxf")]:
+        ours = folder.folder / path.relative_to(other)
+        assert read_profile(ours).region.contours == read_profile(path).region.contours
+
+
+def once(pattern: str, new: str) -> Callable[[str], str]:
+    def change(text: str) -> str:
+        changed, count = re.subn(pattern, new, text, count=1, flags=re.DOTALL)
+        assert count
+        return changed
+
+    return change
+
+
+def all_but_first(pattern: str) -> Callable[[str], str]:
+    def change(text: str) -> str:
+        kept = re.search(pattern, text, re.DOTALL)
+        assert kept
+        return text[: kept.end()] + re.sub(pattern, "", text[kept.end() :], flags=re.DOTALL)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (once(_SHAPE.format(index=1), ""), "the hole at .* is not cut"),
+        (once(_SHAPE.format(index=2), ""), "outline at .* has lead-ins at 0 of its 3 cuts"),
+        (all_but_first(_SHAPE.format(index=2)), "outline at .* has 0 tabs, not 3"),
+        # The beam comes in where the first line of a hole begins.
+        (
+            once(r'(CutIndex="1".*?<XForm>1 0 0 1 )(\S+)', r"\g<1>9\2"),
+            "where nothing is to be cut",
+        ),
+        (once(r'(CutIndex="1".*?<VertList>V)0 0', r"\g<1>0.05 0.05"), "mm long, not 0.4"),
+        (once(r'CutIndex="1"', 'CutIndex="2"'), "is on CUT_OUTER, not CUT_INNER"),
+        (once(r"<Shape ", "<Shap "), "no sound project|not cut|falls apart"),
+    ],
+)
+def test_a_machine_file_that_cuts_otherwise_is_told(
+    change: Callable[[str], str], says: str, folder: Doctor
+) -> None:
+    path = folder.folder / PROJECT
+    path.write_text(change(path.read_text()))
+    folder.rehash()
+    told = [problem.message for problem in read_folder(folder.folder).problems]
+    assert any(re.search(says, message) for message in told), told
+    assert all(message.startswith(PROJECT) for message in told)
+
+
+def test_a_project_without_what_was_asked_is_told(folder: Doctor) -> None:
+    plain = [word for word in ASKED if not word.startswith("sheets")]
+    other = generate(
+        RunRequest(load_design("1dof-5mm", plain), folder.folder.parent / "plain", ("cut",))
+    ).folder
+    for name, says in (
+        ("TPE_1", r"TPE_1.lbrn2: .* has lead-ins at 0 of its 1 cuts"),
+        ("PTFE_1", r"PTFE_1.lbrn2: .* has 0 tabs, not 3"),
+    ):
+        shutil.copy(other / f"sheets/{name}.lbrn2", folder.folder / f"sheets/{name}.lbrn2")
+        folder.rehash()
+        told = [problem.message for problem in read_folder(folder.folder).problems]
+        assert any(re.search(says, message) for message in told), told
