@@ -14,9 +14,12 @@ from sbafab.as_built.expected import AGREEMENT, ExpectedLaminate, departure
 from sbafab.as_built.kerf_removed import remove_kerf
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
+from sbafab.cutting.beam_check import BeamRun
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.entries import PLAIN
 from sbafab.cutting.lightburn import ENDING, read_project
+from sbafab.cutting.machine_files import ENDINGS
 from sbafab.cutting.properties import (
     CUT_SHEET,
     ENGRAVE,
@@ -27,7 +30,7 @@ from sbafab.cutting.properties import (
     limit_properties,
 )
 from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path, severed, stack_kerf
-from sbafab.cutting.sheets import FOLDER, check_cuts
+from sbafab.cutting.sheets import FOLDER, check_cuts, parts_cut
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_surroundings
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
@@ -375,6 +378,8 @@ def _order_problems(order: SheetOrder) -> list[Problem]:
 
 def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
     stem = f"{FOLDER}/{sheet.material}_{sheet.number}{kerf_suffix(_kerf(order, sheet.material))}"
+    program = order.design.sheets.program
+    other = None if program is None else f"{stem}{ENDINGS[program]}"
     return [
         *(
             claim(f"{sheet.material} sheet {sheet.number} is {claimed!r}, not {name}")
@@ -382,13 +387,14 @@ def _name_problems(sheet: SheetClaim, order: SheetOrder) -> list[Problem]:
                 (sheet.file, f"{stem}.dxf"),
                 (sheet.picture, f"{stem}.svg"),
                 (sheet.project, f"{stem}{ENDING}"),
+                (sheet.machine_file, other),
             )
             if claimed != name
         ),
         *(
             claim(f"{path} has no hash in the manifest")
-            for path in (sheet.file, sheet.picture, sheet.project)
-            if path not in order.claims.files
+            for path in (sheet.file, sheet.picture, sheet.project, sheet.machine_file)
+            if path is not None and path not in order.claims.files
         ),
     ]
 
@@ -579,17 +585,23 @@ def _number_problems(sheet: CutSheet, drawing: ReadBack) -> list[Problem]:
 def _machine_problems(
     folder: Path, sheet_claim: SheetClaim, region: Region, design: Design
 ) -> list[Problem]:
-    """Return differences of a sheet's machine file from what it cuts, with lead-ins and tabs."""
-    asked = entries(design).get(sheet_claim.material)
-    if asked is None:
-        return []
-    try:
-        path = path_in_folder(folder, sheet_claim.project)
-        check_cuts(path, read_project(path).cut_runs, region, asked)
-    except OutputError as error:
-        reason = str(error).removeprefix(f"{PurePosixPath(sheet_claim.project).name}: ")
-        return [Problem(INTEGRITY, f"{sheet_claim.project}: {reason}")]
-    return []
+    """Return differences of a sheet's machine files from what it cuts, with lead-ins and tabs."""
+    asked = entries(design).get(sheet_claim.material, PLAIN)
+    files: list[tuple[str, Callable[[Path], Sequence[BeamRun]]]] = []
+    if not asked.is_plain:
+        files.append((sheet_claim.project, lambda path: read_project(path).cut_runs))
+    program, other = design.sheets.program, sheet_claim.machine_file
+    if program is not None and other is not None:
+        files.append((other, lambda path: parts_cut(path, program)))
+    problems = []
+    for name, read in files:
+        try:
+            path = path_in_folder(folder, name)
+            check_cuts(path, read(path), region, asked)
+        except OutputError as error:
+            reason = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
+            problems.append(Problem(INTEGRITY, f"{name}: {reason}"))
+    return problems
 
 
 # Registered sheets: the parts that the second cut frees.

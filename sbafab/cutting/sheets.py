@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from sbafab.cutting.beam_check import BeamRun, check_beam_runs
-from sbafab.cutting.beam_paths import beam_runs, drawn
+from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
 from sbafab.cutting.dxf_read import ReadBack
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.entries import PLAIN, Entries
@@ -27,6 +27,12 @@ from sbafab.cutting.lightburn import (
     sheet_layers,
     verify_runs,
 )
+from sbafab.cutting.machine_files import (
+    ENDINGS,
+    machine_text,
+    read_machine_file,
+    verify_machine_file,
+)
 from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
     CUT_INNER,
@@ -35,6 +41,7 @@ from sbafab.cutting.properties import (
     ENGRAVE,
     REFERENCE,
     CutSettings,
+    Program,
     kerf_suffix,
     sheet_properties,
 )
@@ -63,6 +70,7 @@ class SheetFile:
     whether the sheet's label is engraved, or found no room in the border, or was not asked for.
     ``cut_length`` has the cut that frees a roll's sheet in it; ``contours`` are those of the parts.
     ``index_marks`` of the parts have their number engraved beside them; None if not asked for.
+    ``machine_file`` is that of another laser program than LightBurn, if one was asked for.
     """
 
     path: str
@@ -82,6 +90,7 @@ class SheetFile:
     minutes: float
     label: LabelState = "engraved"
     index_marks: int | None = None
+    machine_file: str | None = None
 
     @property
     def material(self) -> Material:
@@ -148,9 +157,11 @@ def _write_sheet(
     read = verify_file(path, Region(contours), properties)
     _verify_surroundings(path.name, read, around)
     project = path.with_suffix(ENDING)
-    _write_project(project, _Layout(nest, sheet, contours, around), settings, properties)
+    layout = _Layout(nest, sheet, contours, around)
+    runs = _write_project(project, layout, settings, properties)
     picture = path.with_suffix(".svg")
     title = f"{settings.design}: {nest.material} sheet {sheet + 1} of {nest.sheets}"
+    machine_file = _write_machine_file(path, layout, settings, runs, title)
     picture.write_text(
         sheet_svg(contours, around, width, length, title), encoding="utf-8", newline="\n"
     )
@@ -175,6 +186,7 @@ def _write_sheet(
         minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, machine),
         label=label_state,
         index_marks=None if marks is None else len(marks),
+        machine_file=machine_file,
     )
 
 
@@ -189,8 +201,11 @@ class _Layout(NamedTuple):
 
 def _write_project(
     path: Path, layout: _Layout, settings: CutSettings, properties: Mapping[str, str]
-) -> None:
-    """Write a sheet's LightBurn project, with lead-ins, overcuts and tabs where asked for."""
+) -> list[LaserRun]:
+    """Write a sheet's LightBurn project, with lead-ins, overcuts and tabs where asked for.
+
+    Returns what it has the beam follow, in its order.
+    """
     material, around = layout.nest.material, layout.around
     entries = settings.entries.get(material, PLAIN)
     name = f"{material} sheet {layout.sheet + 1}"
@@ -202,6 +217,32 @@ def _write_project(
     verify_runs(path, layers, runs)
     if not entries.is_plain:
         check_cuts(path, read_project(path).cut_runs, Region(tuple(layout.contours)), entries)
+    return runs
+
+
+def _write_machine_file(
+    sheet: Path, layout: _Layout, settings: CutSettings, runs: Sequence[LaserRun], title: str
+) -> str | None:
+    """Write and read back the file of a sheet for another laser program, if one is asked for.
+
+    Returns its path in the output folder.
+    """
+    if settings.program is None or layout.around.frame is None:
+        return None
+    path = sheet.with_name(f"{sheet.stem}{ENDINGS[settings.program]}")
+    text = machine_text(settings.program, runs, layout.around.frame, title)
+    path.write_bytes(text.encode())
+    verify_machine_file(path, settings.program, runs)
+    entries = settings.entries.get(layout.nest.material, PLAIN)
+    cuts = parts_cut(path, settings.program)
+    check_cuts(path, cuts, Region(tuple(layout.contours)), entries)
+    return f"{FOLDER}/{path.name}"
+
+
+def parts_cut(path: Path, program: Program) -> list[BeamRun]:
+    """Return what a machine file cuts of the parts."""
+    runs = read_machine_file(path, program)
+    return [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]
 
 
 def check_cuts(path: Path, cuts: Sequence[BeamRun], region: Region, entries: Entries) -> None:

@@ -510,6 +510,9 @@ class Sheets(Section):
     room for it; off by default. Wider spacing leaves more room."""
     stock: str | None = Field(default=None, min_length=1, max_length=1000)
     """A stock file beside the design: the smallest pieces that hold the parts are cut first."""
+    program: Literal["rdworks", "epilog"] | None = None
+    """A laser program, beside LightBurn, that each sheet gets a machine file for: "rdworks" (DXF
+    R12 by colours) or "epilog" (SVG with hairlines by colours)."""
 
     @field_validator("engine", mode="before")
     @classmethod

@@ -164,6 +164,7 @@ def cut_settings(
         machine=design.laser.machine,
         recipes=recipes(design),
         entries=entries(design),
+        program=design.sheets.program,
     )
 
 

@@ -91,6 +91,7 @@ def _from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
             path=f"../{sheet.path}",
             picture=f"../{sheet.picture}",
             project=f"../{sheet.project}",
+            machine_file=sheet.machine_file and f"../{sheet.machine_file}",
         )
         for sheet in sheets
     ]

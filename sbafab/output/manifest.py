@@ -171,6 +171,7 @@ class SheetClaim(_Claim):
     file: str
     picture: str
     project: str
+    machine_file: str | None = None
     material: Material
     number: Count
     width: Size
@@ -457,7 +458,9 @@ def _place(point: tuple[float, float]) -> dict[str, float]:
 def _sheet(sheet: SheetFile) -> SheetClaim:
     """Return a film sheet as the manifest lists it; lengths mm, areas mm2."""
     stock = sheet.nest.stock
+    other = {} if sheet.machine_file is None else {"machine_file": sheet.machine_file}
     return SheetClaim(
+        **other,
         file=sheet.path,
         picture=sheet.picture,
         project=sheet.project,

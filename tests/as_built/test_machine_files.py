@@ -109,3 +109,41 @@ def test_a_project_without_what_was_asked_is_told(folder: Doctor) -> None:
         folder.rehash()
         told = [problem.message for problem in read_folder(folder.folder).problems]
         assert any(re.search(says, message) for message in told), told
+
+
+# The files of other laser programs.
+
+
+@pytest.fixture(scope="module", params=["rdworks", "epilog"])
+def program_folder(
+    tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Path:
+    """Cut files with those of a laser program, named ``request.param``."""
+    out = tmp_path_factory.mktemp(request.param)
+    asked = [*ASKED, f"sheets.program={request.param}"]
+    return generate(RunRequest(load_design("1dof-5mm", asked), out, ("cut",))).folder
+
+
+def test_a_program_s_file_is_listed_and_measured(program_folder: Path, tmp_path: Path) -> None:
+    doctor = Doctor(Path(shutil.copytree(program_folder, tmp_path / "1dof-5mm")))
+    assert not read_folder(doctor.folder).problems
+    sheet = doctor.manifest["sheets"][0]
+    assert sheet["machine_file"] in doctor.manifest["files"]
+    path = doctor.folder / sheet["machine_file"]
+    text = path.read_text()
+    # A line of the holes becomes one of the outlines.
+    pattern, new = {
+        ".dxf": (r"(CUT_INNER\n 62\n)5(\n 66)", r"\g<1>1\2"),
+        ".svg": (r'(id="CUT_INNER".*?)#0000ff', r"\1#ff0000"),
+    }[path.suffix]
+    changed, count = re.subn(pattern, new, text, count=1, flags=re.DOTALL)
+    assert count
+    path.write_text(changed)
+    doctor.rehash()
+    told = [problem.message for problem in read_folder(doctor.folder).problems]
+    assert [m for m in told if m.startswith(sheet["machine_file"]) and "CUT_OUTER, not" in m]
+    path.write_text(text)
+    doctor.rehash()
+    doctor.set_manifest(lambda manifest: manifest["sheets"][0].pop("machine_file"))
+    told = [problem.message for problem in read_folder(doctor.folder).problems]
+    assert any("is None, not sheets/TPE_1_" in message for message in told)

@@ -1,0 +1,266 @@
+"""Film sheets in the conventions of other laser programs: colours tell what is cut, and in which
+order.
+
+RDWorks (Ruida controllers) makes a layer of each colour of a drawing; its file is the oldest DXF,
+R12, in which every entity has its colour, and polylines their arcs as bulges. Epilog's software
+takes a line for a cut where it is a hairline, 0.001 in wide, and maps red, green and blue to
+settings; its file is an SVG in millimetres. Neither has the sheet's frame, for all that is drawn is
+cut. Both are written by what is known of the programs, which have not been run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+
+from sbafab.cutting.beam_check import BETWEEN, BeamRun, Curve
+from sbafab.cutting.beam_paths import LaserRun
+from sbafab.cutting.dxf_read import polyline
+from sbafab.cutting.dxf_write import number
+from sbafab.cutting.properties import (
+    COLOURS,
+    CUT_INNER,
+    CUT_OUTER,
+    CUT_SHEET,
+    ENGRAVE,
+    REFERENCE,
+    Program,
+)
+from sbafab.cutting.verify import TOLERANCE
+from sbafab.errors import OutputError
+from sbafab.geometry.contour import circle
+from sbafab.geometry.edges import Arc, Edge, Line, Point
+from sbafab.geometry.region import chain_data, coord
+
+ENDINGS: dict[Program, str] = {"rdworks": "_rdworks.dxf", "epilog": "_epilog.svg"}
+"""What stands behind the name of a sheet in that of its machine file."""
+RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET: "#ff00ff"}
+"""Colours of the layers in the order of cutting, pure ones that a driver can map."""
+HAIRLINE = 0.0254
+"""mm: 0.001 in."""
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def machine_text(program: Program, runs: Sequence[LaserRun], size: Point, title: str) -> str:
+    """Return the file of a film sheet of a size in mm for a laser program, runs in their order."""
+    cut = [run for run in runs if run.layer != REFERENCE]
+    return _rdworks(cut) if program == "rdworks" else _epilog(cut, size, title)
+
+
+def read_machine_file(path: Path, program: Program) -> list[BeamRun]:
+    """Return what a machine file has the beam follow, in its order. Raises OutputError."""
+    try:
+        return [*(_read_rdworks(path) if program == "rdworks" else _read_epilog(path))]
+    except OutputError as error:
+        raise OutputError(f"{path.name}: {error}; regenerate it") from error
+    except (OSError, ValueError, LookupError, ArithmeticError, SyntaxError) as error:
+        raise OutputError(f"{path.name}: it cannot be read ({error}); regenerate it") from error
+
+
+def verify_machine_file(path: Path, program: Program, expected: Sequence[LaserRun]) -> None:
+    """Reads the file at ``path`` and compares it with the runs that were meant.
+
+    Raises OutputError with the place of what is missing, on another layer, or off by TOLERANCE.
+    """
+    read = read_machine_file(path, program)
+    runs = [run for run in expected if run.layer != REFERENCE]
+    if len(read) != len(runs):
+        raise OutputError(f"{path.name}: it has {len(read)} lines, not {len(runs)}; regenerate it")
+    for drawn, run in zip(read, runs, strict=True):
+        x, y = run.edges[0].start
+        place = f"{path.name}: the line at x {x:.3f}, y {y:.3f}"
+        if drawn.layer != run.layer:
+            raise OutputError(f"{place} is one of {drawn.layer}, not of {run.layer}; regenerate it")
+        if run.circle is None and not _agrees(drawn.curves, run.edges):
+            raise OutputError(f"{place} differs from what was written; regenerate it")
+        if run.circle is not None and not _is_round(drawn.curves, run.circle):
+            raise OutputError(f"{place} is not the circle that was written; regenerate it")
+
+
+def _agrees(curves: Sequence[Curve], edges: Sequence[Edge]) -> bool:
+    """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
+    if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
+        return False
+    number_, share = 0, 0.0
+    for curve in curves:
+        if number_ == len(edges):
+            return False
+        edge = edges[number_]
+        for t in BETWEEN:
+            p = curve.at(t)
+            if math.dist(p, edge.nearest(p)) > TOLERANCE:
+                return False
+        share = edge.parameter(curve.end)
+        if math.dist(curve.end, edge.end) <= TOLERANCE:
+            number_, share = number_ + 1, 0.0
+    return number_ == len(edges) and share == 0.0
+
+
+def _is_round(curves: Sequence[Curve], expected: tuple[Point, float]) -> bool:
+    centre, radius = expected
+    points = [curve.at(t) for curve in curves for t in BETWEEN]
+    low, high = (f(x for x, _ in points) for f in (min, max))
+    on = all(abs(math.dist(p, centre) - radius) <= TOLERANCE for p in points)
+    return on and high - low > 1.9 * radius
+
+
+# RDWorks: DXF R12.
+
+
+def _rdworks(runs: Sequence[LaserRun]) -> str:
+    layers = [layer for layer in RGB if any(run.layer == layer for run in runs)]
+    table = "".join(
+        f"  0\nLAYER\n  2\n{layer}\n 70\n0\n 62\n{COLOURS[layer]}\n  6\nCONTINUOUS\n"
+        for layer in layers
+    )
+    return "".join(
+        (
+            "  0\nSECTION\n  2\nHEADER\n  9\n$ACADVER\n  1\nAC1009\n  0\nENDSEC\n",
+            "  0\nSECTION\n  2\nTABLES\n  0\nTABLE\n  2\nLAYER\n",
+            f" 70\n{len(layers)}\n{table}  0\nENDTAB\n  0\nENDSEC\n",
+            "  0\nSECTION\n  2\nENTITIES\n",
+            *map(_r12_entity, runs),
+            "  0\nENDSEC\n  0\nEOF\n",
+        )
+    )
+
+
+def _r12_entity(run: LaserRun) -> str:
+    head = f"  8\n{run.layer}\n 62\n{COLOURS[run.layer]}\n"
+    if run.circle is not None:
+        (x, y), radius = run.circle
+        return f"  0\nCIRCLE\n{head} 10\n{number(x)}\n 20\n{number(y)}\n 40\n{number(radius)}\n"
+    rows = [(*edge.start, edge.bulge) for edge in run.edges]
+    if not run.closed:
+        rows.append((*run.edges[-1].end, 0.0))
+    vertices = "".join(
+        f"  0\nVERTEX\n{head} 10\n{number(x)}\n 20\n{number(y)}\n"
+        + (f" 42\n{number(bulge)}\n" if bulge else "")
+        for x, y, bulge in rows
+    )
+    return (
+        f"  0\nPOLYLINE\n{head} 66\n1\n 10\n0.0\n 20\n0.0\n 70\n{int(run.closed)}\n"
+        f"{vertices}  0\nSEQEND\n{head}"
+    )
+
+
+def _read_rdworks(path: Path) -> Iterator[BeamRun]:
+    """Yield the runs of a DXF as ezdxf reads it, by the colour of each entity."""
+    from ezdxf.entities.circle import Circle
+    from ezdxf.entities.polyline import Polyline
+    from ezdxf.filemanagement import readfile
+    from ezdxf.lldxf.const import DXFError
+
+    layers = {COLOURS[layer]: layer for layer in RGB}
+    try:
+        entities = list(readfile(path).modelspace())
+    except DXFError as error:
+        raise OutputError(f"it is no sound DXF ({error})") from error
+    for entity in entities:
+        layer = layers.get(entity.dxf.color)
+        if layer is None:
+            raise OutputError(f"a line has the colour {entity.dxf.color}, which no layer has")
+        if isinstance(entity, Circle):
+            x, y, _ = entity.dxf.center
+            yield BeamRun(layer, circle((x, y), entity.dxf.radius).edges)
+        elif isinstance(entity, Polyline):
+            rows = [
+                (p.x, p.y, 0.0, 0.0, vertex.dxf.get("bulge", 0.0))
+                for vertex in entity.vertices
+                for p in (vertex.dxf.location,)
+            ]
+            yield BeamRun(layer, polyline(rows, entity.is_closed, 0.0, True))
+        else:
+            raise OutputError(f"it holds a {entity.dxftype()}")
+
+
+# Epilog: SVG with hairlines.
+
+
+def _epilog(runs: Sequence[LaserRun], size: Point, title: str) -> str:
+    across, up = (coord(side) for side in size)
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{across}mm" height="{up}mm" '
+        f'viewBox="0 0 {across} {up}">',
+        f"<title>{title.replace('&', '&amp;').replace('<', '&lt;')}</title>",
+    ]
+    for layer, colour in RGB.items():
+        drawn = [run for run in runs if run.layer == layer]
+        if drawn:
+            lines.append(
+                f'<g id="{layer}" fill="none" stroke="{colour}" stroke-width="{HAIRLINE:g}">'
+            )
+            lines += [_svg_shape(run, size[1]) for run in drawn]
+            lines.append("</g>")
+    return "\n".join((*lines, "</svg>\n"))
+
+
+def _svg_shape(run: LaserRun, height: float) -> str:
+    if run.circle is not None:
+        (x, y), radius = run.circle
+        return f'<circle cx="{coord(x)}" cy="{coord(height - y)}" r="{coord(radius)}"/>'
+    edges = [_turned_over(edge, height) for edge in run.edges]
+    return f'<path d="{chain_data(edges)}{"Z" if run.closed else ""}"/>'
+
+
+def _turned_over(edge: Edge, height: float) -> Edge:
+    """The edge with y downwards, from an upper edge at ``height``."""
+
+    def flip(p: Point) -> Point:
+        return p[0], height - p[1]
+
+    if isinstance(edge, Line):
+        return Line(flip(edge.start), flip(edge.end))
+    return Arc(flip(edge.start), flip(edge.end), flip(edge.centre), edge.radius, not edge.ccw)
+
+
+class _SvgCurve(NamedTuple):
+    """A segment of a path as svgelements has it, seen with y upwards."""
+
+    segment: Any
+    height: float
+
+    @property
+    def start(self) -> Point:
+        return self.at(0.0)
+
+    @property
+    def end(self) -> Point:
+        return self.at(1.0)
+
+    def at(self, t: float) -> Point:
+        p = self.segment.point(t)
+        return float(p.x), self.height - float(p.y)
+
+
+def _read_epilog(path: Path) -> Iterator[BeamRun]:
+    """Yield the runs of an SVG, its paths read by svgelements, by the colour of their strokes."""
+    from svgelements import Close
+    from svgelements import Path as SvgPath
+
+    root = ElementTree.parse(path).getroot()
+    box = [float(word) for word in root.get("viewBox", "").split()]
+    if len(box) != 4 or root.get("width") != f"{coord(box[2])}mm":
+        raise OutputError("its page is not in millimetres")
+    layers = {colour: layer for layer, colour in RGB.items()}
+    for group in root.iter(f"{SVG}g"):
+        layer = layers.get(group.get("stroke", ""))
+        if layer is None or group.get("stroke-width") != f"{HAIRLINE:g}":
+            raise OutputError(f"lines of {group.get('id')} are no hairlines in a colour of a layer")
+        for shape in group:
+            if shape.tag == f"{SVG}circle":
+                x, y, r = (float(shape.get(key, "")) for key in ("cx", "cy", "r"))
+                yield BeamRun(layer, circle((x, box[3] - y), r).edges)
+                continue
+            segments = [*SvgPath(shape.get("d", ""))][1:]
+            curves = [
+                _SvgCurve(segment, box[3])
+                for segment in segments
+                # A close line of no length closes what is closed already.
+                if not isinstance(segment, Close)
+                or abs(segment.end - segment.start) > TOLERANCE / 10
+            ]
+            yield BeamRun(layer, curves)

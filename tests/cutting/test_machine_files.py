@@ -1,0 +1,163 @@
+"""Machine files of other laser programs: colours, order and shapes, read by other readers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+import svgelements
+
+from sbafab.cutting.beam_check import check_beam_runs
+from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
+from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.entries import PLAIN, Entries
+from sbafab.cutting.machine_files import (
+    ENDINGS,
+    machine_text,
+    read_machine_file,
+    verify_machine_file,
+)
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import Program
+from sbafab.errors import OutputError
+from sbafab.geometry.region import Region, disc, stadium
+
+SIZE = (80.0, 60.0)
+AROUND = Surroundings(
+    engraved=(((1.0, 1.0), (3.0, 1.0), (3.0, 2.0)),),
+    parting=(((0.0, 60.0), (80.0, 60.0)),),
+    frame=SIZE,
+)
+ASKED = Entries(lead_in=1.0, overcut=0.5, tab_width=0.6, tabs=2)
+RING = disc((20.0, 20.0), 10.0) - disc((20.0, 20.0), 4.0)
+OBLONG = stadium((50.0, 30.0), 16.0, 36.0)
+PARTS = Region((*RING.contours, *OBLONG.contours))
+AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
+"""mm2: a ring, and a stadium."""
+PROGRAMS: tuple[Program, ...] = ("rdworks", "epilog")
+
+
+def test_the_parts_are_what_they_are_called() -> None:
+    assert pytest.approx(AREA) == PARTS.area
+
+
+def runs_of(entries: Entries) -> list[LaserRun]:
+    return list(drawn(beam_runs(cutting_order(PARTS), entries, AROUND), AROUND))
+
+
+def written(folder: Path, program: Program, entries: Entries = PLAIN) -> Path:
+    path = folder / f"TPE_1{ENDINGS[program]}"
+    path.write_text(machine_text(program, runs_of(entries), SIZE, "arm & co <1>"))
+    return path
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("entries", [PLAIN, ASKED])
+def test_what_is_written_reads_back(program: Program, entries: Entries, tmp_path: Path) -> None:
+    path = written(tmp_path, program, entries)
+    verify_machine_file(path, program, runs_of(entries))
+    cuts = [run for run in read_machine_file(path, program) if run.layer.endswith("ER")]
+    check_beam_runs(cuts, PARTS, entries)
+    assert "REFERENCE" not in path.read_text(), "what a program sees, it cuts"
+
+
+def test_rdworks_gets_a_sound_r12_whose_colours_are_its_layers(tmp_path: Path) -> None:
+    """Order of cutting and of colours: black, blue, red, magenta."""
+    document = ezdxf.readfile(written(tmp_path, "rdworks"))
+    assert document.dxfversion == "AC1009"
+    assert not document.audit().errors
+    entities = list(document.modelspace())
+    colours = [entity.dxf.color for entity in entities]
+    assert colours == [7, 5, 1, 1, 6]
+    assert [document.layers.get(e.dxf.layer).color for e in entities] == colours
+    area = 0.0
+    for entity in entities:
+        if entity.dxf.color == 5:
+            area -= math.pi * entity.dxf.radius**2
+        elif entity.dxftype() == "CIRCLE":
+            area += math.pi * entity.dxf.radius**2
+        elif entity.dxf.color == 1:
+            assert entity.is_closed
+            ring = [(p.x, p.y) for e in entity.virtual_entities() for p in chords(e)]
+            area += shapely.Polygon(ring).area
+    assert area == pytest.approx(AREA, rel=1e-5)
+
+
+def chords(entity: object) -> list[ezdxf.math.Vec3]:
+    if entity.dxftype() == "LINE":  # type: ignore[attr-defined]
+        return [entity.dxf.start, entity.dxf.end]  # type: ignore[attr-defined]
+    return list(entity.flattening(1e-5))  # type: ignore[attr-defined]
+
+
+def test_epilog_gets_hairlines_in_pure_colours_and_millimetres(tmp_path: Path) -> None:
+    path = written(tmp_path, "epilog")
+    root = ElementTree.parse(path).getroot()
+    assert (root.get("width"), root.get("height")) == ("80mm", "60mm")
+    groups = [item for item in root if item.tag.endswith("}g")]
+    assert [group.get("stroke") for group in groups] == [
+        *("#000000", "#0000ff", "#ff0000", "#ff00ff")
+    ]
+    for group in groups:
+        assert float(group.get("stroke-width", "")) == 0.001 * 25.4
+        assert group.get("fill") == "none"
+    # svgelements reads a page of millimetres in 96ths of an inch, y downwards.
+    area = 0.0
+    for shape in svgelements.SVG.parse(path).elements():
+        if isinstance(shape, svgelements.Shape) and shape.stroke.hex in ("#ff0000", "#0000ff"):
+            ring = svgelements.Path(shape).npoint(np.linspace(0, 1, 4000))
+            sign = 1 if shape.stroke.hex == "#ff0000" else -1
+            area += sign * shapely.Polygon(ring).area * (25.4 / 96) ** 2
+    assert area == pytest.approx(AREA, rel=1e-4)
+    bounds = [shape.bbox() for shape in svgelements.SVG.parse(path).elements() if shape_is(shape)]
+    top = min(box[1] for box in bounds) * 25.4 / 96
+    assert top == pytest.approx(60 - 48), "the upper edge is at y = 48 mm from below"
+
+
+def shape_is(shape: object) -> bool:
+    return isinstance(shape, svgelements.Shape) and shape.stroke.hex == "#ff0000"
+
+
+def once(old: str, new: str) -> Callable[[str], str]:
+    def change(text: str) -> str:
+        changed, count = re.subn(old, new, text, count=1, flags=re.DOTALL)
+        assert count
+        return changed
+
+    return change
+
+
+FAULTS: list[tuple[Program, Callable[[str], str], str]] = [
+    ("rdworks", once(r" 62\n5\n 10", " 62\n1\n 10"), "is one of CUT_OUTER, not of CUT_INNER"),
+    ("rdworks", once(r" 62\n5\n 10", " 62\n3\n 10"), "has the colour 3, which no layer has"),
+    ("rdworks", once(r" 40\n4\.0", " 40\n4.002"), "is not the circle that was written"),
+    ("rdworks", once(r"  0\nCIRCLE.*?(?=  0\n[CP])", ""), "it has 4 lines, not 5"),
+    ("rdworks", once(r"( 62\n1\n 10\n\d+\.\d)", r"\g<1>2"), "differs from what was written|circle"),
+    ("rdworks", once(r"42\n0\.414", "42\n0.424"), "differs from what was written"),
+    ("rdworks", lambda text: text[: len(text) // 2], "no sound DXF|cannot be read"),
+    ("rdworks", once("CIRCLE", "POINT"), "it holds a POINT"),
+    ("epilog", once("#0000ff", "#ff0000"), "is one of CUT_OUTER, not of CUT_INNER"),
+    ("epilog", once("#0000ff", "#00ff00"), "no hairlines in a colour of a layer"),
+    ("epilog", once("0.0254", "0.254"), "no hairlines in a colour of a layer"),
+    ("epilog", once('width="80mm"', 'width="80"'), "its page is not in millimetres"),
+    ("epilog", once('r="4"', 'r="4.002"'), "is not the circle that was written"),
+    ("epilog", once("A8 8 0 0 0", "A8 8 0 0 1"), "differs from what was written"),
+    ("epilog", once(r"<circle .*?/>\n", ""), "it has 4 lines, not 5"),
+    ("epilog", lambda text: text[: len(text) // 2], "cannot be read"),
+]
+
+
+@pytest.mark.parametrize(("program", "change", "says"), FAULTS)
+def test_a_file_that_is_not_the_sheet_is_told(
+    program: Program, change: Callable[[str], str], says: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, program)
+    path.write_text(change(path.read_text()))
+    with pytest.raises(OutputError, match=says):
+        verify_machine_file(path, program, runs_of(PLAIN))

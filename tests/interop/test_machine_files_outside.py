@@ -1,0 +1,180 @@
+"""Machine files in other programs: G-code by MeerK40t, Inkscape's size, LibreCAD's print."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+import pypdfium2
+import pytest
+import shapely
+
+from sbafab.cutting.beam_paths import LaserRun, beam_runs, drawn
+from sbafab.cutting.dxf_read import read_profile
+from sbafab.cutting.dxf_write import Surroundings
+from sbafab.cutting.entries import PLAIN, Entries
+from sbafab.cutting.lightburn import ADVICE, runs_text, sheet_layers
+from sbafab.cutting.machine_files import machine_text
+from sbafab.cutting.order import cutting_order
+from sbafab.cutting.properties import CUT_INNER, CUT_OUTER, ENGRAVE
+from sbafab.design.recipes import Recipe
+from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
+from tests.interop.painting import painted
+
+pytestmark = pytest.mark.long
+
+AROUND = Surroundings(engraved=(((2.0, 2.0), (30.0, 2.0), (30.0, 5.0)),), frame=(WIDTH, LENGTH))
+HELD = Entries(lead_in=0.3, overcut=0.3, tab_width=0.4, tabs=2, clearance=0.1)
+CUT, MARK = (
+    Recipe(
+        film="TPE",
+        thickness_mm=0.038,
+        machine="any",
+        operation=operation,
+        power_percent=power,
+        speed_mm_s=speed,
+        source="this test",
+    )
+    for operation, power, speed in (("cut", 20.0, 10.0), ("engrave", 5.0, 80.0))
+)
+STEP = 0.0254
+"""mm: MeerK40t's grid, a thousandth of an inch."""
+
+
+def runs_of(sheet: Sheet, entries: Entries) -> list[LaserRun]:
+    contours = cutting_order(read_profile(sheet.files["bulges"]).region)
+    return list(drawn(beam_runs(contours, entries, AROUND), AROUND))
+
+
+class Move(NamedTuple):
+    """A straight move of a G-code file with the beam on: its S word, mm/min, and ends in mm."""
+
+    power: float
+    feed: float
+    start: tuple[float, float]
+    end: tuple[float, float]
+
+
+def moves(path: Path) -> list[Move]:
+    """What a file has the beam cut: G1 with S above 0, words staying as they were set."""
+    words: dict[str, float] = {"X": 0.0, "Y": 0.0, "S": 0.0, "F": 0.0, "G": 0.0}
+    found = []
+    for line in re.split(r"[\r\n]+", path.read_text()):
+        start = words["X"], words["Y"]
+        told = {key: float(value) for key, value in re.findall(r"([GXYSF])([-\d.]+)", line)}
+        words |= told
+        if words["G"] == 1 and words["S"] > 0 and told.keys() & {"X", "Y"}:
+            found.append(Move(words["S"], words["F"], start, (words["X"], words["Y"])))
+    return found
+
+
+def meerk40t(folder: Path, *lines: str) -> None:
+    batch = folder / "batch.txt"
+    batch.write_text("".join(f"{line}\n" for line in (*lines, "quit")))
+    home = {"HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
+    start = "from meerk40t.main import run; run()"
+    subprocess.run(
+        [sys.executable, "-c", start, *("-z", "-p", "-A", "-q", "-b"), str(batch)],
+        cwd=folder,
+        env={**os.environ, **home},
+        capture_output=True,
+        timeout=120,
+        check=True,
+    )
+
+
+@pytest.mark.skipif(find_spec("meerk40t") is None, reason="MeerK40t is not installed")
+def test_meerk40t_writes_gcode_of_what_the_project_cuts(
+    sheets: dict[str, Sheet], tmp_path: Path
+) -> None:
+    """Lengths within 0.2 %, every place within a step of its grid, order, power and speed."""
+    runs = runs_of(sheets["3dof-15mm TPE"], HELD)
+    layers = sheet_layers({run.layer for run in runs}, {"cut": CUT, "engrave": MARK})
+    (tmp_path / "TPE_1.lbrn2").write_text(runs_text(layers, runs, {}, ADVICE))
+    # Its y runs down: without this the sheet comes out mirrored.
+    meerk40t(tmp_path, "service device start -i grbl", "set -p grbl flip_y False")
+    job = "plan copy preprocess validate blob save_job"
+    meerk40t(
+        tmp_path,
+        "service device activate 1",
+        f"load {tmp_path / 'TPE_1.lbrn2'}",
+        f"{job} {tmp_path / 'TPE_1.gcode'}",
+    )
+    found = moves(tmp_path / "TPE_1.gcode")
+    # 5 % and 20 % of S 1000, 80 and 10 mm/s in mm/min, engraving first.
+    powers = [move.power for move in found]
+    assert powers == sorted(powers)
+    assert {(move.power, move.feed) for move in found} == {(50.0, 4800.0), (200.0, 600.0)}
+    for power, names in ((50.0, (ENGRAVE,)), (200.0, (CUT_INNER, CUT_OUTER))):
+        ours = [run for run in runs if run.layer in names]
+        theirs = [move for move in found if move.power == power]
+        length = sum(edge.length for run in ours for edge in run.edges)
+        cut = sum(math.dist(move.start, move.end) for move in theirs)
+        assert cut == pytest.approx(length, rel=2e-3)
+        lines = shapely.union_all([line(run) for run in ours])
+        places = shapely.points([p for move in theirs for p in (move.start, move.end)])
+        assert float(shapely.distance(lines, places).max()) < STEP
+        extent = shapely.union_all(places).bounds
+        assert extent == pytest.approx(lines.bounds, abs=STEP)
+        # Nothing is left out either: tabs are, and nothing else.
+        cuts = shapely.MultiLineString([(m.start, m.end) for m in theirs]).buffer(1.5 * STEP)
+        assert lines.difference(cuts).length < 1e-3 * length
+
+
+def line(run: LaserRun) -> shapely.LineString:
+    points = [run.edges[0].start, *(e.at(k / 48) for e in run.edges for k in range(1, 49))]
+    return shapely.LineString(points)
+
+
+@pytest.mark.skipif(shutil.which("inkscape") is None, reason="no Inkscape here")
+def test_inkscape_finds_epilog_s_outlines_where_the_cut_file_has_them(
+    sheet: Sheet, tmp_path: Path
+) -> None:
+    path = tmp_path / "sheet.svg"
+    path.write_text(machine_text("epilog", runs_of(sheet, PLAIN), (WIDTH, LENGTH), "sheet"))
+    done = subprocess.run(
+        ["inkscape", "--query-all", str(path)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    boxes = {
+        name: [float(value) * 25.4 / 96 for value in values]
+        for name, *values in (row.split(",") for row in done.stdout.splitlines())
+    }
+    x, y, width, height = boxes["CUT_OUTER"]
+    low_x, low_y, high_x, high_y = outline_bounds(sheet.files["bulges"])
+    # Inkscape counts half a hairline on every side.
+    edge = 0.0127
+    found = x + edge, LENGTH - y - height + edge, x + width - edge, LENGTH - y - edge
+    assert found == pytest.approx((low_x, low_y, high_x, high_y), abs=0.01)
+
+
+@pytest.mark.skipif(shutil.which("librecad") is None, reason="no LibreCAD here")
+def test_librecad_prints_rdworks_s_file_with_the_film_s_area(sheet: Sheet, tmp_path: Path) -> None:
+    (tmp_path / "sheet.dxf").write_text(
+        machine_text("rdworks", runs_of(sheet, PLAIN), (WIDTH, LENGTH), "sheet")
+    )
+    # R12 has no units; LibreCAD takes its own, which are millimetres.
+    subprocess.run(
+        ["librecad", "dxf2pdf", "-s", "1", "sheet.dxf"],
+        cwd=tmp_path,
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen", "HOME": str(tmp_path)},
+        capture_output=True,
+        timeout=60,
+        check=True,
+    )
+    dots = 600
+    with pypdfium2.PdfDocument(tmp_path / "sheet.pdf") as document:
+        picture = document[0].render(scale=dots / 72).to_pil().convert("RGB")
+    found = painted(picture, dots / 25.4)
+    assert found.film == pytest.approx(sheet.film, rel=EXACT)
+    assert (found.pieces, found.holes) == (len(sheet.outers), len(sheet.holes))
