@@ -27,7 +27,7 @@ from sbafab.cutting.properties import (
     CUT_SHEET,
     ENGRAVE,
     REFERENCE,
-    Program,
+    LaserProgram,
 )
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.errors import OutputError
@@ -35,7 +35,7 @@ from sbafab.geometry.contour import circle
 from sbafab.geometry.edges import Arc, Edge, Line, Point
 from sbafab.geometry.region import chain_data, coord
 
-ENDINGS: dict[Program, str] = {"rdworks": "_rdworks.dxf", "epilog": "_epilog.svg"}
+ENDINGS: dict[LaserProgram, str] = {"rdworks": "_rdworks.dxf", "epilog": "_epilog.svg"}
 """What stands behind the name of a sheet in that of its machine file."""
 RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET: "#ff00ff"}
 """Colours of the layers in the order of cutting, pure ones that a driver can map."""
@@ -44,13 +44,13 @@ HAIRLINE = 0.0254
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def machine_text(program: Program, runs: Sequence[LaserRun], size: Point, title: str) -> str:
+def machine_text(program: LaserProgram, runs: Sequence[LaserRun], size: Point, title: str) -> str:
     """Return the file of a film sheet of a size in mm for a laser program, runs in their order."""
     cut = [run for run in runs if run.layer != REFERENCE]
     return _rdworks(cut) if program == "rdworks" else _epilog(cut, size, title)
 
 
-def read_machine_file(path: Path, program: Program) -> list[BeamRun]:
+def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
     """Return what a machine file has the beam follow, in its order. Raises OutputError."""
     try:
         return [*(_read_rdworks(path) if program == "rdworks" else _read_epilog(path))]
@@ -60,7 +60,7 @@ def read_machine_file(path: Path, program: Program) -> list[BeamRun]:
         raise OutputError(f"{path.name}: it cannot be read ({error}); regenerate it") from error
 
 
-def verify_machine_file(path: Path, program: Program, expected: Sequence[LaserRun]) -> None:
+def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[LaserRun]) -> None:
     """Reads the file at ``path`` and compares it with the runs that were meant.
 
     Raises OutputError with the place of what is missing, on another layer, or off by TOLERANCE.

@@ -16,7 +16,7 @@ from sbafab.laminate.films import PTFE_WARNING, Material
 
 Recipes = Mapping[Operation, Recipe]
 """Recipes of a film on the machine, by what they do."""
-Program = Literal["rdworks", "epilog"]
+LaserProgram = Literal["rdworks", "epilog"]
 """Laser programs beside LightBurn that a sheet's machine file is for."""
 DxfProfile = Literal["bulges", "arcs", "chords"]
 
@@ -59,7 +59,7 @@ class CutSettings:
     machine: str | None = None
     recipes: Mapping[Material, Recipes] = field(default_factory=dict)
     entries: Mapping[Material, Entries] = field(default_factory=dict)
-    program: Program | None = None
+    program: LaserProgram | None = None
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)

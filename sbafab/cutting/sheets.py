@@ -41,7 +41,7 @@ from sbafab.cutting.properties import (
     ENGRAVE,
     REFERENCE,
     CutSettings,
-    Program,
+    LaserProgram,
     kerf_suffix,
     sheet_properties,
 )
@@ -239,7 +239,7 @@ def _write_machine_file(
     return f"{FOLDER}/{path.name}"
 
 
-def parts_cut(path: Path, program: Program) -> list[BeamRun]:
+def parts_cut(path: Path, program: LaserProgram) -> list[BeamRun]:
     """Return what a machine file cuts of the parts."""
     runs = read_machine_file(path, program)
     return [run for run in runs if run.layer in (CUT_INNER, CUT_OUTER)]

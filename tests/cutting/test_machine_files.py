@@ -25,7 +25,7 @@ from sbafab.cutting.machine_files import (
     verify_machine_file,
 )
 from sbafab.cutting.order import cutting_order
-from sbafab.cutting.properties import Program
+from sbafab.cutting.properties import LaserProgram
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc, stadium
 
@@ -41,7 +41,7 @@ OBLONG = stadium((50.0, 30.0), 16.0, 36.0)
 PARTS = Region((*RING.contours, *OBLONG.contours))
 AREA = math.pi * (10**2 - 4**2) + math.pi * 8**2 + 20 * 16
 """mm2: a ring, and a stadium."""
-PROGRAMS: tuple[Program, ...] = ("rdworks", "epilog")
+PROGRAMS: tuple[LaserProgram, ...] = ("rdworks", "epilog")
 
 
 def test_the_parts_are_what_they_are_called() -> None:
@@ -52,7 +52,7 @@ def runs_of(entries: Entries) -> list[LaserRun]:
     return list(drawn(beam_runs(cutting_order(PARTS), entries, AROUND), AROUND))
 
 
-def written(folder: Path, program: Program, entries: Entries = PLAIN) -> Path:
+def written(folder: Path, program: LaserProgram, entries: Entries = PLAIN) -> Path:
     path = folder / f"TPE_1{ENDINGS[program]}"
     path.write_text(machine_text(program, runs_of(entries), SIZE, "arm & co <1>"))
     return path
@@ -60,7 +60,9 @@ def written(folder: Path, program: Program, entries: Entries = PLAIN) -> Path:
 
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("entries", [PLAIN, ASKED])
-def test_what_is_written_reads_back(program: Program, entries: Entries, tmp_path: Path) -> None:
+def test_what_is_written_reads_back(
+    program: LaserProgram, entries: Entries, tmp_path: Path
+) -> None:
     path = written(tmp_path, program, entries)
     verify_machine_file(path, program, runs_of(entries))
     cuts = [run for run in read_machine_file(path, program) if run.layer.endswith("ER")]
@@ -133,7 +135,7 @@ def once(old: str, new: str) -> Callable[[str], str]:
     return change
 
 
-FAULTS: list[tuple[Program, Callable[[str], str], str]] = [
+FAULTS: list[tuple[LaserProgram, Callable[[str], str], str]] = [
     ("rdworks", once(r" 62\n5\n 10", " 62\n1\n 10"), "is one of CUT_OUTER, not of CUT_INNER"),
     ("rdworks", once(r" 62\n5\n 10", " 62\n3\n 10"), "has the colour 3, which no layer has"),
     ("rdworks", once(r" 40\n4\.0", " 40\n4.002"), "is not the circle that was written"),
@@ -155,7 +157,7 @@ FAULTS: list[tuple[Program, Callable[[str], str], str]] = [
 
 @pytest.mark.parametrize(("program", "change", "says"), FAULTS)
 def test_a_file_that_is_not_the_sheet_is_told(
-    program: Program, change: Callable[[str], str], says: str, tmp_path: Path
+    program: LaserProgram, change: Callable[[str], str], says: str, tmp_path: Path
 ) -> None:
     path = written(tmp_path, program)
     path.write_text(change(path.read_text()))

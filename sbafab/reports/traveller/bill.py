@@ -291,8 +291,9 @@ PROGRAMS = (
         "from its documentation, not tried",
         (
             "Open the .lbrn2 beside each DXF: layers, order and a frame without output are set, "
-            "all powers are 0. Set power and speed of each layer. The rest of this list is only "
-            "for the DXF.",
+            "and lead-ins, overcuts and tabs where the design asks for them. Powers are 0 unless "
+            "its notes name a recipe: set power and speed of each layer. The rest of this list is "
+            "only for the DXF.",
             "Each colour becomes a layer of its own in the Cuts / Layers window. By default layers "
             "run in the order of that window, from the top: bring them into the order above.",
             "Switch Output off for the layer of the grey REFERENCE lines.",
