@@ -31,7 +31,7 @@ ROOM = 4 * TOLERANCE
 """mm by which lengths along a contour may be off: ends of a stretch are off by TOLERANCE each."""
 
 
-class Curve(Protocol):
+class BeamCurve(Protocol):
     """A line, an arc or a Bezier curve."""
 
     @property
@@ -45,7 +45,7 @@ class BeamRun(NamedTuple):
     """Curves one after the other with the beam on, and the layer that they are on."""
 
     layer: str
-    curves: Sequence[Curve]
+    curves: Sequence[BeamCurve]
 
 
 class _Stretch(NamedTuple):
@@ -162,7 +162,7 @@ def _measured(run: BeamRun, laps: _Laps) -> tuple[int, _Stretch, Line | None]:
     return number, _Stretch(first_way, length, has_lead), lead
 
 
-def _steps(curves: Sequence[Curve], laps: _Laps) -> tuple[int, float, list[float]]:
+def _steps(curves: Sequence[BeamCurve], laps: _Laps) -> tuple[int, float, list[float]]:
     """The contour of curves, the way to their start along it, and the steps from there, mm."""
     number, first_way = laps.place(curves[0].start)
     lap, way = laps.lengths[number], first_way
@@ -179,7 +179,7 @@ def _steps(curves: Sequence[Curve], laps: _Laps) -> tuple[int, float, list[float
     return number, first_way, steps
 
 
-def _straight(curve: Curve) -> Line:
+def _straight(curve: BeamCurve) -> Line:
     line = Line(curve.start, curve.end)
     if any(distance_to(line, curve.at(t)) > TOLERANCE for t in BETWEEN):
         x, y = curve.start

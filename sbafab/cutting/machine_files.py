@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from sbafab.cutting.beam_check import BETWEEN, BeamRun, Curve
+from sbafab.cutting.beam_check import BETWEEN, BeamCurve, BeamRun
 from sbafab.cutting.beam_paths import LaserRun
 from sbafab.cutting.dxf_read import polyline
 from sbafab.cutting.dxf_write import number
@@ -80,7 +80,7 @@ def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[La
             raise OutputError(f"{place} is not the circle that was written; regenerate it")
 
 
-def _agrees(curves: Sequence[Curve], edges: Sequence[Edge]) -> bool:
+def _agrees(curves: Sequence[BeamCurve], edges: Sequence[Edge]) -> bool:
     """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
     if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
         return False
@@ -99,7 +99,7 @@ def _agrees(curves: Sequence[Curve], edges: Sequence[Edge]) -> bool:
     return number_ == len(edges) and share == 0.0
 
 
-def _is_round(curves: Sequence[Curve], expected: tuple[Point, float]) -> bool:
+def _is_round(curves: Sequence[BeamCurve], expected: tuple[Point, float]) -> bool:
     centre, radius = expected
     points = [curve.at(t) for curve in curves for t in BETWEEN]
     low, high = (f(x for x, _ in points) for f in (min, max))
