@@ -54,7 +54,9 @@ def near_discs(design: Design) -> NearDiscs | None:
     pocket, axis = read_outline(drawing), (0.0, 0.0)
     outer = max(edge.farthest_from(axis) for edge in pocket.edges)
     inner = pocket.distance_to_edge(axis)
-    return NearDiscs(2 * math.sqrt(pocket.area / math.pi), 2 * inner, 2 * outer)
+    equal = math.sqrt(pocket.area / math.pi)
+    # To the nanometre, as points are told apart: a drawn circle's discs are one.
+    return NearDiscs(*(round(2 * radius, 6) for radius in (equal, inner, outer)))
 
 
 def model_form(design: Design) -> Form:

@@ -490,14 +490,13 @@ def predict(
         items = uncertainty.bounded(items, partial(_moved_figures, subject, wish, together))
     relations = () if quick else tuple(_relations(subject, wish, _stack(together)))
     if discs is not None:
-        bounds = [
-            actuator_of(design, flat, wish.factors, discs.form(design, diameter))
-            for diameter in (discs.inner, discs.outer)
-        ]
-        each = [
-            _figures(end, wish, None if quick else elastic.elastic_stack(end, wish))
-            for end in bounds
-        ]
+        each = []
+        for diameter in (discs.inner, discs.outer):
+            if diameter == discs.equal:
+                each.append(items)
+                continue
+            end = actuator_of(design, flat, wish.factors, discs.form(design, diameter))
+            each.append(_figures(end, wish, None if quick else elastic.elastic_stack(end, wish)))
         items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     to_come = (STACK,) if quick and subject.radii else ()

@@ -9,6 +9,7 @@ averaged, nothing fitted. Rims stay level as a whole. Lengths mm, pressures kPa,
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -349,8 +350,15 @@ class Rung(NamedTuple):
     in_step: bool
 
 
-@lru_cache(maxsize=512)
 def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
+    """Return a balloon at the pressure of rung ``k``. Shapes hang on pressure over modulus alone:
+    films of any modulus have the rungs of the paper's.
+    """
+    return _rung_of_paper(replace(balloon, modulus=Balloon.modulus), waves, k)
+
+
+@lru_cache(maxsize=512)
+def _rung_of_paper(balloon: Balloon, waves: int, k: int) -> Rung:
     """Return a balloon at the pressure of rung ``k``, continued from the rung below."""
     of, p = _waving(balloon, waves), np.array([_first_pressure(balloon) * STEP**k])
     if k == 0:
@@ -358,7 +366,7 @@ def _rung(balloon: Balloon, waves: int, k: int) -> Rung:
         x, in_step = np.zeros((of.is_free.size, 1)), False
         x[R::PLACES], x[Z::PLACES] = shape.r.T, shape.z.T
     else:
-        below = _rung(balloon, waves, k - 1)
+        below = _rung_of_paper(balloon, waves, k - 1)
         x, in_step = below.x[:, None].copy(), below.in_step
     if not _ripples(balloon, x[:, 0]):
         x[PLACES * balloon.edge + EDGE] = -SEED * balloon.thickness / 2

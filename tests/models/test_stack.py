@@ -142,11 +142,11 @@ def test_one_chamber_is_its_balloons_in_series() -> None:
 
 
 def test_a_tapered_stack_pushes_at_most_as_its_smallest_balloon() -> None:
-    sizes = [12.0, 9.0, 6.0]
-    changes = {"chamber.diameter": sizes}, "stack.balloons=3", "models.calibration=none"
+    sizes = [10.0, 6.0]
+    changes = {"chamber.diameter": sizes}, "stack.balloons=2", "models.calibration=none"
     taper = sbafab.stack("1dof-10mm", *changes)
     bound = 100e-3 * math.pi * 3.0**2
-    found = blocked_force(taper, 100.0, np.linspace(0, 3, 7))
+    found = blocked_force(taper, 100.0, np.linspace(0, 2, 7))
     assert (found <= bound).all()
     assert (np.diff(found) <= 1e-9).all()
     assert found[0] > 0.9 * bound
