@@ -86,6 +86,31 @@ def test_the_whole_is_good_where_every_interface_is(good: Good) -> None:
     assert found.whole.value == pytest.approx(product, abs=ROOM)
 
 
+@pytest.mark.parametrize("cut", [0.0, 0.06, 0.15])
+def test_builds_are_drawn_until_the_share_is_within_a_point(cut: float, good: Good) -> None:
+    errors = Tolerances(cutting=0.1, pin=0, placement=0, turn=0)
+    asked = Limits(worst_bond_width=0.75 - cut, worst_mask_overhang=0.0, tolerances=errors)
+    share = simulate(good(*ONE), asked).whole
+    low, high = share.interval
+    assert high - low <= 0.0101
+    # No more than that takes: a batch above 1.96^2 p (1 - p) / 0.005^2, or the first 10,000.
+    p = min(max(0.5, low - 0.01), high + 0.01)
+    assert share.builds <= max(10_000, p * (1 - p) * 392.0**2 + 5_000)
+
+
+def test_middle_first_takes_a_placement_by_hand_less(good: Good) -> None:
+    by_hand = Tolerances(cutting=0, pin=0, placement=0.2, turn=0)
+    two = ("1dof-5mm", "stack.balloons=2")
+    shares = [
+        simulate(good(*two, f"registration.sequence={word}"), limits(0.6, by_hand)).whole.value
+        for word in ("bottom-first", "middle-first")
+    ]
+    # Base, separator and cap are each laid by hand, and good within 0.15 of 0.2.
+    assert shares[1] == pytest.approx((0.15 / 0.2) ** 6, abs=0.02)
+    # With the bottom balloon pressed first, the upper one is laid on it by hand as well.
+    assert shares[0] < 0.6 * shares[1]
+
+
 def test_without_errors_every_build_is_good(good: Good) -> None:
     found = simulate(good(*ONE), limits(0.75, Tolerances(0, 0, 0, 0)))
     assert found.whole.value == 1.0
