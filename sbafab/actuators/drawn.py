@@ -379,6 +379,7 @@ def build(design: DrawnDesign) -> Laminate:
         registration=design.registration.method,
         notes=design.notes or (),
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        middle_first=design.registration.is_middle_first,
         tube=None if design.tube is None else design.tube.outer_diameter,
         outline=Region() if design.body is None else shapes.of(design.body, "body"),
         seams=tuple(

@@ -244,6 +244,7 @@ def stacked(
         balloons=balloons,
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        middle_first=design.registration.is_middle_first,
         notes=(NOTE,) if stack.ears else (),
         bonds=design.stated_bonds,
     )

@@ -50,6 +50,7 @@ def laminate_of(files: Sequence[LayerFile], claims: Manifest, design: Design) ->
         balloons=sum(layer.role == "chamber-mask" for layer in layers),
         registration=design.registration.method,
         pins_in_full_bonds=design.registration.full_bond_pins == "in",
+        middle_first=design.registration.is_middle_first,
     )
     drilled = sorted(
         (hole.centre for hole in bores(layers, design.bore.diameter, bare.lumen)),

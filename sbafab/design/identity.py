@@ -107,6 +107,7 @@ def actuator_sha256(design: Design) -> str:
     table["registration"] = [
         method,
         *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
+        *(("middle-first",) if design.registration.is_middle_first else ()),
     ]
     table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
     table["press"] = [getattr(design.press, key) for key in BONDED]

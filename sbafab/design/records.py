@@ -77,6 +77,13 @@ def card(title: str, symbol: str) -> ConfigDict:
     return ConfigDict(title=title, json_schema_extra={"symbol": symbol})
 
 
+REGISTRATIONS = {
+    "method": ("channel-pin", "ears"),
+    "sequence": ("bottom-first", "middle-first"),
+}
+"""Ways of registration that a search may choose between, by key; sheets are experimental."""
+
+
 class Design(Section):
     """The sections that all families share; a family adds its own, sets ``family`` and ``form``."""
 
@@ -239,6 +246,11 @@ class Design(Section):
             Free("stack.balloons", 2, most, 1),
             Free("bond.width", bond, bond + 0.5, 0.05, asked="yield"),
             Free("mask.overhang", reach, reach + 0.5, 0.05, asked="yield"),
+            *(
+                Free.of_words(f"registration.{key}", words, asked="yield")
+                for key, words in REGISTRATIONS.items()
+                if self.registration.method in REGISTRATIONS["method"]
+            ),
         )
 
     def drawn_shapes(self) -> Mapping[str, Region | None]:
@@ -381,7 +393,7 @@ class Form:
 
 @dataclass(frozen=True)
 class Free:
-    """A key that a search may change: from ``low`` to ``high`` in steps.
+    """A key that a search may change: from ``low`` to ``high`` in steps, or one of ``choices``.
 
     ``asked``: only where a requirement names this quantity; else it stays as it is. ``widens``: the
     ends are where a search begins, and may move.
@@ -393,6 +405,14 @@ class Free:
     step: float
     asked: str = ""
     widens: bool = False
+    choices: tuple[str, ...] = ()
+    """Words that the key may be, if it is no number; its steps then count them from 0."""
+
+    @classmethod
+    def of_words(cls, key: str, choices: Iterable[str], asked: str = "") -> Free:
+        """Return a key that takes one of some words."""
+        words = tuple(choices)
+        return cls(key, 0, len(words) - 1, 1, asked, choices=words)
 
 
 def degrees_of_freedom(stacks: int) -> str:

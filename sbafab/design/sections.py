@@ -263,6 +263,10 @@ class Registration(Section):
     """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
     bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
     coat. Neither was tried."""
+    sequence: Literal["bottom-first", "middle-first"] | None = None
+    """Order of stacking. "bottom-first" (default, the paper's): the bottom balloon with its base,
+    then the middle layers on the pins, then both with the top layer. "middle-first": all layers
+    between base and cap on the pins, then base and cap; one placement by hand less, not tried."""
     pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
     """By how much the holes of the ears are wider than their pins; up to three steps add it up."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
@@ -302,6 +306,11 @@ class Registration(Section):
                 'add --experimental, or set it to true, to have it all the same, or use "ears"'
             )
         return experimental
+
+    @property
+    def is_middle_first(self) -> bool:
+        """True if the layers between base and cap are tacked before any balloon is pressed."""
+        return self.sequence == "middle-first"
 
     @property
     def hole_diameter(self) -> float:

@@ -104,6 +104,8 @@ def import_laminate(path: Path) -> Imported:
     tables["registration"] = {"method": laminate.registration}
     if laminate.pins_in_full_bonds:
         tables["registration"]["full_bond_pins"] = "in"
+    if laminate.middle_first:
+        tables["registration"]["sequence"] = "middle-first"
     return _drawn(laminate, tables, stock, tube, {}, remarks)
 
 

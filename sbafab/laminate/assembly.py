@@ -50,9 +50,10 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
 
     Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
-    out as in the paper. With ears base and cap are tacked on the pins by a flash bond, and the full
-    bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In registered
-    sheets the pins, which stand in the frame, are in every time.
+    out as in the paper. ``laminate.middle_first`` tacks all layers between base and cap in one
+    step, and presses no balloon by itself. With ears base and cap are tacked on the pins by a flash
+    bond, and the full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In
+    registered sheets the pins, which stand in the frame, are in every time.
     """
     return stored(laminate, "_steps", _steps)
 
@@ -126,6 +127,13 @@ def _all_plans(laminate: Laminate, indices: tuple[int, ...]) -> tuple[_Plan, ...
     upper = tuple(index for index in indices if base < index <= wall)
     bottom = (base, *upper)
     under = tuple(index for index in indices if index < base)
+    between = tuple(index for index in indices if index > base)
+    if laminate.middle_first and len(between) > 2:
+        between, cap = between[:-1], between[-1:]
+        return (
+            _Plan("flash_middle", "flash", (between,), between),
+            _Plan("bond_all", "full", (under, (base,), between, cap), (*under, base, *cap)),
+        )
     over = tuple(index for index in indices if index > wall)
     middle, cap = over[:-1], over[-1:]
     if len(upper) < 2:

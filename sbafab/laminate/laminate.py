@@ -229,6 +229,7 @@ class Laminate:
 
     ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty where
     only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
+    ``middle_first``: all layers between base and cap are tacked on the pins before any other bond.
     ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
     the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
     layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join halves of one film, and
@@ -249,6 +250,7 @@ class Laminate:
     notes: tuple[str, ...] = ()
     outline: Region = NOTHING
     pins_in_full_bonds: bool = False
+    middle_first: bool = False
     panel: SheetPanel | None = None
     tube: float | None = None
     seams: tuple[Seam, ...] = ()

@@ -117,6 +117,7 @@ def _document(laminate: Laminate) -> dict[str, Any]:
         "lumen": laminate.lumen,
         "tube": laminate.tube,
         "pins_in_full_bonds": laminate.pins_in_full_bonds,
+        "middle_first": laminate.middle_first,
         "notes": laminate.notes,
         "films": films.values,
         "layers": layers,
@@ -191,6 +192,7 @@ def _laminate(document: dict[str, Any]) -> Laminate:
         notes=tuple(document["notes"]),
         outline=shapes[document["outline"]],
         pins_in_full_bonds=document["pins_in_full_bonds"],
+        middle_first=document["middle_first"],
         panel=None if panel is None else _panel(panel, shapes),
         tube=document["tube"],
         seams=tuple(

@@ -89,7 +89,14 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
 }
 """Of each list of objects: its keys and what stands there; ``?`` where it may be null."""
 LATER: Mapping[str, Mapping[str, Any]] = {
-    "": {"seams": [], "folds": [], "ports": [], "nets": [], "bonds": []},
+    "": {
+        "seams": [],
+        "folds": [],
+        "ports": [],
+        "nets": [],
+        "bonds": [],
+        "middle_first": False,
+    },
     "films": {"faces": None},
     "layers": {"turned": False},
     "chambers": {"balloons": []},
@@ -106,6 +113,7 @@ HEAD: Mapping[str, str] = {
     "lumen": "size?",
     "tube": "size?",
     "pins_in_full_bonds": _YES,
+    "middle_first": _YES,
     "notes": _TEXTS,
     "outline": _INDEX,
 }

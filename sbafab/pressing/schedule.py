@@ -462,6 +462,8 @@ def _step(
     if part.name == "flash_bottom" and len(part.layers) > 2:
         title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
     words = _instructions(part, count) + after
+    if part.name == "flash_middle" and laminate.middle_first:
+        title = "All layers between base and cap"
     if laminate.panel is not None:
         title, words = title_of_sheets(part), instructions(part)
     if part.joining is not None and len(part.layers) < len(laminate.layers):
@@ -618,6 +620,11 @@ PINS_IN = (
     "a release sleeve on each or coat it with a release agent, and try it on a sample first"
 )
 
+MIDDLE_FIRST = (
+    'untested: with registration.sequence = "middle-first" the base is pressed on together with '
+    "the cap, in the last bond alone; try a sample, and look at its lowest bond"
+)
+
 HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 
@@ -730,6 +737,8 @@ def warnings(
         )
     if laminate.registration == "ears" and laminate.pins:
         yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
+    if laminate.middle_first and laminate.panel is None and parts[0].name == "flash_middle":
+        yield MIDDLE_FIRST
     pads = (
         item.thickness_mm for step in steps for item in step.build_up if item.part == build_up.PAD
     )

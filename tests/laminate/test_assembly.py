@@ -40,6 +40,18 @@ def test_three_balloons_take_four_steps(laminate: Laminate) -> None:
     ]
 
 
+def test_middle_first_takes_two_steps(laminate: Laminate) -> None:
+    core = (2, 3, 4, 5, 6, 7, 8, 9, 10)
+    turned = replace(laminate, middle_first=True)
+    assert [told(step) for step in assembly(turned)] == [
+        (1, "flash_middle", "flash", (core,), core, ["chamber1"]),
+        (2, "bond_all", "full", ((1,), core, (11,)), (1, 11), []),
+    ]
+    # A balloon alone has too few layers between base and cap.
+    single = replace(turned, layers=laminate.layers[:3])
+    assert [step.name for step in assembly(single)] == ["flash_bottom", "bond_bottom"]
+
+
 def test_a_balloon_alone_takes_two(laminate: Laminate) -> None:
     single = replace(laminate, layers=laminate.layers[:3])
     assert [told(step) for step in assembly(single)] == [
