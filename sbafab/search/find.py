@@ -24,6 +24,7 @@ from sbafab.design.files import (
     kit_names,
     override,
     read_toml,
+    shown,
     suggest_from_user_folder,
 )
 from sbafab.design.records import Design, Free, keys_of
@@ -228,6 +229,11 @@ def _refuse_fixed(
     """Raises DesignError for a key that is asked to be what it is not, and may not change."""
     key = requirement.quantity.key
     value = keys.get(key or "")
+    if isinstance(value, str):
+        raise DesignError(
+            f"{key} is a word, {shown(value)}, and has no least or most; set it with --set, or let "
+            f"the search choose with --free {key}={value},..."
+        )
     if key in [free_key.key for free_key in free] or not isinstance(value, int | float):
         return
     if not requirement.holds(value):
@@ -401,9 +407,8 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeE
     """Return the keys whose range alone stops a better design, or a nearer miss."""
     ends = []
     for axis, neighbour in _steps(point):
-        if space.lows[axis] <= neighbour[axis] <= space.highs[axis] or space.is_excluded(
-            axis, neighbour
-        ):
+        is_inside = space.lows[axis] <= neighbour[axis] <= space.highs[axis]
+        if is_inside or space.free[axis].choices or space.is_excluded(axis, neighbour):
             continue
         if space.with_rules(space.peek(neighbour)).rank < best.rank:
             free = space.free[axis]

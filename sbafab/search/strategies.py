@@ -89,11 +89,19 @@ def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
 
 
 def _grid(space: SearchSpace) -> None:
-    """Evaluate a coarse grid, as fine as its share of the tries allows."""
+    """Evaluate a coarse grid, as fine as its share of the tries allows.
+
+    Keys that are words stay as they begin: the walks from the grid change them.
+    """
     room = max(8.0, GRID_SHARE * space.tries)
-    levels = max(2, int(room ** (1 / len(space.free))))
+    numbers = sum(not free.choices for free in space.free)
+    levels = max(2, int(room ** (1 / max(1, numbers))))
     axes = []
-    for low, count in zip(space.lows, space.counts, strict=True):
+    begin = space.nearest()
+    for axis, (low, count) in enumerate(zip(space.lows, space.counts, strict=True)):
+        if space.free[axis].choices:
+            axes.append([begin[axis]])
+            continue
         few = min(levels, count)
         steps = [low + round((count - 1) * number / max(1, few - 1)) for number in range(few)]
         axes.append(list(dict.fromkeys(steps)))
@@ -267,7 +275,12 @@ def with_optuna(search: SearchSpace, storage: str | None) -> None:
 
 def _name(search: SearchSpace) -> str:
     requirements = [requirement.label for requirement in search.problem.requirements]
-    keys = [f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}" for free in search.free]
+    keys = [
+        f"{free.key} {', '.join(free.choices)}"
+        if free.choices
+        else f"{free.key} {free.low:g} to {free.high:g} by {free.step:g}"
+        for free in search.free
+    ]
     design = search.problem.design
     return "; ".join(
         [

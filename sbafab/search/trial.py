@@ -145,7 +145,8 @@ class Trial:
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
     ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
     says why no such design can be made. ``intervals``, by quantity in its unit, are those whose
-    ends are held against limits, where requirements are to hold with a probability.
+    ends are held against limits, where requirements are to hold with a probability. ``words``:
+    number of keys, of those that are words, that differ from the starting design's.
     """
 
     values: Mapping[str, Any]
@@ -157,6 +158,7 @@ class Trial:
     refused: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    words: int = 0
 
     @property
     def holds(self) -> bool:
@@ -164,9 +166,9 @@ class Trial:
         return self.missed == 0.0 and not self.refused
 
     @property
-    def rank(self) -> tuple[float, float, float]:
-        """Sort key, best first: share missed, then cost, then mass."""
-        return self.missed, self.cost, self.mass
+    def rank(self) -> tuple[float, float, float, int]:
+        """Sort key, best first: share missed, then cost, then mass, then changed words."""
+        return self.missed, self.cost, self.mass, self.words
 
     def value(self, requirement: Requirement | Goal) -> float:
         """The figure that a requirement or the goal is about, in its unit."""
@@ -307,6 +309,8 @@ def misses(problem: SearchProblem, trial: Trial) -> list[str]:
 
 def value_said(value: Any) -> str:
     """The value of a key, a list in brackets."""
+    if isinstance(value, str):
+        return value
     return f"[{', '.join(map(value_said, value))}]" if isinstance(value, list) else f"{value:g}"
 
 
@@ -343,8 +347,11 @@ def read_free(
     """
     keys = {key: value for key, value, _ in keys_of(design)}
     assigned = [key for key in assigned if not numbers_of(keys.get(key))]
-    varied = [_stepped(text) for text in texts]
+    varied = [_free_of(text) for text in texts]
     refuse_unknown(design, [read_varied(text, "--free") for text in texts], "--free")
+    for words in varied:
+        for word in words.choices:
+            design.with_({words.key: word})
     free = {free_key.key: free_key for free_key in design.free}
     if any(key.startswith("fits.") for key in assigned):
         free.pop("chamber.diameter", None)
@@ -368,14 +375,17 @@ def read_free(
     return tuple(free.values())
 
 
-def _stepped(text: str) -> Free:
+def _free_of(text: str) -> Free:
+    """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` of a key that takes one of some words."""
     stepped = read_varied(text, "--free")
+    if stepped.values and all(isinstance(value, str) for value in stepped.values):
+        return Free.of_words(stepped.key, stepped.values)
     numbers = [value for value in stepped.values if isinstance(value, int | float)]
     parts = text.partition("=")[2].split(":")
     if len(parts) != 3 or len(numbers) != len(stepped.values):
         raise DesignError(
             f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
-            "--free chamber.diameter=3:12:0.1"
+            "--free chamber.diameter=3:12:0.1 or --free registration.method=channel-pin,ears"
         )
     step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
     return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))
@@ -426,6 +436,11 @@ class SearchSpace:
         values: dict[str, Any] = {}
         for axis, free in enumerate(self.free):
             value = self.number(axis, point)
+            if free.choices:
+                # Out of its range a word stays the last one.
+                last = len(free.choices) - 1
+                values[free.key] = free.choices[min(max(point[axis], 0), last)]
+                continue
             is_whole = free.low == int(free.low) and free.step == int(free.step)
             listed = numbers_of(self._keys.get(free.key))
             if listed:
@@ -439,6 +454,9 @@ class SearchSpace:
         steps = []
         for free in self.free:
             value: Any = self._keys.get(free.key)
+            if free.choices:
+                steps.append(free.choices.index(value) if value in free.choices else 0)
+                continue
             listed = numbers_of(value)
             at = max(listed) if listed else value
             at = at if isinstance(at, int | float) else (free.low + free.high) / 2
@@ -459,7 +477,7 @@ class SearchSpace:
         """
         if point not in self.trials:
             self._tell(PROGRESS_LABEL, len(self.trials), self.tries)
-            candidate = evaluated(self.problem, self.values(point))
+            candidate = self._evaluated(point)
             so_far = min(
                 (trial.rank for trial in self.trials.values() if trial.rules), default=None
             )
@@ -474,7 +492,16 @@ class SearchSpace:
 
     def peek(self, point: GridPoint) -> Trial:
         """Return the candidate at a point, also out of range; it does not count as a try."""
-        return self.trials.get(point) or evaluated(self.problem, self.values(point))
+        return self.trials.get(point) or self._evaluated(point)
+
+    def _evaluated(self, point: GridPoint) -> Trial:
+        candidate = evaluated(self.problem, self.values(point))
+        start = self.nearest()
+        words = sum(
+            free.choices != () and step != begin
+            for free, step, begin in zip(self.free, point, start, strict=True)
+        )
+        return replace(candidate, words=words)
 
     def is_excluded(self, axis: int, point: GridPoint) -> bool:
         """Return True if a requirement on the key itself excludes its value at the point."""
@@ -489,7 +516,7 @@ class SearchSpace:
         """Return the candidate with its rules checked, unless they are known or it was refused."""
         if trial.rules is not None or trial.refused:
             return trial
-        return evaluated(self.problem, trial.values, with_rules=True)
+        return replace(evaluated(self.problem, trial.values, with_rules=True), words=trial.words)
 
     def best(self) -> tuple[GridPoint, Trial]:
         """Return the best candidate, rules checked; where they make it worse, the next is tried."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
@@ -21,7 +21,7 @@ from sbafab.errors import DesignError
 from sbafab.models.intervals import calibration_of
 from sbafab.models.unknowns import UNKNOWNS
 from sbafab.search import trial as module
-from sbafab.search.find import FindRequest, find, free_keys
+from sbafab.search.find import FindRequest, FoundDesign, find, free_keys
 from sbafab.search.quantities import QUANTITIES, read_quantity
 from sbafab.search.trial import SearchProblem, Trial, figure_text, read_all, read_free
 
@@ -179,6 +179,8 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
         (["--min", "inlet.tab_length=6"], "--free inlet.tab_length=LOW:HIGH:STEP"),
         (["--max", "deflated_diameter=3"], "only radial designs"),
         (["--free", "chamber.diameter=6:3:1"], "--free 'chamber.diameter=6:3:1' stops below"),
+        (["--free", "registration.method=ears,glue"], "'glue' must be 'channel-pin', 'ears' or"),
+        (["--min", "registration.method=3"], "is a word, 'channel-pin', and has no least or most"),
     ],
 )
 def test_what_cannot_be_asked_is_said_before_anything_else(
@@ -503,3 +505,49 @@ def test_a_search_by_optuna_that_is_stopped_goes_on(
     changed = replace(request, design=sbafab.load("1dof-5mm", "inlet.tab_length=6"))
     find(changed)
     assert len(optuna.get_all_study_summaries(request.storage or "")) == 2
+
+
+# Keys that are words.
+
+
+YIELDING = ("stack.balloons=2", "rules.yield_builds=400")
+ROUGH = ("registration.hand_placement=0.2", "registration.hand_turn=1")
+
+
+def best_yield(*assignments: str, free: Sequence[str]) -> FoundDesign:
+    design = sbafab.load("1dof-5mm", *YIELDING, *assignments)
+    fixed = [key.key for key in design.free]
+    requirements, goal = read_all([], [], "yield")
+    return find(FindRequest(design, requirements, goal, read_free(design, free, fixed), tries=8))
+
+
+def test_the_best_yield_is_that_of_the_best_words() -> None:
+    found = best_yield(*ROUGH, free=["registration.method=channel-pin,ears"])
+    assert found.best.values == {"registration.method": "ears"}
+    by_word = {trial.values["registration.method"]: trial for trial in (found.best, *found.front)}
+    for word, trial in by_word.items():
+        changed = sbafab.load("1dof-5mm", *YIELDING, *ROUGH, f"registration.method={word}")
+        (finding,) = (row for row in sbafab.check(changed) if row.rule == "registration-yield")
+        assert trial.figures["yield"] == finding.measured
+    # Words have no end beyond which another one would be better.
+    assert found.ends == ()
+
+
+@pytest.mark.parametrize("word", ["bottom-first", "middle-first"])
+def test_of_equal_words_that_of_the_design_stays(word: str) -> None:
+    # On ears every build is good, whatever is stacked first.
+    given = ("registration.method=ears", f"registration.sequence={word}")
+    found = best_yield(*given, free=["registration.sequence=bottom-first,middle-first"])
+    assert found.best.figures["yield"] == 1
+    assert found.best.values == {"registration.sequence": word}
+
+
+def test_a_yield_frees_the_ways_of_registration() -> None:
+    design = sbafab.load("1dof-5mm")
+    requirements, goal = read_all(["yield=0.9"], [], "mass")
+    free = {key.key: key for key in free_keys(FindRequest(design, requirements, goal))}
+    assert free["registration.method"].choices == ("channel-pin", "ears")
+    assert free["registration.sequence"].choices == ("bottom-first", "middle-first")
+    requirements, goal = read_all([], [], "mass")
+    keys = [key.key for key in free_keys(FindRequest(design, requirements, goal))]
+    assert not [key for key in keys if key.startswith("registration")]
