@@ -14,7 +14,13 @@ import click
 from sbafab.actuators import load_design
 from sbafab.assemblies.files import load
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import designs_or_folders, json_option, set_option, waive_option
+from sbafab.cli.options import (
+    designs_or_folders,
+    json_option,
+    set_option,
+    target_yield_option,
+    waive_option,
+)
 from sbafab.cli.printing import (
     FILES,
     Group,
@@ -89,12 +95,9 @@ class CheckOutcome(NamedTuple):
 @click.argument("source", metavar="DESIGN|FOLDER", shell_complete=designs_or_folders)
 @set_option
 @waive_option("Accept the failure of this rule; cut files would state it. Repeatable.")
-@click.option(
-    "--target-yield",
-    type=click.FloatRange(0, 1, min_open=True, max_open=True),
-    metavar="SHARE",
-    help="Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest "
-    "bond and overhang that reach it.",
+@target_yield_option(
+    "Fail if fewer random builds are good than this share, e.g. 0.99, and advise the smallest bond "
+    "and overhang that reach it."
 )
 @click.option(
     "--nets",

@@ -85,17 +85,23 @@ def _counted(number: int, noun: str) -> str:
 def print_comparison(comparison: DesignComparison) -> None:
     """Print keys and rules that differ, and the main figures of both designs."""
     names = comparison.names
-    _print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
-    _print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
+    print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
+    print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
+    print_figures(comparison, names)
+
+
+def print_figures(comparison: DesignComparison, names: tuple[str, str]) -> None:
+    """Print the main figures of both designs."""
     main = [
         (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures))
         for pair in comparison.figures
         if pair.is_main
     ]
-    _print_table("Figures, in parentheses the 90 % interval", names, main)
+    print_table("Figures, in parentheses the 90 % interval", names, main)
 
 
-def _print_table(title: str, names: tuple[str, str], rows: Sequence[tuple[str, ...]]) -> None:
+def print_table(title: str, names: tuple[str, str], rows: Sequence[tuple[str, ...]]) -> None:
+    """Print a table of two designs; nothing without rows."""
     from rich.table import Table
     from rich.text import Text
 

@@ -98,7 +98,7 @@ SHARE = {"passed": COUNT, "tested": COUNT, "share": number(), "low": number(), "
 
 
 def _run() -> dict[str, Any]:
-    return table(
+    run = table(
         schema={"const": ids.RUN_SCHEMA},
         folder=TEXT,
         failed=YES,
@@ -106,6 +106,17 @@ def _run() -> dict[str, Any]:
         notes=array(TEXT),
         files=PATHS,
     )
+    word_or_mm = {"type": ["number", "string"]}
+    reached = table(
+        target_yield=number(),
+        changes=array(table(**{"key": TEXT, "from": word_or_mm, "to": word_or_mm})),
+        measured=number("null"),
+        interval={"type": ["array", "null"], "items": number()},
+        message=TEXT,
+        figures=array(_figure_of_two()),
+    )
+    described = {**reached, "description": "of --target-yield; figures as given and as changed"}
+    return and_perhaps(run, **{"yield": described})
 
 
 def _nested() -> dict[str, Any]:
@@ -730,36 +741,42 @@ def _find() -> dict[str, Any]:
     )
 
 
-def _compare() -> dict[str, Any]:
-    def two(item: Mapping[str, Any]) -> dict[str, Any]:
-        return {**array(item), "minItems": 2, "maxItems": 2}
+def _two(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {**array(item), "minItems": 2, "maxItems": 2}
 
-    text_or_null = {"type": ["string", "null"]}
-    design = table(name=TEXT, source=TEXT, family=TEXT, design_sha256=TEXT, failed=array(TEXT))
-    rule = table(
-        rule=TEXT,
-        unit=TEXT,
-        verdicts=two(text_or_null),
-        margins={**two(number("null")), "description": "what is left to the limit"},
-    )
-    figure = table(
+
+TEXT_OR_NULL = {"type": ["string", "null"]}
+
+
+def _figure_of_two() -> dict[str, Any]:
+    return table(
         name=TEXT,
         unit=TEXT,
         main={"type": "boolean", "description": "whether the command prints it"},
         differs=YES,
-        values=two(number("null")),
+        values=_two(number("null")),
         intervals={
-            **two({**array(number()), "type": ["array", "null"]}),
+            **_two({**array(number()), "type": ["array", "null"]}),
             "description": "90 % intervals, where a calibration says so",
         },
-        models=two(text_or_null),
+        models=_two(TEXT_OR_NULL),
+    )
+
+
+def _compare() -> dict[str, Any]:
+    design = table(name=TEXT, source=TEXT, family=TEXT, design_sha256=TEXT, failed=array(TEXT))
+    rule = table(
+        rule=TEXT,
+        unit=TEXT,
+        verdicts=_two(TEXT_OR_NULL),
+        margins={**_two(number("null")), "description": "what is left to the limit"},
     )
     found = table(
         schema={"const": ids.COMPARE_SCHEMA},
-        designs=two(design),
-        keys=array(table(key=TEXT, values=two({}))),
+        designs=_two(design),
+        keys=array(table(key=TEXT, values=_two({}))),
         rules=array(rule),
-        figures=array(figure),
+        figures=array(_figure_of_two()),
     )
     return and_perhaps(found, folder=TEXT)
 

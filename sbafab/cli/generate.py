@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.assemblies.files import load
-from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
-from sbafab.cli.printing import console, facts_table, print_line
-from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_request
+from sbafab.cli.compare import print_figures, print_table
+from sbafab.cli.exit import RULE_FAILED, Exit, end
+from sbafab.cli.options import (
+    Request,
+    dxf_options,
+    run_options,
+    sheet_options,
+    target_yield_option,
+)
+from sbafab.cli.printing import console, facts_table, print_line, print_wrapped
+from sbafab.cli.progress import shown_progress
+from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_json, run_request
+from sbafab.design.files import changed_keys
 from sbafab.design.records import Design
+from sbafab.errors import DesignError
+from sbafab.output.advice import reach_yield, value_of
 from sbafab.output.checked import EVERYTHING
 from sbafab.runs.run import Run, RunRequest
+from sbafab.search.compare import compare as compared
+from sbafab.search.compare import value_text
 from sbafab.simulators.simulator import NAMES
 
 if TYPE_CHECKING:
@@ -21,23 +36,75 @@ if TYPE_CHECKING:
     from sbafab.cutting.properties import Curves
 
 
+DESIGNS = "as given", "changed"
+"""Of the two designs of --target-yield."""
+
+
 @click.command()
 @run_options
 @dxf_options
 @sheet_options
+@target_yield_option(
+    "Change the design as little as this share of good random builds needs, e.g. 0.95: order of "
+    "stacking, bond and overhang, plate, ears. Keys of --set stay."
+)
 @click.option("--decks", is_flag=True, help="Also write the input files of the simulators.")
-def generate(request: Request, curves: Curves, decks: bool) -> None:
+def generate(request: Request, curves: Curves, target_yield: float | None, decks: bool) -> None:
     """Write everything: cut files, schedule, traveller, meshes.
 
     --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
     has a folder for each of its designs, and sheets, a traveller and a solid of the whole.
+    --target-yield prints what it changed and what that costs, and the folder's design.toml is the
+    changed design; where the share is not reached, nothing is written and the exit code is 1.
     """
     source = load(request.designs[0], request.assignments, request.waivers)
     if decks and not isinstance(source, Design):
         raise click.UsageError("--decks goes with one design; leave it out for an assembly")
     parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
-    show = print_run if isinstance(source, Design) else print_assembly
-    run_request(RunRequest(source, request.out, parts, curves), request, show)
+    wanted = RunRequest(source, request.out, parts, curves)
+    if target_yield is not None:
+        if not isinstance(source, Design):
+            raise DesignError(
+                "--target-yield goes with a design, and this is an assembly; generate its parts' "
+                "designs one by one, and name the files it writes in the assembly"
+            )
+        _generate_for_yield(source, target_yield, wanted, request)
+        return
+    run_request(wanted, request, print_run if isinstance(source, Design) else print_assembly)
+
+
+def _generate_for_yield(
+    design: Design, target: float, wanted: RunRequest, request: Request
+) -> None:
+    """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
+    fixed = frozenset(changed_keys(request.assignments))
+    with shown_progress(request.as_json) as progress:
+        found = reach_yield(design, target, fixed, progress)
+        if found.design is None:
+            end(Exit("yield", found.sentence, RULE_FAILED), request.as_json)
+        changed = found.design
+        comparison = (
+            compared(design, changed, DESIGNS, progress=progress) if found.changes else None
+        )
+
+    def show(run: Run) -> None:
+        if comparison is not None:
+            rows = [
+                (key, value_text(value_of(design, key)), value_text(value))
+                for key, value in found.changes.items()
+            ]
+            print_table("Changed for the yield", DESIGNS, rows)
+            print_figures(comparison, DESIGNS)
+        print_wrapped(found.sentence)
+        print_line("")
+        print_run(run)
+
+    def as_json(run: Run) -> dict[str, object]:
+        figures = comparison.as_dict()["figures"] if comparison is not None else []
+        main = [figure for figure in figures if figure["main"]]
+        return {**run_json(run), "yield": {**found.as_dict(), "figures": main}}
+
+    run_request(replace(wanted, source=changed), request, show, as_json)
 
 
 def print_assembly(run: Run) -> None:

@@ -220,6 +220,24 @@ def waive_option(words: str) -> Callable[[Command], Command]:
     )
 
 
+def _target(_: click.Context, __: click.Parameter, text: str | None) -> float | None:
+    """Return a share from 0.95 or 95%; raises BadParameter for none, all and other text."""
+    match = None if text is None else _WRITTEN.fullmatch(text)
+    if text is None:
+        return None
+    share = float(match[1]) / (100 if match[2] else 1) if match and match[2] in ("", "%") else 0.0
+    if not 0 < share < 1:
+        raise click.BadParameter(f"{text!r} must be a share above 0 and below 1, as 0.95 or 95%")
+    return share
+
+
+def target_yield_option(words: str) -> Callable[[Command], Command]:
+    """Return ``--target-yield`` with the help text of a command."""
+    return click.option(
+        "--target-yield", "target_yield", callback=_target, metavar="SHARE", help=words
+    )
+
+
 WAIVE_HELP = {
     "press": "Write the schedule although this rule fails; it will state it. Repeatable.",
     "mesh": "Write the meshes although this rule fails; the manifest will state it. Repeatable.",

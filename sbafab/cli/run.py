@@ -46,14 +46,17 @@ def run_parts(
 
 
 def run_request(
-    wanted: RunRequest, request: Request, show: Callable[[Run], None] | None = None
+    wanted: RunRequest,
+    request: Request,
+    show: Callable[[Run], None] | None = None,
+    as_json: Callable[[Run], object] | None = None,
 ) -> None:
-    """Write a folder, print its table (by ``show``) and exit with 1 if a rule failed."""
+    """Write a folder, print it (by ``show`` or ``as_json``) and exit with 1 if a rule failed."""
     with shown_progress(request.as_json) as progress:
         run = generate(wanted, progress)
     for name, reason in run.left_out:
         print_error(f"no input files for {name}: {reason}")
-    finish(run, request, run_json, show or print_run)
+    finish(run, request, as_json or run_json, show or print_run)
 
 
 def finish(

@@ -1,28 +1,36 @@
-"""The bond and overhang with which a design reaches a yield, found by search.
+"""What a design needs for a yield: bond and overhang, the order of stacking, plate, registration.
 
-Every trial is built and counted like the design itself; the advised one is counted again with
-another seed, so that the advice does not rest on the draws it was chosen by.
+``advise`` says the least bond and overhang, ``reach_yield`` changes a design as little as it needs.
+Every trial is built and counted like the design itself; the result is counted again with another
+seed, so that it does not rest on the draws it was chosen by.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple, get_args
 
 from sbafab.actuators import build
-from sbafab.design.records import Design
+from sbafab.design.records import REGISTRATIONS, Design
 from sbafab.errors import DesignError
+from sbafab.laminate.base_plate import PlateMachine
 from sbafab.output.checked import limits
 from sbafab.process import Progress, ignore_progress
-from sbafab.rules.deck import has_failed, run_deck
+from sbafab.rules.deck import run_deck
 from sbafab.rules.registration_yield import SEED, Share, simulate
 
 STEP = 0.01
 """mm: bond and overhang are advised in whole steps."""
 MOST_STEPS = 128
 """1.28 mm more than the least that the rules ask for."""
+FEW_STEPS = 10
+"""0.1 mm, a cutting error: by so much bond and overhang grow before plate or pins change."""
 CHECK_SEED = SEED + 1
+BOND, OVERHANG = "bond.width", "mask.overhang"
+METHOD, SEQUENCE = "registration.method", "registration.sequence"
+PLATE, PIN_ERROR = "registration.plate_made_by", "registration.pin_error"
+TARGET = "rules.target_yield"
 
 
 OTHERWISE = {
@@ -73,100 +81,308 @@ class Advice:
 
 
 def advise(design: Design, target: float, progress: Progress = ignore_progress) -> Advice:
-    """The smallest bond and overhang whose interval of 95 % lies at or above ``target``.
-
-    First both grow by the same amount above the rules' limits until the target is reached; then
-    the overhang, and after it the bond, is taken back as far as the target allows. Neither can
-    then be smaller by itself. Where the other seed falls short, both grow by one step more.
+    """The smallest bond and overhang whose interval of 95 % lies at or above ``target``, from the
+    rules' limits on.
     """
-    trial = _Trial(design, target, progress)
-    both = _least(lambda steps: trial.verdict(steps, steps))
-    if both is None:
+    rules = design.rules
+    start = {BOND: rules.bond_width, OVERHANG: rules.mask_overhang}
+    trials = _Trials(design, start, target, progress)
+    least = _smallest(trials, MOST_STEPS)
+    if least is None:
         return Advice(target, design.registration.method)
-    overhang = _least(lambda steps: trial.verdict(both, steps), both) or 0
-    bond = _least(lambda steps: trial.verdict(steps, overhang), both) or 0
-    while bond <= MOST_STEPS:
-        share = trial.share(bond, overhang, CHECK_SEED)
-        if share is None:
-            break
-        if share.interval[0] >= target and trial.holds(bond, overhang):
-            wide, over = trial.lengths(bond, overhang)
-            return Advice(target, design.registration.method, wide, over, share)
-        bond, overhang = bond + 1, overhang + 1
-    return Advice(target, design.registration.method)
+    lengths = trials.lengths(least.steps)
+    return Advice(target, design.registration.method, lengths[BOND], lengths[OVERHANG], least.share)
 
 
+# A design changed as little as a yield needs.
+
+
+@dataclass(frozen=True)
+class YieldDesign:
+    """A design for a yield: ``design`` is ``given`` with the ``changes``, by key; None where no
+    change reaches ``target``.
+
+    ``share`` is that of the changed design by another seed, or of the one given where that is
+    enough; ``best`` and ``best_changes`` are the best that was reached where nothing is enough.
+    ``fixed``: keys that were not changed although a change might have helped.
+    """
+
+    target: float
+    given: Design
+    design: Design | None
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    share: Share | None = None
+    best: Share | None = None
+    best_changes: Mapping[str, Any] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What was changed and what that reaches; why nothing is, where the target is too high."""
+        if self.design is None:
+            return self._too_high()
+        if self.share is None:
+            return f"{self.given.name} fails other rules, so that nothing was changed for its yield"
+        low, high = self.share.interval
+        reached = (
+            f"{self.share.value:.2%} of {self.share.builds} random builds are good (95 % interval "
+            f"{low:.2%} to {high:.2%})"
+        )
+        if not self.changes:
+            return f"Nothing to change for a yield of {self.target:.4g}: {reached}"
+        return f"Changed for a yield of {self.target:.4g}: {_said(self.changes)}; {reached}"
+
+    def _too_high(self) -> str:
+        reached = "no change that was tried can be built and passes the other rules"
+        if self.best is not None:
+            low, high = self.best.interval
+            by = f" with {_said(self.best_changes)}" if self.best_changes else " as it is"
+            reached = (
+                f"the best reached is {self.best.value:.2%} of {self.best.builds} random builds "
+                f"(95 % interval {low:.2%} to {high:.2%}){by}"
+            )
+        free = f", or do not --set {', '.join(self.fixed)}" if self.fixed else ""
+        return (
+            f"{self.given.name} does not reach a yield of {self.target:.4g}, and nothing was "
+            f"written: {reached}; ask for less, cut or place more exactly "
+            f"(registration.cutting_error, registration.hand_placement){free}"
+        )
+
+    def as_dict(self) -> dict[str, object]:
+        return {
+            "target_yield": self.target,
+            "changes": [
+                {"key": key, "from": value_of(self.given, key), "to": value}
+                for key, value in self.changes.items()
+            ],
+            "measured": None if self.share is None else self.share.value,
+            "interval": None if self.share is None else list(self.share.interval),
+            "message": self.sentence,
+        }
+
+
+def _said(changes: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {value}" for key, value in changes.items())
+
+
+def value_of(design: Design, key: str) -> Any:
+    """Return the value of a dotted key."""
+    value: Any = design
+    for name in key.split("."):
+        value = getattr(value, name)
+    # The default has a name.
+    return REGISTRATIONS["sequence"][0] if key == SEQUENCE and value is None else value
+
+
+def reach_yield(
+    design: Design,
+    target: float,
+    fixed: Collection[str] = (),
+    progress: Progress = ignore_progress,
+) -> YieldDesign:
+    """Return the design with what a yield of ``target`` needs, but for the keys that are ``fixed``.
+
+    In this order, until a change is enough: the order of stacking, which changes no film; bond and
+    overhang, up to 0.1 mm wider; a more exact base plate; pins in ears; and all of these with bond
+    and overhang up to 1.28 mm wider. Of bond and overhang the least that is enough. The design
+    passes every other rule; one that fails another rule as it is given is returned unchanged.
+    """
+    asked = design.with_({TARGET: target})
+    start = {key: value_of(asked, key) for key in (BOND, OVERHANG) if key not in fixed}
+    as_given = _Trials(asked, start, target, progress)
+    if as_given.broken(AS_GIVEN) - {WORST_CASE, PIN_FIT}:
+        return YieldDesign(target, design, asked)
+    share = as_given.share(AS_GIVEN)
+    enough = share is not None and share.interval[0] >= target
+    if enough and not as_given.broken(AS_GIVEN):
+        return YieldDesign(target, design, asked, share=share)
+    tried: dict[tuple[str, ...], _Trials] = {}
+    for words, most in _ways(asked, fixed):
+        name = tuple(words.values())
+        if name not in tried:
+            try:
+                changed = asked.with_(words)
+            except DesignError:
+                continue
+            tried[name] = _Trials(changed, start, target, progress)
+        least = _smallest(tried[name], most if start else 0)
+        if least is not None:
+            changes = _changes(asked, {**tried[name].lengths(least.steps), **words})
+            return YieldDesign(target, design, asked.with_(changes), changes, least.share)
+    best, best_changes = _best(asked, tried.values())
+    useful = tuple(key for key in (BOND, OVERHANG, METHOD, SEQUENCE, PLATE) if key in fixed)
+    return YieldDesign(target, design, None, best=best, best_changes=best_changes, fixed=useful)
+
+
+def _changes(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values that a design does not have."""
+    return {key: value for key, value in values.items() if value != value_of(design, key)}
+
+
+def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, str], int]]:
+    """Yield words for keys, and by how many steps bond and overhang may grow with them."""
+    registration = design.registration
+    orders: list[dict[str, str]] = [{}]
+    if registration.method != "sheet" and not {SEQUENCE} & set(fixed):
+        orders += [{SEQUENCE: word} for word in REGISTRATIONS["sequence"][1:]]
+    plates: list[dict[str, str]] = [{}]
+    if registration.pin_error is None and not {PLATE, PIN_ERROR} & set(fixed):
+        machines = get_args(PlateMachine)
+        better = machines[: machines.index(registration.plate_made_by)]
+        plates += [{PLATE: machine} for machine in reversed(better)]
+    ears: list[dict[str, str]] = []
+    if registration.method == "channel-pin" and METHOD not in fixed:
+        ears = [{METHOD: "ears", **plate} for plate in plates]
+    with_pins = [[{**plate, **order} for order in orders] for plate in plates]
+    for group in (*with_pins, *([way] for way in ears)):
+        for most in (0, FEW_STEPS):
+            yield from ((way, most) for way in group)
+    for group in (*with_pins, ears):
+        yield from ((way, MOST_STEPS) for way in group)
+
+
+def _best(design: Design, tried: Iterable[_Trials]) -> tuple[Share | None, Mapping[str, Any]]:
+    """The best share that passes the other rules, with its changes; of equal ones the first."""
+    every = [
+        (share, trials, steps)
+        for trials in tried
+        for steps, share in trials.shares.items()
+        if share is not None
+    ]
+    every.sort(key=lambda entry: -entry[0].value)
+    for share, trials, steps in every[:MOST_CHECKED]:
+        if not trials.broken(steps):
+            words = {key: value_of(trials.design, key) for key in (METHOD, SEQUENCE, PLATE)}
+            return share, _changes(design, {**trials.lengths(steps), **words})
+    return None, {}
+
+
+# Bond and overhang by steps, each tried once.
+
+
+MOST_CHECKED = 5
+"""Best trials whose other rules are checked, where none reaches the target."""
 Outcome = Literal["short", "reached", "impossible"]
 
 
-class _Trial:
-    """Builds the design with steps more of bond and overhang than the rules ask for."""
+class Steps(NamedTuple):
+    """By how many steps bond and overhang are wider than at the start."""
 
-    def __init__(self, design: Design, target: float, progress: Progress) -> None:
+    bond: int
+    overhang: int
+
+
+AS_GIVEN = Steps(0, 0)
+WORST_CASE = "registration-worst-case"
+"""The only other rule that more steps may mend."""
+PIN_FIT = "pin-fit"
+"""A rule that a better plate may mend."""
+
+
+class _Least(NamedTuple):
+    """The least steps that are enough, and their share by another seed."""
+
+    steps: Steps
+    share: Share
+
+
+class _Trials:
+    """A design with steps more of bond and overhang; of lengths without a ``start`` none."""
+
+    def __init__(
+        self, design: Design, start: Mapping[str, float], target: float, progress: Progress
+    ) -> None:
         self.design = design
+        self.start = start
         self.target = target
         self.progress = progress
-        self.verdicts: dict[tuple[int, int], Outcome] = {}
+        self.shares: dict[Steps, Share | None] = {}
 
-    def lengths(self, bond: int, overhang: int) -> tuple[float, float]:
-        rules = self.design.rules
-        return round(rules.bond_width + bond * STEP, 6), round(
-            rules.mask_overhang + overhang * STEP, 6
-        )
+    def lengths(self, steps: Steps) -> dict[str, float]:
+        """Bond and overhang in mm, by key."""
+        by_key = {BOND: steps.bond, OVERHANG: steps.overhang}
+        return {key: round(length + by_key[key] * STEP, 6) for key, length in self.start.items()}
 
-    def _changed(self, bond: int, overhang: int) -> Design:
-        width, reach = self.lengths(bond, overhang)
-        return self.design.model_copy(
-            update={
-                "bond": self.design.bond.model_copy(update={"width": width}),
-                "mask": self.design.mask.model_copy(update={"overhang": reach}),
-            }
-        )
+    def _changed(self, steps: Steps) -> Design:
+        return self.design.with_(self.lengths(steps))
 
-    def share(self, bond: int, overhang: int, seed: int) -> Share | None:
+    def counted(self, steps: Steps, seed: int) -> Share | None:
         """The share of good builds; None where such a design cannot be built."""
         try:
-            laminate = build(self._changed(bond, overhang))
+            design = self._changed(steps)
+            laminate = build(design)
         except DesignError:
             return None
-        return simulate(laminate, limits(self.design), seed).whole
+        return simulate(laminate, limits(design), seed).whole
 
-    def holds(self, bond: int, overhang: int) -> bool:
-        """True if the design passes every rule but the one that limits the yield."""
-        untargeted = replace(limits(self.design), target_yield=None)
-        return not has_failed(run_deck(build(self._changed(bond, overhang)), untargeted))
-
-    def verdict(self, bond: int, overhang: int) -> Outcome:
-        key = bond, overhang
-        if key not in self.verdicts:
+    def share(self, steps: Steps) -> Share | None:
+        """The share by the seed of the rule, counted once."""
+        if steps not in self.shares:
             # How many it takes nobody knows.
             self.progress(
-                f"bond and overhang that reach the yield, trial {len(self.verdicts) + 1}", 0, 0
+                f"bond and overhang that reach the yield, trial {len(self.shares) + 1}", 0, 0
             )
-            share = self.share(bond, overhang, SEED)
-            if share is None:
-                self.verdicts[key] = "impossible"
-            else:
-                self.verdicts[key] = "reached" if share.interval[0] >= self.target else "short"
-        return self.verdicts[key]
+            self.shares[steps] = self.counted(steps, SEED)
+        return self.shares[steps]
+
+    def broken(self, steps: Steps) -> set[str]:
+        """The rules that the design fails, but for the one that limits the yield."""
+        design = self._changed(steps)
+        untargeted = replace(limits(design), target_yield=None)
+        findings = run_deck(build(design), untargeted)
+        return {finding.rule for finding in findings if finding.verdict == "fail"}
+
+    def outcome(self, bond: int, overhang: int) -> Outcome:
+        steps = Steps(bond * (BOND in self.start), overhang * (OVERHANG in self.start))
+        share = self.share(steps)
+        if share is None:
+            return "impossible"
+        return "reached" if share.interval[0] >= self.target else "short"
 
 
-def _least(verdict: Callable[[int], Outcome], sufficient: int | None = None) -> int | None:
-    """The fewest steps that are not short, if they reach; ``known`` steps are known to reach.
+def _smallest(trials: _Trials, most: int) -> _Least | None:
+    """The least bond and overhang, up to ``most`` steps, whose interval lies above the target.
+
+    First both grow by the same amount until the target is reached; then the overhang, and after it
+    the bond, is taken back as far as the target allows. Neither can then be smaller by itself.
+    Where the other seed falls short, or the worst case does, both grow by one step more.
+    """
+    both = _least(lambda steps: trials.outcome(steps, steps), most)
+    if both is None:
+        return None
+    overhang = _least(lambda steps: trials.outcome(both, steps), most, both) or 0
+    bond = _least(lambda steps: trials.outcome(steps, overhang), most, both) or 0
+    for more in range(most - max(bond, overhang) + 1):
+        steps = Steps(bond + more, overhang + more)
+        share = trials.counted(steps, CHECK_SEED)
+        if share is None:
+            return None
+        broken = trials.broken(steps) if share.interval[0] >= trials.target else {WORST_CASE}
+        if not broken:
+            return _Least(steps, share)
+        if broken != {WORST_CASE}:
+            return None
+    return None
+
+
+def _least(
+    outcome: Callable[[int], Outcome], most: int, sufficient: int | None = None
+) -> int | None:
+    """The fewest steps that are not short, if they reach; ``sufficient`` steps are known to.
 
     With more steps a design goes from short to reached, and may become impossible.
     """
-    if verdict(0) == "reached":
+    if outcome(0) == "reached":
         return 0
-    short, enough = 0, sufficient if sufficient is not None else 8
-    while sufficient is None and enough <= MOST_STEPS and verdict(enough) == "short":
-        short, enough = enough, 2 * enough
-    if enough > MOST_STEPS:
-        return None
+    short, enough = 0, min(8, most) if sufficient is None else sufficient
+    while sufficient is None and outcome(enough) == "short":
+        if enough >= most:
+            return None
+        short, enough = enough, min(2 * enough, most)
     while enough - short > 1:
         middle = (short + enough) // 2
-        if verdict(middle) == "short":
+        if outcome(middle) == "short":
             short = middle
         else:
             enough = middle
-    return enough if verdict(enough) == "reached" else None
+    return enough if outcome(enough) == "reached" else None

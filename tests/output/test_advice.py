@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
-from sbafab.output.advice import CHECK_SEED, SEED, advise
-from sbafab.output.checked import limits
+from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
+from sbafab.output.checked import check, limits
 from sbafab.rules.registration_yield import simulate
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")
@@ -42,3 +42,83 @@ def test_where_nothing_helps_it_says_so() -> None:
     assert advice.share is None
     assert "ears" in advice.sentence
     assert advice.as_dict()["bond_width"] is None
+
+
+# A design changed as little as a yield needs.
+
+
+MORE = ("rules.yield_builds=4000",)
+BOTH = {"bond.width", "mask.overhang"}
+
+
+def reached(target: float, *assignments: str, fixed: set[str] | None = None) -> YieldDesign:
+    design = load_design(SMALL[0], (*SMALL[1:], *MORE, *assignments))
+    return reach_yield(design, target, fixed or set())
+
+
+def is_good(found: YieldDesign) -> bool:
+    """Every rule passes, the target among them, and another seed gives the share that is said."""
+    assert found.design is not None
+    assert found.share is not None
+    assert found.design.rules.target_yield == found.target <= found.share.interval[0]
+    again = simulate(build(found.design), limits(found.design), CHECK_SEED).whole
+    return not check(found.design).failed and again == found.share
+
+
+def test_what_is_good_enough_stays() -> None:
+    found = reached(0.9)
+    assert (found.changes, found.sentence[:17]) == ({}, "Nothing to change")
+    assert found.design is not None
+    assert found.design.with_({"rules.target_yield": 0.5}) == found.given.with_(
+        {"rules.target_yield": 0.5}
+    )
+
+
+def test_the_order_of_stacking_changes_before_any_film() -> None:
+    found = reached(0.945)
+    assert found.changes == {"registration.sequence": "middle-first"}
+    assert is_good(found)
+    assert found.as_dict()["changes"] == [
+        {"key": "registration.sequence", "from": "bottom-first", "to": "middle-first"}
+    ]
+
+
+def test_bond_and_overhang_grow_before_ears_and_no_more_than_needed() -> None:
+    found = reached(0.97, fixed={"registration.sequence"})
+    assert found.changes.keys() <= BOTH
+    assert is_good(found)
+    usual = {"bond.width": 0.75, "mask.overhang": 0.5}
+    assert 0 < max(value - usual[key] for key, value in found.changes.items()) <= 0.1
+    less = [f"{key}={value - 0.02:.2f}" for key, value in found.changes.items()]
+    assert min(lower_end(*MORE, *less), lower_end(*MORE, *less, seed=CHECK_SEED)) < 0.97
+
+
+def test_a_rough_hand_takes_ears() -> None:
+    rough = ("registration.hand_placement=0.3", "registration.hand_turn=1.5")
+    found = reached(0.9, *rough)
+    assert found.changes == {"registration.method": "ears"}
+    assert is_good(found)
+
+
+def test_a_rough_plate_is_made_by_a_better_machine() -> None:
+    found = reached(0.9, "registration.method=ears", "registration.plate_made_by=drill-press")
+    assert found.changes["registration.plate_made_by"] in ("cnc-mill", "jig-borer")
+    assert is_good(found)
+
+
+def test_what_is_fixed_stays_and_the_best_is_said() -> None:
+    fixed = {*BOTH, "registration.method"}
+    found = reached(0.99, fixed=fixed)
+    assert found.design is None
+    assert found.best is not None
+    assert found.best_changes == {"registration.sequence": "middle-first"}
+    order = "registration.sequence=middle-first"
+    design = load_design(SMALL[0], (*SMALL[1:], *MORE, order))
+    assert found.best == simulate(build(design), limits(design)).whole
+    assert "do not --set bond.width, mask.overhang, registration.method" in found.sentence
+
+
+def test_a_design_that_fails_another_rule_stays() -> None:
+    found = reached(0.9, "inlet.width=1")
+    assert (found.changes, found.share) == ({}, None)
+    assert "fails other rules" in found.sentence
