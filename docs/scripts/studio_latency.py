@@ -41,8 +41,8 @@ def main(changes: int = 25) -> None:
     """Prints a table in Markdown of what is seen in the browser."""
     with tempfile.TemporaryDirectory() as scratch, browser() as chromium:
         folder = Path(scratch)
-        (folder / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
-        with served(folder, "gripper.toml") as link:
+        (folder / "arm.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
+        with served(folder, "arm.toml") as link:
             seen = Watched(chromium, link, viewport={"width": 1280, "height": 800})
             seen.ready()
             seen.page.click("#tab-layers")

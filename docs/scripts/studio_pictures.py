@@ -28,8 +28,8 @@ def main() -> None:
     wanted = sys.argv[1:] or ["gallery", "docs", "draw", "assembly", "phone"]
     with tempfile.TemporaryDirectory() as scratch, browser() as chromium:
         folder = Path(scratch)
-        (folder / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
-        with served(folder, "gripper.toml") as link:
+        (folder / "arm.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
+        with served(folder, "arm.toml") as link:
             if "gallery" in wanted:
                 _gallery(Watched(chromium, link, device_scale_factor=2), folder)
             if "docs" in wanted:

@@ -30,8 +30,8 @@ def main() -> None:
     """Writes the picture."""
     with tempfile.TemporaryDirectory() as scratch, browser() as chromium:
         folder = Path(scratch)
-        (folder / "gripper.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
-        with served(folder, "gripper.toml") as link:
+        (folder / "arm.toml").write_text(api.template("3dof-15mm"), encoding="utf-8")
+        with served(folder, "arm.toml") as link:
             seen = Watched(chromium, link, viewport=PAGE)
             seen.ready()
             without_timing(seen)

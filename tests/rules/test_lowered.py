@@ -48,6 +48,8 @@ NO_LIMITS = {"waive", "target_yield", "yield_builds", "kerf_tpe", "kerf_ptfe"} |
     "travel_speed",
     "pierce_seconds",
     "heat_distance",
+    "machine",
+    "recipe",
     "hold_tpe",
     "hold_ptfe",
 }
