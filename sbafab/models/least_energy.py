@@ -155,22 +155,25 @@ def solve_positive(band: Array, right_side: Array) -> Array | None:
     size, width, rows = band.shape
     count = -(-size // width)
     # Beyond the end A is 1, so that all blocks are whole.
-    whole = np.zeros((rows, count * width, width))
+    entries = np.zeros((rows, count * width * width + 1))
+    whole = entries[:, :-1].reshape(rows, count * width, width)
     whole[:, size:, 0] = 1.0
     whole[:, :size] = band.transpose(2, 0, 1)
-    whole = whole.reshape(rows, count, width, width)
-    number = np.arange(width)
-    off = number - number[:, None]
-    row = np.broadcast_to(number[:, None], off.shape)
-    upper = np.where(off >= 0, whole[:, :, row, off.clip(0)], 0.0)
+    # A[i, i + k] at [i, i + k]: each block's upper half, then what couples it to the next.
+    across, item = entries.strides
+    skewed = np.lib.stride_tricks.as_strided(
+        entries,
+        (rows, count, width, 2 * width),
+        (across, width * width * item, (width - 1) * item, item),
+    )
+    is_lower = np.tri(width, k=-1, dtype=bool)
+    upper = np.where(is_lower, 0.0, skewed[..., :width])
     diagonal = upper + np.triu(upper, 1).swapaxes(2, 3)
-    beside = np.where(off < 0, whole[:, :, row, (off + width).clip(max=width - 1)], 0.0)
-    right = np.zeros((rows, count * width, 1))
-    right[:, :size, 0] = right_side.T
-    right = right.reshape(rows, count, width, 1)
-    turned = np.ascontiguousarray(beside.swapaxes(2, 3))
     # Each block's coupling to the next, and its part of the solution.
-    both = np.concatenate([beside, right], 3)
+    both = np.zeros((rows, count, width, width + 1))
+    np.copyto(both[..., :-1], skewed[..., width:], where=is_lower)
+    both.reshape(rows, -1, width + 1)[:, :size, -1] = right_side.T
+    turned = np.ascontiguousarray(both[..., :-1].swapaxes(2, 3))
     for k in range(count):
         if k:
             lower = turned[:, k - 1] @ both[:, k - 1]
