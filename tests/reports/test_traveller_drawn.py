@@ -75,7 +75,11 @@ def test_a_flash_bond_that_bonds_nothing_is_said_to_be_needless(sheet_files: Any
     assert "Leave this step out: nothing bonds in it" in first
     assert "Flash bond" not in first
     assert "After the flash bond it cannot be moved" not in first
-    assert "Where step 1 was left out, lay layers 2 and 3 one by one" in second
+    laid = "lay layers 2 and 3 one by one in place of its stack, as step 1 says"
+    assert f"Where step 1 was left out, {laid}; the print shows their edges too." in second
+    overview = "min at 135 °C (275 °F); leave out step 1, in which nothing bonds."
+    assert overview in words_of(page(sheet_files, "array"))
+    assert "leave out step" not in words_of(page(sheet_files, "1dof-5mm"))
     # Textile coated with TPU: there is no TPE film in it.
     assert "Full bond: films that face each other melt into one" in second
     assert "nothing bonds" not in words_of(page(sheet_files, "1dof-5mm"))

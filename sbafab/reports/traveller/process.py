@@ -75,6 +75,8 @@ class StepPage:
     plan: str
     exploded: str
     actions: tuple[Action, ...]
+    is_needless: bool
+    """Nothing bonds in it."""
 
 
 def step_pages(work: Work) -> list[StepPage]:
@@ -99,6 +101,7 @@ def step_pages(work: Work) -> list[StepPage]:
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 _bench_actions(work, part, step, lying, runs),
+                _is_loose(work, part),
             )
         )
     return pages
@@ -176,9 +179,10 @@ def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
             "the step that takes the stack, one by one, lowest first. (Our advice, not tried.)",
         )
     stacks = [stack for stack in part.stacks if stack in loose]
+    edges = "" if work.job.underlay is None else "; the print shows their edges too"
     return tuple(
         f"Where step {loose[stack]} was left out, lay {layers_in_words(stack)} one by one in place "
-        "of its stack."
+        f"of its stack, as step {loose[stack]} says{edges}."
         for stack in stacks
     )
 
