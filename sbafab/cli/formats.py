@@ -770,6 +770,7 @@ def _compare() -> dict[str, Any]:
         unit=TEXT,
         verdicts=_two(TEXT_OR_NULL),
         margins={**_two(number("null")), "description": "what is left to the limit"},
+        measured=_two(number("null")),
     )
     found = table(
         schema={"const": ids.COMPARE_SCHEMA},

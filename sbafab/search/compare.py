@@ -82,7 +82,9 @@ class KeyDifference:
 
 @dataclass(frozen=True)
 class RuleDifference:
-    """A rule whose verdict or margin differs; None where a design has no such finding."""
+    """A rule whose verdict or margin differs, or without a limit what was measured; None where a
+    design has no such finding.
+    """
 
     rule: str
     margins: tuple[RuleMargin | None, RuleMargin | None]
@@ -157,6 +159,7 @@ def _rule_dict(row: RuleDifference) -> dict[str, Any]:
         "unit": next(margin.unit for margin in row.margins if margin is not None),
         "verdicts": [margin and margin.verdict for margin in row.margins],
         "margins": [margin and margin.margin for margin in row.margins],
+        "measured": [margin and margin.measured for margin in row.margins],
     }
 
 
@@ -280,7 +283,10 @@ def _rules(designs: Two) -> Iterable[RuleDifference]:
 
 
 def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
-    return None if margin is None else (margin.verdict, margin.margin)
+    if margin is None:
+        return None
+    # A yield has no limit where none is asked for, and still is more or less.
+    return margin.verdict, margin.measured if margin.margin is None else margin.margin
 
 
 def _figures(designs: Two) -> Iterable[FigurePair]:
@@ -303,11 +309,12 @@ def value_text(value: object) -> str:
 
 
 def margin_text(margin: RuleMargin | None) -> str:
-    """Return verdict and margin of a rule."""
+    """Return verdict and margin of a rule; what was measured where there is no limit."""
     if margin is None:
         return NOTHING
     if margin.margin is None:
-        return margin.verdict
+        measured = "" if margin.measured is None else f", {margin.measured:.3g} {margin.unit}"
+        return f"{margin.verdict}{measured}".rstrip()
     return f"{margin.verdict}, margin {margin.margin:.3g} {margin.unit}".rstrip()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -127,6 +128,23 @@ def test_what_is_printed_is_of_its_schema(monkeypatch: pytest.MonkeyPatch) -> No
     pairs = {pair.name: pair for pair in found.figures}
     assert pairs["reached diameter"].figures[0] is None
     assert pairs["reached diameter"].differs
+
+
+def test_yields_without_a_target_are_held_against_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Figures take the longest, and are none of a rule's.
+    monkeypatch.setattr(module, "predict", lambda *_: SimpleNamespace(figures=()))
+    small = sbafab.load("1dof-5mm", "stack.balloons=1", "rules.yield_builds=400")
+    found = compare(small, small.with_("registration.cutting_error=0.12"))
+    rows = {row.rule: row.margins for row in found.rules}
+    yields = [margin.measured for margin in rows["registration-yield"] if margin is not None]
+    assert yields[0] > yields[1]
+    page = " ".join(compare_html(found).split())
+    for margin in rows["registration-yield"]:
+        assert margin is not None
+        assert f"{margin.verdict}, {margin.measured:.3g}<" in page
+    hold("compare", json.loads(json.dumps(found.as_dict())))
 
 
 def test_a_page_that_cannot_be_written_is_said(tmp_path: Path) -> None:
