@@ -162,7 +162,8 @@ def _dust(
 
 def save(picture: NDArray[np.uint8], path: Path, dpi: float | None) -> Path:
     image = Image.fromarray(picture)
-    image.save(path, **({} if dpi is None else {"dpi": (dpi, dpi)}))
+    # Hardly compressed: writing took longer than drawing.
+    image.save(path, compress_level=1, **({} if dpi is None else {"dpi": (dpi, dpi)}))
     return path
 
 
