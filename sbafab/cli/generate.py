@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.assemblies.files import load
-from sbafab.cli.compare import print_figures, print_table
-from sbafab.cli.exit import RULE_FAILED, Exit, end
 from sbafab.cli.options import (
     Request,
     dxf_options,
@@ -17,27 +14,18 @@ from sbafab.cli.options import (
     sheet_options,
     target_yield_option,
 )
-from sbafab.cli.printing import console, facts_table, print_line, print_wrapped
-from sbafab.cli.progress import shown_progress
-from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_json, run_request
-from sbafab.design.files import changed_keys
+from sbafab.cli.printing import console, facts_table, print_line
+from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_request
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.advice import reach_yield, value_of
 from sbafab.output.checked import EVERYTHING
 from sbafab.runs.run import Run, RunRequest
-from sbafab.search.compare import compare as compared
-from sbafab.search.compare import value_text
 from sbafab.simulators.simulator import NAMES
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from sbafab.cutting.properties import Curves
-
-
-DESIGNS = "as given", "changed"
-"""Of the two designs of --target-yield."""
 
 
 @click.command()
@@ -68,43 +56,12 @@ def generate(request: Request, curves: Curves, target_yield: float | None, decks
                 "--target-yield goes with a design, and this is an assembly; generate its parts' "
                 "designs one by one, and name the files it writes in the assembly"
             )
-        _generate_for_yield(source, target_yield, wanted, request)
+        # It predicts both designs, which a plain run does not: models load slowly.
+        from sbafab.cli.target_yield import generate_for_yield
+
+        generate_for_yield(source, target_yield, wanted, request)
         return
     run_request(wanted, request, print_run if isinstance(source, Design) else print_assembly)
-
-
-def _generate_for_yield(
-    design: Design, target: float, wanted: RunRequest, request: Request
-) -> None:
-    """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
-    fixed = frozenset(changed_keys(request.assignments))
-    with shown_progress(request.as_json) as progress:
-        found = reach_yield(design, target, fixed, progress)
-        if found.design is None:
-            end(Exit("yield", found.sentence, RULE_FAILED), request.as_json)
-        changed = found.design
-        comparison = (
-            compared(design, changed, DESIGNS, progress=progress) if found.changes else None
-        )
-
-    def show(run: Run) -> None:
-        if comparison is not None:
-            rows = [
-                (key, value_text(value_of(design, key)), value_text(value))
-                for key, value in found.changes.items()
-            ]
-            print_table("Changed for the yield", DESIGNS, rows)
-            print_figures(comparison, DESIGNS)
-        print_wrapped(found.sentence)
-        print_line("")
-        print_run(run)
-
-    def as_json(run: Run) -> dict[str, object]:
-        figures = comparison.as_dict()["figures"] if comparison is not None else []
-        main = [figure for figure in figures if figure["main"]]
-        return {**run_json(run), "yield": {**found.as_dict(), "figures": main}}
-
-    run_request(replace(wanted, source=changed), request, show, as_json)
 
 
 def print_assembly(run: Run) -> None:
