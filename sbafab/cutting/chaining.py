@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Sequence
 
 from sbafab.cutting.properties import CUT_INNER, CUT_OUTER
@@ -26,6 +26,8 @@ CLEAR = 10 * EPSILON
 
 JOINED = 0.002
 """mm: ends that lie within 1 um of one corner, which is what cut files promise, are as near."""
+CELL = 16.0
+"""Width of the cells that known ends are kept in, over the distance at which they are joined."""
 
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
@@ -86,17 +88,24 @@ def _joints(ends: Sequence[Point]) -> dict[Point, Point]:
 
 def _nearest_known(points: Sequence[Point], within: float) -> dict[Point, Point]:
     """For each point the nearest one known before it, if that is near enough, or itself."""
-    cells: dict[tuple[int, int], list[Point]] = defaultdict(list)
+    # Cells so wide that most points are near to those of their own alone.
+    side = CELL * within
+    cells: dict[tuple[int, int], list[Point]] = {}
     joints: dict[Point, Point] = {}
     for p in points:
         if p in joints:
             continue
-        x, y = math.floor(p[0] / within), math.floor(p[1] / within)
-        near = [q for i in (x - 1, x, x + 1) for j in (y - 1, y, y + 1) for q in cells[i, j]]
+        x, y = p
+        near = [
+            q
+            for i in range(math.floor((x - within) / side), math.floor((x + within) / side) + 1)
+            for j in range(math.floor((y - within) / side), math.floor((y + within) / side) + 1)
+            for q in cells.get((i, j), ())
+        ]
         joint = min(near, key=lambda q: math.dist(p, q), default=p)
         joints[p] = joint if math.dist(p, joint) <= within else p
         if joints[p] is p:
-            cells[x, y].append(p)
+            cells.setdefault((math.floor(x / side), math.floor(y / side)), []).append(p)
     return joints
 
 
