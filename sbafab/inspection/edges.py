@@ -156,7 +156,8 @@ def crossings(
     film = median_filter(np.median(levels[:, :plateau], axis=1), 9, mode="nearest")
     paper = median_filter(np.median(levels[:, -plateau:], axis=1), 9, mode="nearest")
     difference = film - paper
-    usual = float(np.nanmedian(difference))
+    # Edges outside the picture have no contrast.
+    usual = float(np.nanmedian(difference)) if np.isfinite(difference).any() else np.nan
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (levels - paper[:, None]) / difference[:, None]
     is_seen = difference * np.sign(usual) > LEAST_CONTRAST * abs(usual)

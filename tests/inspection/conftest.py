@@ -21,8 +21,8 @@ def lobed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return cut(tmp_path_factory.mktemp("cut"), "3dof-15mm")
 
 
-def cut(out: Path, template: str) -> Path:
+def cut(out: Path, template: str, *options: str) -> Path:
     with pytest.raises(SystemExit) as stop:
-        main(["cut", template, "-o", str(out), "-q"])
+        main(["cut", template, "-o", str(out), "-q", *options])
     assert stop.value.code == 0
     return out / template

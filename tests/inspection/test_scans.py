@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
+from sbafab.errors import DesignError
 from sbafab.inspection.cut_sheet import read_cut_sheet
 from sbafab.inspection.inspection import Inspection, inspect_picture
 from sbafab.inspection.picture import read_picture
 from sbafab.inspection.scale import Reference
+from tests.inspection.conftest import cut
 from tests.inspection.scans import Camera, Change, render, save
 from tests.quick import few
 
@@ -104,3 +108,31 @@ def test_a_clean_sheet_gives_no_alarm(seed: int, folder: Path, lobed: Path, tmp_
 def test_dust_is_no_opening(folder: Path, tmp_path: Path) -> None:
     inspection = inspected(folder, tmp_path, Camera(dpi=400, specks=300, seed=4))
     assert not inspection.failed
+
+
+PINS = ((32.0, 14.0, 3.0), (32.0, 34.0, 3.0), (54.0, 24.0, 2.0))
+"""Centre and diameter in mm, among the parts."""
+
+
+def test_the_pins_of_a_sheet_give_the_scale(tmp_path: Path) -> None:
+    """Film that has shrunk by 0.2 % between pins that have not, in a picture of unknown scale."""
+    pins = str([list(pin) for pin in PINS])
+    folder = cut(tmp_path, "1dof-10mm", "--set", f"sheets.tpe.pins={pins}")
+    camera = Camera(dpi=600, tilt=2, noise=2)
+
+    def shrunk(pieces: list[Any]) -> list[Any]:
+        middle = shapely.MultiPolygon(pieces).envelope.centroid
+        smaller = [shapely.affinity.scale(each, 0.998, 0.998, origin=middle) for each in pieces]
+        discs = [shapely.Point(x, y).buffer((d + camera.kerf) / 2, 64) for x, y, d in PINS]
+        return smaller + discs
+
+    path = save(render(folder / "sheets" / "TPE_1.dxf", camera, shrunk), tmp_path / "p.png", None)
+    sheet = read_cut_sheet(folder, "TPE_1")
+    inspection = inspect_picture(read_picture(path), sheet, Reference(pins=True), False)
+    assert inspection.scale.reference == "3 pins"
+    assert inspection.scale.x == pytest.approx(0.998, abs=2e-4)
+    # Without one of them the scale is not known: no pin is there, or the picture ends before it.
+    for x, y in ((75.2, 26.0), (60.0, 60.0)):
+        hidden = replace(sheet, pins=(*PINS[:2], (x, y, 2.0)))
+        with pytest.raises(DesignError, match=f"the pin at x {x:g}, y {y:g} mm is not seen"):
+            inspect_picture(read_picture(path), hidden, Reference(pins=True), False)
