@@ -105,8 +105,8 @@ def cases(stack: Stack, pressures: Array, loads: dict[str, Any]) -> Iterator[Cas
             return pressures + share * step * np.eye(stack.chambers)[chamber], load
 
         yield Case([part[..., chamber] for part in each.by_pressure], step, pressed)
-    # A stiff plate leaves fewer digits to a force on it, and bends less. Twice as far the differences
-    # themselves are 1.4e-5 off at a pose of three chambers, and 16 times less at half the step.
+    # A stiff plate leaves fewer digits to a force on it, and bends less. At twice this step the
+    # differences themselves are 1.4e-5 off at a pose of three chambers.
     step = 2e-6 if plate is None else 5e-5
     for way in range(3):
 
