@@ -125,7 +125,10 @@ def _unknown_key(
         return f"{field} is not a key of a film's faces; they are upper and lower"
     paths = key_paths(record)
     siblings = [path for path in paths if path.split(".")[:-1] == list(where[:-1])]
-    near = _nearest(where[-1], siblings, 0.6) or _nearest(where[-1], paths, 0.75)
+    near = _nearest(where[-1], siblings, 0.6)
+    # A key cut short is one of its own table, not one of another that is spelled alike.
+    if near is None and not any(path.startswith(field) for path in siblings):
+        near = _nearest(where[-1], paths, 0.75)
     if near:
         return f"{field} is not a key of a design file; did you mean {near}?"
     known = f"; known here: {', '.join(siblings)}" if siblings else ""
