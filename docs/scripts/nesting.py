@@ -3,9 +3,10 @@
     python -m docs.scripts.nesting        (for it alone: pip install spyrrow python-libnest2d)
 
 sparrow packs a strip as wide as a sheet, whose length over a sheet's is rounded up; a cut at a
-sheet's end may cross parts, so it is a lower bound of what it needs. ``one_more`` is "no" if sparrow
-cannot put one copy more on a sheet than we do, for films of one shape. libnest2d puts parts by
-no-fit polygons, first fit. ``area`` is a lower bound for any nester.
+sheet's end may cross parts, so it is a lower bound of what it needs. For films of one shape ``most``
+is what we can put on a sheet, and ``one_more`` is "no" if sparrow cannot put one copy more on it.
+libnest2d puts parts by no-fit polygons, first fit. ``area`` and ``bars`` are lower bounds for any
+nester with quarter turns: by the area of the parts, and by bars that lie in every part.
 """
 
 from __future__ import annotations
@@ -13,9 +14,10 @@ from __future__ import annotations
 import csv
 import math
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +40,14 @@ SECONDS = 25
 """By the clock, of sparrow for each strip; the processor's time is written."""
 MOST_PARTS = 130
 """libnest2d, whose time grows with the square of the parts, gets no more."""
+LONGEST_BAR = 6
+"""Widths that a bar of the bound is long, at most."""
 SLACK = 0.01
 """mm by which libnest2d's parts may be nearer: its outlines are polygons."""
 TABLE = Path(__file__).parents[1] / "measured" / "nesting.csv"
 COLUMNS = (
-    "design", "copies", "film", "parts", "area", "bottom_left", "sbafab", "seconds",
-    "sparrow", "sparrow_seconds", "one_more", "libnest2d", "libnest2d_seconds",
+    "design", "copies", "film", "parts", "area", "bars", "bottom_left", "sbafab", "seconds",
+    "sparrow", "sparrow_seconds", "most", "one_more", "libnest2d", "libnest2d_seconds",
 )  # fmt: skip
 
 
@@ -69,19 +73,28 @@ def measured(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     (result,) = nest(parts, {parts[0].material: stock})
     seconds = time.process_time() - began
     check_nest(result)
-    area = area_bound(parts, stock)
+    area, bars = area_bound(parts, stock), bar_bound(parts, stock)
     plain = 1 + max(place.sheet for place in bottom_left(parts, stock, lattices=False))
-    row = {"parts": sum(part.count for part in parts), "area": area, "bottom_left": plain}
-    row |= {"sbafab": result.sheets, "seconds": round(seconds, 2)}
-    # One sheet, or as few as the area needs, cannot be beaten.
-    if result.sheets == max(1, area):
+    row = {"parts": sum(part.count for part in parts), "area": area, "bars": bars}
+    row |= {"bottom_left": plain, "sbafab": result.sheets, "seconds": round(seconds, 2)}
+    # One sheet, or as few as a bound allows, cannot be beaten.
+    if result.sheets == max(1, area, bars):
         return row
     row |= sparrow(parts, stock) | libnest2d(parts, stock)
     if len({Region(part.region.outers) for part in parts}) == 1:
-        fullest = max(len(result.on_sheet(sheet)) for sheet in range(result.sheets))
-        length, _ = strip([replace(parts[0], count=fullest + 1)], stock)
-        row["one_more"] = "yes" if length <= stock.usable[3] - stock.usable[1] else "no"
+        most = max(len(result.on_sheet(sheet)) for sheet in range(result.sheets))
+        while fits(parts[0], most + 1, stock):
+            most += 1
+        length, _ = strip([replace(parts[0], count=most + 1)], stock)
+        more = "yes" if length <= stock.usable[3] - stock.usable[1] else "no"
+        row |= {"most": most, "one_more": more}
     return row
+
+
+def fits(part: NestPart, count: int, stock: Stock) -> bool:
+    """Return True if we put so many copies on one sheet."""
+    (result,) = nest([replace(part, count=count)], {part.material: stock})
+    return result.sheets == 1
 
 
 def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
@@ -92,6 +105,44 @@ def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
     ]
     room = (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
     return math.ceil(sum(grown) / room - 1e-6)
+
+
+def bar_bound(parts: Sequence[NestPart], stock: Stock) -> int:
+    """Return the sheets that the parts need by the bars that lie in each of them.
+
+    Points in rows ``pitch`` apart, every k-th place of a row taken and each row one place further:
+    a bar of k pitches by one, lying or standing, holds exactly one of them (its far sides not
+    counted). So a sheet holds no more bars than it holds points, however these are moved.
+    """
+    shapes = {Region(part.region.outers) for part in parts}
+    # Parts that are ``spacing`` apart are that over the root of two apart along x or along y.
+    room = stock.spacing / math.sqrt(2)
+    low_x, low_y, high_x, high_y = stock.usable
+    sides = [rectangles(shape) for shape in shapes]
+    most = math.inf
+    for k in range(1, LONGEST_BAR + 1):
+        # The largest bar of this form that every shape holds.
+        pitch = min(
+            max((min((a + room) / k, b + room) for a, b in each), default=0.0) for each in sides
+        )
+        if pitch > 2 * room:
+            columns = math.floor((high_x - low_x + room) / pitch + 1e-9)
+            rows = math.floor((high_y - low_y + room) / pitch + 1e-9)
+            counts = Counter((i + j) % k for i in range(columns) for j in range(rows))
+            most = min([most, *(counts[rest] for rest in range(k))])
+    return math.ceil(sum(part.count for part in parts) / max(most, 1))
+
+
+def rectangles(shape: Region) -> list[tuple[float, float]]:
+    """Return sides of rectangles in a shape, the longer first, from corner to corner of it."""
+    polygon = shapely.Polygon(shape.polygons(1e-3)[0][0]).buffer(1e-6)
+    corners = [edge.start for edge in shape.edges]
+    spans = [combinations(sorted({round(at[axis], 6) for at in corners}), 2) for axis in (0, 1)]
+    return [
+        (max(x1 - x0, y1 - y0), min(x1 - x0, y1 - y0))
+        for (x0, x1), (y0, y1) in product(*spans)
+        if polygon.contains(shapely.box(x0, y0, x1, y1))
+    ]
 
 
 def sparrow(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:

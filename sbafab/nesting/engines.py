@@ -20,7 +20,7 @@ from sbafab.geometry.edges import Arc, Bounds, Edge, Point, distance_to
 from sbafab.geometry.offset import grow
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region, disc
-from sbafab.nesting.lattice import Lattice, lattice_of, lattices_of
+from sbafab.nesting.lattice import Lattice, lattice_of, lattices_of, most_copies
 from sbafab.nesting.records import (
     TURNS,
     NestPart,
@@ -98,11 +98,6 @@ class _Filled:
     sheets: int
     reach: float
     stuck: int | None = None
-
-
-def _most_copies(lattice: Lattice) -> tuple[int, float]:
-    """Sort key: most copies, then least length."""
-    return -len(lattice.places), round(lattice.top, 3)
 
 
 def _score(filled: _Filled) -> tuple[bool, int, float]:
@@ -205,25 +200,25 @@ class _Filler:
     def lattices(self) -> list[dict[int, Lattice]]:
         """Return copies on a sheet, for the shapes of most area that come often enough.
 
-        They are the best lattices, and the arrangements where one holds more copies.
+        They are the best lattices, and arrangements or pairs of lattices where these hold more.
         """
         areas = dict.fromkeys(range(len(self.grid.shapes)), 0.0)
         counts: Counter[int] = Counter()
         for part, shape in zip(self.parts, self.shape_of, strict=True):
             areas[shape] += part.count * part.region.area
             counts[shape] += part.count
-        straight, searched = {}, {}
+        kinds: list[dict[int, Lattice]] = [{}, {}, {}]
         for shape in sorted(areas, key=lambda shape: -areas[shape])[:MOST_LATTICES]:
             if counts[shape] >= LEAST_COPIES:
-                laid = self._clear_lattices(self.grid.shapes[shape])
-                lattice = min(
-                    laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3))
-                )
-                arrangement = self._arrangement(shape)
-                straight[shape] = lattice
-                has_more = len(arrangement.places) > len(lattice.places)
-                searched[shape] = arrangement if has_more else lattice
-        return [straight] if searched == straight else [straight, searched]
+                laid = sorted(self._clear_lattices(self.grid.shapes[shape]), key=most_copies)
+                alone = next(lattice for lattice in laid if not lattice.is_pair)
+                # Of equal ones the first, which rows are.
+                for kind, other in zip(
+                    kinds, (alone, self._arrangement(shape), laid[0]), strict=True
+                ):
+                    has_more = len(other.places) > len(alone.places)
+                    kind[shape] = other if has_more else alone
+        return [kind for number, kind in enumerate(kinds) if kind not in kinds[:number]]
 
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
         """Yield the lattices of a shape without the copies that are too near to pins."""

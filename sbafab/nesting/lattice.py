@@ -40,6 +40,8 @@ PROMISING = 16
 """Lattices that are laid, of those that rank first."""
 NEVER = -1e9
 """mm: what need not lie above at all."""
+FEW = 40
+"""Copies on a sheet up to which two lattices are tried beside each other."""
 ROOM = 0.02
 """mm more than there is, in which copies are counted to rank a lattice."""
 ROUNDING = 5e-7
@@ -53,11 +55,12 @@ Value = TypeVar("Value")
 class Lattice(NamedTuple):
     """Places of copies of one shape on an empty sheet, the lowest first: turn and shift in mm.
 
-    ``top`` is the highest y that they reach.
+    ``top`` is the highest y that they reach; ``is_pair`` is true of two lattices side by side.
     """
 
     places: tuple[tuple[Turn, Point], ...]
     top: float
+    is_pair: bool = False
 
 
 def lattices_of(
@@ -65,25 +68,63 @@ def lattices_of(
 ) -> list[Lattice]:
     """Return the lattices that hold most copies of a shape in ``area``, the best first.
 
-    Copies are ``spacing`` mm apart, and turned by ``turns`` alone.
+    Copies are ``spacing`` mm apart, and turned by ``turns`` alone. Where few fit, a lattice may be
+    two, one beside the other.
     """
+    rows = tuple(_Rows(shape, base, spacing) for base in TURNS[:2])
+    laid = list(_laid_in(rows, area, turns))
+    if 0 < max(len(lattice.places) for lattice in laid) <= FEW:
+        laid += _pairs(rows, area, turns)
+    return sorted(laid, key=most_copies)
+
+
+def most_copies(lattice: Lattice) -> tuple[int, float]:
+    """Sort key: most copies, then least length."""
+    return -len(lattice.places), round(lattice.top, 3)
+
+
+def _laid_in(rows: tuple[_Rows, _Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+    """Yield lattices of a shape, as it is drawn and turned, in ``area``."""
     low_x, low_y, high_x, high_y = area
     width, length = high_x - low_x, high_y - low_y
-    laid: list[Lattice] = []
-    for base in TURNS[:2]:
-        rows = _Rows(shape, base, spacing)
+    for base, in_turn in zip(TURNS, rows, strict=False):
         if base in turns:
-            for copies in rows.layouts((width, length)):
+            for copies in in_turn.layouts((width, length)):
                 places = [(turn, (low_x + u, low_y + v)) for turn, (u, v) in copies]
-                laid.append(lattice_of(shape, places))
+                yield lattice_of(in_turn.shape, places)
         if TURNS[base + 1] in turns and abs(width - length) > LEVEL:
             # Columns: the sheet's y is the rows' x.
-            for copies in rows.layouts((length, width)):
+            for copies in in_turn.layouts((length, width)):
                 places = [
                     (TURNS[(turn + 1) % 4], (high_x - v, low_y + u)) for turn, (u, v) in copies
                 ]
-                laid.append(lattice_of(shape, places))
-    return sorted(laid, key=lambda lattice: (-len(lattice.places), round(lattice.top, 3)))
+                yield lattice_of(in_turn.shape, places)
+
+
+def _pairs(rows: tuple[_Rows, _Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+    """Yield pairs of lattices: one leaves a strip as wide as one copy, another fills the strip."""
+    shape, spacing = rows[0].shape, rows[0].spacing
+    low_x, low_y, high_x, high_y = area
+    # On a square, a strip on top is one at the side, turned.
+    is_square = abs(high_x - low_x - (high_y - low_y)) < LEVEL and len(turns) == len(TURNS)
+    for strip in sorted({2 * rows[0].half_width, 2 * rows[0].half_height}):
+        for is_above in (False,) if is_square else (False, True):
+            across, up = (0.0, strip + spacing) if is_above else (strip + spacing, 0.0)
+            inside = low_x, low_y, high_x - across, high_y - up
+            first = min(_laid_in(rows, inside, turns), key=most_copies)
+            if not first.places:
+                continue
+            beyond = first.top if is_above else _right(shape, first)
+            corner = (low_x, beyond + spacing) if is_above else (beyond + spacing, low_y)
+            rest = min(_laid_in(rows, (*corner, high_x, high_y), turns), key=most_copies)
+            pair = lattice_of(shape, [*first.places, *rest.places])
+            yield pair._replace(is_pair=True)
+
+
+def _right(shape: Region, lattice: Lattice) -> float:
+    """Return the highest x that the copies reach."""
+    right = {turn: placed(shape, turn, (0.0, 0.0)).bounds[2] for turn, _ in lattice.places}
+    return max(right[turn] + shift[0] for turn, shift in lattice.places)
 
 
 def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
@@ -122,6 +163,7 @@ class _Rows:
     """Rows along x of a shape in a turn and in its half turn."""
 
     def __init__(self, shape: Region, turn: Turn, spacing: float) -> None:
+        self.shape, self.spacing = shape, spacing
         self.turns: tuple[Turn, Turn] = turn, TURNS[(turn + 2) % 4]
         (outline,) = grow(Region(shape.outers), spacing / 2).outers
         polygon = np.array([p for run in outline.runs for p in run_chords(run, True, SAGITTA)])
@@ -200,7 +242,12 @@ class _Rows:
     # The patterns that are tried.
 
     def layouts(self, box: tuple[float, float]) -> list[list[tuple[Turn, Point]]]:
-        """Return the copies of the patterns that promise most, in a box from the origin."""
+        """Return the copies of the patterns that promise most, in a box from the origin.
+
+        One without copies where the box holds none.
+        """
+        if box[0] < 2 * self.half_width - ROUNDING or box[1] < 2 * self.half_height - ROUNDING:
+            return [[]]
         ranked = [entry for family in self._families() for entry in self._ranked(family, box)]
         ranked.sort(key=lambda entry: -entry[0])
         return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]

@@ -139,7 +139,7 @@ def _key(nests: Iterable[tuple[Stock, Sequence[NestPart], int]]) -> str:
     """Return a hash of what was nested, and of whether lattices and arrangements were tried."""
     inputs = [
         (
-            "bottom-left, lattices, arrangements"
+            "bottom-left, lattices, pairs of lattices, arrangements"
             if takes_lattices(parts, stock, sheets)
             else "bottom-left",
             astuple(stock),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,25 @@ def test_rectangles_fill_what_they_fill_exactly(size: tuple[float, float]) -> No
     width, height = (5 * size[0] + 4 * 0.7, 6 * size[1] + 5 * 0.7)
     laid = best(rectangle((1.0, 1.0), (1.0 + size[0], 1.0 + size[1])), 0.7, width, height)
     assert len(laid.places) == 30
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_rectangles_fill_a_sheet_that_takes_two_lattices(turned: bool) -> None:
+    """Two columns of 11 lying and one of 4 standing fill it: 26 x 44 mm, each with 0.5 mm of gap
+    11 x 4 mm. Rows of one sort alone hold 22 or 24.
+    """
+    width, length = (43.5, 25.5) if turned else (25.5, 43.5)
+    laid = best(rectangle((0.0, 0.0), (10.5, 3.5)), 0.5, width, length)
+    assert len(laid.places) == 26 * 44 // (11 * 4)
+
+
+def test_eighteen_membranes_of_a_finger_lie_on_one_sheet() -> None:
+    """16 in pairs whose tabs pass each other, 117 mm wide, and two in the strip of 14.4 mm left."""
+    design = load_design("finger")
+    parts = of_material(plan_design(check(design), ("cut",)).parts, "PTFE")
+    (result,) = nest([replace(parts[0], count=18)], {"PTFE": stocks(design)["PTFE"]})
+    assert result.sheets == 1
+    judged(result)
 
 
 def test_right_triangles_lie_in_pairs() -> None:
@@ -146,12 +166,12 @@ def test_only_turns_that_the_stock_allows_are_used() -> None:
 
 
 def test_five_folded_pouches_lie_on_one_sheet() -> None:
-    """As sparrow packs them; rows hold three, and bottom-left alone four."""
+    """As sparrow packs them; two lattices hold four, as bottom-left alone does."""
     design = load_design("folded", ("order.copies=4",))
     parts = of_material(plan_design(check(design), ("cut",)).parts, "PE")
     stock = stocks(design)["PE"]
     low_x, low_y, high_x, high_y = stock.usable
-    assert len(best(parts[0].region, stock.spacing, high_x - low_x, high_y - low_y).places) == 3
+    assert len(best(parts[0].region, stock.spacing, high_x - low_x, high_y - low_y).places) == 4
     (result,) = nest(parts, {"PE": stock})
     assert len(result.placements) == 5
     assert result.sheets == 1
