@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from sbafab.api.lab import kerf, record, record_history, record_sheet, report
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
     from sbafab.api.runs import cut, generate, import_design, mesh, nest, press, simulate
-    from sbafab.api.search import compare, find, sweep
+    from sbafab.api.search import compare, find, reach_yield, sweep
 
 __all__ = [
     "Source",
@@ -62,6 +62,7 @@ __all__ = [
     "predict",
     "predict_assembly",
     "press",
+    "reach_yield",
     "read_laminate",
     "record",
     "record_history",
@@ -82,7 +83,7 @@ MODULES = {
     "lab": ("kerf", "record", "record_history", "record_sheet", "report"),
     "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
     "runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
-    "search": ("compare", "find", "sweep"),
+    "search": ("compare", "find", "reach_yield", "sweep"),
 }
 """The functions by their module, which is loaded when first asked for one of them; ``designs`` has
 the rest.

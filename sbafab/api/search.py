@@ -1,4 +1,4 @@
-"""Designs found, swept or compared by their predictions."""
+"""Designs found, swept, compared, or changed for a yield."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.api.designs import Source, load, parted
-from sbafab.design.files import Change
+from sbafab.design.files import Change, changed_keys
 from sbafab.design.records import Design
 from sbafab.search.compare import PRESSURES, DesignComparison, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
@@ -15,6 +15,8 @@ from sbafab.search.find import FindRequest, FoundDesign
 from sbafab.search.find import find as run_find
 from sbafab.search.sweep import SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
+from sbafab.search.target_yield import ReachedYield
+from sbafab.search.target_yield import reach_yield as run_reach_yield
 from sbafab.search.trial import read_all
 from sbafab.search.vary import read_varied
 
@@ -42,6 +44,19 @@ def find(
     at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+
+
+def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> ReachedYield:
+    """The design changed as little as a yield needs, and what that costs.
+
+    ``reach_yield("3dof-15mm", target=0.95).design`` goes to ``generate``; ``target`` is the share
+    of random builds that are good. Order of stacking, bond, overhang, base plate and ears may
+    change; keys in ``changes`` and ``tables`` stay. Of the result, ``changes`` has both values of
+    each key, ``comparison`` the figures of both designs, ``found.share`` the share; ``design`` is
+    None where no change reaches the target, and ``sentence`` says why. Raises DesignError.
+    """
+    fixed = frozenset(changed_keys([*changes, tables]))
+    return run_reach_yield(load(source, *changes, **tables), target, fixed)
 
 
 def compare(

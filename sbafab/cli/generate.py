@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
 from sbafab.assemblies.files import load
+from sbafab.cli.exit import RULE_FAILED, Exit, end
 from sbafab.cli.options import (
     Request,
     dxf_options,
@@ -14,8 +16,10 @@ from sbafab.cli.options import (
     sheet_options,
     target_yield_option,
 )
-from sbafab.cli.printing import console, facts_table, print_line
-from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_request
+from sbafab.cli.printing import console, facts_table, print_line, print_wrapped
+from sbafab.cli.progress import shown_progress
+from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_json, run_request
+from sbafab.design.files import changed_keys
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.output.checked import EVERYTHING
@@ -56,12 +60,40 @@ def generate(request: Request, curves: Curves, target_yield: float | None, decks
                 "--target-yield goes with a design, and this is an assembly; generate its parts' "
                 "designs one by one, and name the files it writes in the assembly"
             )
-        # It predicts both designs, which a plain run does not: models load slowly.
-        from sbafab.cli.target_yield import generate_for_yield
-
-        generate_for_yield(source, target_yield, wanted, request)
+        _generate_for_yield(source, target_yield, wanted, request)
         return
     run_request(wanted, request, print_run if isinstance(source, Design) else print_assembly)
+
+
+def _generate_for_yield(
+    design: Design, target: float, wanted: RunRequest, request: Request
+) -> None:
+    """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
+    # Both designs are predicted, which a plain run does not do: models load slowly.
+    from sbafab.cli.compare import print_figures, print_table
+    from sbafab.search.compare import value_text
+    from sbafab.search.target_yield import DESIGNS, reach_yield
+
+    with shown_progress(request.as_json) as progress:
+        reached = reach_yield(
+            design, target, frozenset(changed_keys(request.assignments)), progress
+        )
+    if reached.design is None:
+        end(Exit("yield", reached.sentence, RULE_FAILED), request.as_json)
+
+    def show(run: Run) -> None:
+        if reached.comparison is not None:
+            rows = [(row.key, *map(value_text, row.values)) for row in reached.changes]
+            print_table("Changed for the yield", DESIGNS, rows)
+            print_figures(reached.comparison, DESIGNS)
+        print_wrapped(reached.sentence)
+        print_line("")
+        print_run(run)
+
+    def as_json(run: Run) -> dict[str, object]:
+        return {**run_json(run), "yield": reached.as_dict()}
+
+    run_request(replace(wanted, source=reached.design), request, show, as_json)
 
 
 def print_assembly(run: Run) -> None:

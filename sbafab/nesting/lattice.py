@@ -83,7 +83,7 @@ def most_copies(lattice: Lattice) -> tuple[int, float]:
     return -len(lattice.places), round(lattice.top, 3)
 
 
-def _laid_in(rows: tuple[_Rows, _Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+def _laid_in(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
     """Yield lattices of a shape, as it is drawn and turned, in ``area``."""
     low_x, low_y, high_x, high_y = area
     width, length = high_x - low_x, high_y - low_y
@@ -101,7 +101,7 @@ def _laid_in(rows: tuple[_Rows, _Rows], area: Bounds, turns: Sequence[Turn]) -> 
                 yield lattice_of(in_turn.shape, places)
 
 
-def _pairs(rows: tuple[_Rows, _Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
+def _pairs(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
     """Yield pairs of lattices: one leaves a strip as wide as one copy, another fills the strip."""
     shape, spacing = rows[0].shape, rows[0].spacing
     low_x, low_y, high_x, high_y = area

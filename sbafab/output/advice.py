@@ -100,7 +100,7 @@ def advise(design: Design, target: float, progress: Progress = ignore_progress) 
 @dataclass(frozen=True)
 class YieldDesign:
     """A design for a yield: ``design`` is ``given`` with the ``changes``, by key; None where no
-    change reaches ``target``.
+    change reaches the share ``target``.
 
     ``share`` is that of the changed design by another seed, or of the one given where that is
     enough; ``best`` and ``best_changes`` are the best that was reached where nothing is enough.

@@ -1,0 +1,65 @@
+"""A design changed as little as a yield needs, beside the one given: what the yield costs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+from sbafab.design.records import Design
+from sbafab.output import advice
+from sbafab.output.advice import YieldDesign, value_of
+from sbafab.process import Progress, ignore_progress
+from sbafab.search.compare import DesignComparison, KeyDifference, compare
+
+DESIGNS = "as given", "changed"
+
+
+@dataclass(frozen=True)
+class ReachedYield:
+    """The ``design`` for a yield, None where none reaches it; ``found`` says how it was changed.
+
+    ``comparison`` holds both designs with their figures; None where nothing was changed.
+    """
+
+    found: YieldDesign
+    comparison: DesignComparison | None
+
+    @property
+    def design(self) -> Design | None:
+        """The changed design; the one given where that is enough, None where no change is."""
+        return self.found.design
+
+    @property
+    def sentence(self) -> str:
+        """What was changed and the share that it reaches, or why nothing is."""
+        return self.found.sentence
+
+    @property
+    def changes(self) -> tuple[KeyDifference, ...]:
+        """Each key that was changed, with its value as given and as changed."""
+        return tuple(
+            KeyDifference(key, (value_of(self.found.given, key), value))
+            for key, value in self.found.changes.items()
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry ``yield`` of ``generate --json``."""
+        figures = self.comparison.as_dict()["figures"] if self.comparison is not None else []
+        return {**self.found.as_dict(), "figures": [each for each in figures if each["main"]]}
+
+
+def reach_yield(
+    design: Design,
+    target: float,
+    fixed: Collection[str] = (),
+    progress: Progress = ignore_progress,
+) -> ReachedYield:
+    """Return the design that reaches a yield of ``target`` by few changes, and what they cost.
+
+    Keys that are ``fixed`` stay. Raises DesignError for a share that is not between 0 and 1.
+    """
+    found = advice.reach_yield(design, target, fixed, progress)
+    if found.design is None or not found.changes:
+        return ReachedYield(found, None)
+    return ReachedYield(found, compare(design, found.design, DESIGNS, progress=progress))

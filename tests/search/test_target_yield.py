@@ -1,0 +1,53 @@
+"""A design for a yield from Python: its folder holds it, and what was asked for stays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import sbafab
+from sbafab.actuators import build
+from sbafab.errors import DesignError
+from sbafab.output.checked import limits
+from sbafab.rules.registration_yield import simulate
+
+ROUGH = {
+    "stack.balloons": 2,
+    "rules.yield_builds": 500,
+    "registration": {"hand_placement": 0.2, "hand_turn": 1.0},
+}
+
+
+def test_the_changed_design_reaches_the_share_and_costs_what_its_ears_do() -> None:
+    given = sbafab.load("1dof-5mm", ROUGH)
+    reached = sbafab.reach_yield("1dof-5mm", ROUGH, target=0.9)
+    design, comparison = reached.design, reached.comparison
+    assert design is not None
+    assert comparison is not None
+    assert [row.key for row in reached.changes] == ["registration.method"]
+    assert reached.changes[0].values == ("channel-pin", "ears")
+    assert design == given.with_(registration={"method": "ears"}, rules={"target_yield": 0.9})
+    # Ears stand on the outline and leave it as it is.
+    (outline,) = (pair for pair in comparison.figures if pair.name == "outline diameter")
+    (overall,) = (pair for pair in comparison.figures if pair.name == "overall diameter")
+    assert not outline.differs
+    assert overall.differs
+    # Builds drawn by a third seed.
+    share = simulate(build(design), replace(limits(design), yield_builds=1000), 91).whole
+    assert share.interval[1] >= 0.9
+
+
+def test_keys_that_are_given_stay() -> None:
+    keys = ("registration.method=channel-pin", "bond.width=0.75", "mask.overhang=0.5")
+    reached = sbafab.reach_yield("1dof-5mm", ROUGH, *keys, target=0.99)
+    assert reached.design is None
+    assert reached.comparison is None
+    assert "does not reach a yield of 0.99" in reached.sentence
+    assert "bond.width" in reached.sentence
+
+
+@pytest.mark.parametrize("target", [0.0, 1.0, -0.5, 120.0, float("nan")])
+def test_a_share_out_of_range_is_refused(target: float) -> None:
+    with pytest.raises(DesignError, match=r"rules\.target_yield"):
+        sbafab.reach_yield("1dof-5mm", ROUGH, target=target)
