@@ -28,7 +28,7 @@ class Finding:
 
     ``by_user`` distinguishes a failure that the design waives by name from a waiver that the rule
     grants (a flush mask at a pinned bore). ``remedy`` is the action that a warning asks for; the
-    message begins with it.
+    message begins with it. Of a share that was counted, ``interval`` is that of 95 %.
     """
 
     rule: str
@@ -40,6 +40,7 @@ class Finding:
     message: str
     by_user: bool = False
     remedy: str = ""
+    interval: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.

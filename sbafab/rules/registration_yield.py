@@ -607,8 +607,11 @@ def finding_of(outcome: Yield, laminate: Laminate, limits: Limits) -> Finding:
     place = Place()
     if worst is not None and outcome.interfaces[worst].good < outcome.whole.builds:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
-    share = outcome.whole.value
-    return Finding(NAME, verdict, target, share, "", place, message, remedy=remedy)
+    share = outcome.whole
+    return Finding(
+        NAME, verdict, target, share.value, "", place, message,
+        remedy=remedy, interval=share.interval,
+    )  # fmt: skip
 
 
 def _remedy(laminate: Laminate) -> str:

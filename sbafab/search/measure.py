@@ -38,7 +38,8 @@ SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 """
 SweepRow = dict[str, Any]
 """What is known of one design, in values that JSON has. ``outcome`` and ``reason`` are always
-there; ``sha256``, ``keys``, ``rules``, ``figures`` where the design could be measured so far."""
+there; ``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its
+interval), ``figures`` where the design could be measured so far."""
 
 
 def measured(
@@ -73,7 +74,10 @@ def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
         name: [rule.verdict, rule.margin, rule.measured, rule.limit, rule.unit]
         for name, rule in worst.items()
     }
-    # A row has no intervals: with the factors given, none are computed.
+    row["yield"] = next(
+        ([each.measured, *each.interval] for each in checked.findings if each.interval), []
+    )
+    # Figures have no intervals here: with the factors given, none are computed.
     request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
     prediction = predict(design, request, checked.laminate)
     row["figures"] = named_figures(prediction.figures)

@@ -57,7 +57,8 @@ FIRST = (
 """Figures that are looked for first, whatever the pressure."""
 MOVED = ("free stroke", "bend", "blocked force", "blocked force of one SBA")
 """Those at a pressure."""
-YIELD = "registration-yield.measured"
+YIELD = ("yield", "yield.low", "yield.high")
+"""Share of good builds, and the interval of 95 % that its number of random builds leaves."""
 LITTLE = 0.005
 """Share of a limit that is nothing to spare."""
 BATCH = 1000
@@ -124,7 +125,7 @@ class Table:
         each = [f"{figure} at {kpa:g} kPa" for kpa in self.pressures_kpa for figure in MOVED]
         for begins in (*FIRST, *each):
             yield from [name for name in names if name.startswith(begins)][:1]
-        yield YIELD
+        yield from YIELD
 
     def _binding(self) -> Iterator[str]:
         """Yield verdict and margin of the rules that fail, warn or pass without margin anywhere."""
@@ -151,7 +152,9 @@ class Table:
             cells = (number, row.get("sha256", ""), row["outcome"], row["reason"])
             head = dict(zip(HEAD, cells, strict=True))
             # What was asked stands there even where no design came of it.
-            yield head, {**values, **row.get("keys", {})}, _rules(row), row.get("figures", {})
+            shares = dict(zip(YIELD, row.get("yield", ()), strict=False))
+            figures = {**shares, **row.get("figures", {})}
+            yield head, {**values, **row.get("keys", {})}, _rules(row), figures
 
     @staticmethod
     @contextmanager
@@ -440,7 +443,7 @@ def _wrapped(objective: Objective) -> str:
 
 
 TEMPLATE = "sweep.html.j2"
-GOOD_BUILDS = Objective(YIELD, "share of good builds", True)
+GOOD_BUILDS = Objective(YIELD[0], "share of good builds", True)
 INTRODUCTION = (
     ("mass [g]", False),
     ("overall diameter [mm]", False),
@@ -525,7 +528,7 @@ def _objectives(table: Table) -> list[Objective]:
     for group in (sorted(strokes, key=lambda name: name.startswith("full")), forces[::-1]):
         if group:
             objectives.append(Objective(group[0], _label(group[0]), True))
-    return [*objectives, GOOD_BUILDS] if YIELD in names else objectives
+    return [*objectives, GOOD_BUILDS] if YIELD[0] in names else objectives
 
 
 def _label(column: str) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scipy.stats import binomtest
 
 import sbafab
 from sbafab.cli.sweep import _as_json
@@ -64,7 +65,7 @@ def test_a_table_opens_with_what_was_varied_asked_for_and_binding(
     assert len(every) > 100
     varied = [text.partition("=")[0] for text in VARY]
     assert first[4 : 4 + len(varied)] == varied
-    for asked in ("mass [g]", "full stroke [mm]", "free stroke at 10 kPa [mm]"):
+    for asked in ("mass [g]", "full stroke [mm]", "free stroke at 10 kPa [mm]", "yield.low"):
         assert asked in first
     # A narrow bond fails bond-width, and the others have nothing to spare.
     assert {"bond-width.verdict", "bond-width.margin"} <= set(first)
@@ -89,6 +90,13 @@ def test_each_row_says_what_check_and_predict_say(found: SweptDesigns) -> None:
             if finding.rule in ("bond-width", "tube-fit", "press-fit", "registration-yield"):
                 assert row[f"{finding.rule}.verdict"] == finding.verdict
                 assert float(row[f"{finding.rule}.measured"]) == finding.measured
+                if finding.rule == "registration-yield":
+                    good = round(100 * float(row["yield"]))
+                    assert good == round(100 * (finding.measured or 0))
+                    ends = binomtest(good, 100).proportion_ci(0.95, "wilson")
+                    assert [float(row["yield.low"]), float(row["yield.high"])] == (
+                        pytest.approx([*ends], abs=1e-6)
+                    )
         said = sbafab.predict(design, pressures_kpa=[10.0])
         assert float(row["mass [g]"]) == pytest.approx(said.value("mass"), rel=1e-6)
         stroke = float(row["free stroke at 10 kPa [mm]"])
