@@ -3,17 +3,17 @@ under a load and in contact.
 
 First freedoms and pressures are found together by Newton's method: each step solves the linearised
 equilibrium, and the pressures' change is the least, within their limits, that brings the linearised
-tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Where these steps do not
-converge, or a plate is in the way, Levenberg and Marquardt's method goes from equilibrium to
-equilibrium by the tip's derivatives. Pressures are counted in asinh(p / P0), in which heights are
-nearly linear.
+tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Against an outer plate the
+points in contact are those at the step's end, so that it passes where one closes or opens and the
+tip's rates jump. Where these steps do not converge, Levenberg and Marquardt's method goes from
+equilibrium to equilibrium by the tip's derivatives. Pressures are counted in asinh(p / P0), in
+which heights are nearly linear.
 """
 
 from __future__ import annotations
 
 import math
 from functools import lru_cache
-from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ import numpy as np
 from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.derivatives import derivatives, hessian, tip_motion
 from sbafab.models.least_energy import is_positive_definite, step_limit
+from sbafab.models.stack_balance import free_equilibrium
 from sbafab.models.stack_loads import (
     level_motions,
     loaded_energy,
@@ -35,26 +36,41 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.models.film_elements import Array
-    from sbafab.models.stack_loads import GapPlaces, Load
+    from sbafab.models.stack_loads import GapPlaces, Load, LoadedEnergy, Springs
     from sbafab.models.stack_poses import Pose, PosedStack
 
 P0 = 0.1
 """Pressure in kPa below which pressures are counted evenly, above in their logarithm."""
-NEAR = 1e-4
-"""Distance in mm from the place at which the tip has reached it."""
+NEAR, MET = 1e-4, 1e-3
+"""Distances in mm from the place at which a search ends, and at which the tip has reached it."""
 STEPS, LAST_STEP = 25, 2e-3
 """Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
 WHOLE_STEPS = 5
 """Steps after which one that closes or opens contacts is halved, lest they do so for ever."""
 CLOSE = 0.05
 """Step (mm, rad, asinh) from which on tangents are exact."""
+SOFT_PLATES: tuple[tuple[float, ...], ...] = (
+    (3e2, 3e3, 3e4),
+    (1e3, 1e4, 1e5),
+    (),
+    (1e1, 3e1, 1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5),
+)
+"""Stiffness in mN/mm of an outer plate without friction in the first solutions, tried in turn."""
+ROUGH_CONTACT, CLOSE_CONTACT = 0.05, 1e-4
+"""Last step (mm, rad, asinh) against a soft plate, and against the plate itself."""
 LONGEST_STEP = 1.5
 """Largest change of asinh(p / P0) in one step."""
 POSES = 40
 """Equilibria from one start."""
+PLATE_STEPS, PLATE_STARTS, DESCENT_STARTS = 40, 3, 3
+"""Newton's steps against an outer plate, the starts of these, and those of descents after them."""
+CONTACT_ROUNDS = 8
+"""Rounds in which a step's contacts with an outer plate are found."""
 DAMPING = 1e-3
 """First damping, as a share of the largest square of a derivative (mm by asinh)."""
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e3
+PLATE_DAMPING = 1e-4
+"""Damping against an outer plate, a mm away from the place."""
 STILL = 1e-6
 """Step (mm, rad, asinh) that changes nothing."""
 
@@ -101,34 +117,90 @@ def reach(
     target = TipTarget(stack, place, load, math.asinh(most_pressure / P0))
     guess = start(target) if near is None else np.arcsinh(np.array(near.pressures) / P0)
     guess = np.clip(guess, 0.0, target.most)
-    # An outer plate is too stiff for steps of freedoms and pressures together.
-    has_plate = load is not None and load.wall is not None
-    if not has_plate:
-        pose = _by_freedoms(target, guess, near)
-        if pose is not None:
-            return pose
-    if load is not None and not has_plate:
-        # From an equilibrium, where the load has bent the stack far.
-        posed = _equilibrium(target, guess, arguments, near)
-        pose = None if posed is None else _by_freedoms(target, guess, posed)
-        if pose is not None:
-            return pose
-    best = None
-    further = _further_starts(target, guess)
-    for x in (guess, *(islice(further, 2) if has_plate else further)):
-        pose = _by_poses(target, x, arguments, near if best is None else None)
-        if pose is None:
-            continue
-        if _distance(target, pose) < NEAR:
-            return pose
-        if best is None or _distance(target, pose) < _distance(target, best):
-            best = pose
+    if load is not None and load.wall is not None:
+        best = _against_plate(target, guess, arguments, near)
+    else:
+        best = _without_plate(target, guess, arguments, near)
+    if best is not None and _distance(target, best) < MET:
+        return best
     if best is None:
         raise DesignError("no equilibrium of the stack found near this place; try another load")
     raise UnreachableError(
         f"the tip cannot reach {_written(place)} mm with 0 to {most_pressure:g} kPa; the nearest "
         f"place found is {_written(best.tip)} mm, {_distance(target, best):.3g} mm away"
     )
+
+
+def _without_plate(
+    target: TipTarget, guess: Array, arguments: dict[str, Any], near: Pose | None
+) -> Pose | None:
+    """Return the pose whose tip is nearest to the place; None where there is no equilibrium."""
+    pose = _by_freedoms(target, guess, near)
+    if pose is not None:
+        return pose
+    if target.load is not None:
+        # From an equilibrium, where the load has bent the stack far.
+        posed = _equilibrium(target, guess, arguments, near)
+        pose = None if posed is None else _by_freedoms(target, guess, posed)
+        if pose is not None:
+            return pose
+    best = None
+    for x in (guess, *_further_starts(target, guess)):
+        pose = _by_poses(target, x, arguments, near if best is None else None)
+        best = _nearer(target, best, pose)
+        if best is not None and _distance(target, best) < NEAR:
+            break
+    return best
+
+
+def _against_plate(
+    target: TipTarget, guess: Array, arguments: dict[str, Any], near: Pose | None
+) -> Pose | None:
+    """Return the pose against an outer plate whose tip is nearest to the place; None where there is
+    no equilibrium.
+    """
+    assert target.load is not None
+    assert target.load.wall is not None
+    best = None
+    starts = (guess, *_further_starts(target, guess))
+    ways = ((),) if target.load.wall.sticks else SOFT_PLATES
+    for x in starts[:PLATE_STARTS]:
+        from_near = near if x is guess else None
+        for soft in ways if from_near is None else ((), *ways):
+            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, soft))
+            if best is not None and _distance(target, best) < NEAR:
+                return best
+        if best is not None and _distance(target, best) < MET:
+            return best
+    for x in starts[:DESCENT_STARTS]:
+        pose = _by_poses(target, x, arguments, near if x is guess else None)
+        best = _nearer(target, best, pose)
+        if best is not None and _distance(target, best) < NEAR:
+            return best
+    if best is None or _distance(target, best) < MET:
+        return best
+    # The descents end where a contact opens or closes: from places about there.
+    for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
+        for from_near, soft in ((best, ()), (None, SOFT_PLATES[0])):
+            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, soft))
+            if best is not None and _distance(target, best) < NEAR:
+                return best
+    return best
+
+
+def _around(target: TipTarget, x: Array) -> Iterator[Array]:
+    """Yield places about one, a chamber's pressure changed in each."""
+    for size in (0.0, 0.05, 0.2, 0.6):
+        for change in size * np.concatenate([np.eye(len(x)), -np.eye(len(x))]):
+            yield np.clip(x + change, 0.0, target.most)
+            if not size:
+                break
+
+
+def _nearer(target: TipTarget, first: Pose | None, second: Pose | None) -> Pose | None:
+    if first is None or second is None:
+        return first or second
+    return min(first, second, key=lambda pose: _distance(target, pose))
 
 
 def _written(place: Array) -> str:
@@ -293,6 +365,123 @@ def _pose(target: TipTarget, x: Array, at: Array) -> Pose | None:
         return stack.pose_at(pressures, springs, at)
     except DesignError:
         return None
+
+
+# Freedoms and pressures together, against an outer plate.
+
+
+def _by_contacts(
+    target: TipTarget,
+    x: Array,
+    near: Pose | None,
+    arguments: dict[str, Any],
+    soft: tuple[float, ...],
+) -> Pose | None:
+    """Return the pose by Newton's method, with the plate's contact forces as unknowns besides; None
+    where it does not converge to a stable pose within the limits.
+
+    It starts at the equilibrium; with ``soft`` plates (mN/mm) that come first at that without one.
+    Against these the top's load goes gradually from one point to the next as it rolls, and rates
+    hardly jump.
+    """
+    load, forces = target.load, None
+    assert load is not None
+    start = _free_freedoms(target.stack, x) if soft else None
+    if start is None:
+        pose = _equilibrium(target, x, arguments, near)
+        if pose is None:
+            return None
+        start = pose.freedoms
+    at = start
+    for stiffness in soft:
+        softer = target._replace(load=load._replace(stiffness=stiffness))
+        tried = _contact_newton(softer, x, at, forces, ROUGH_CONTACT)
+        if tried is not None:
+            x, at, forces = tried
+    found = _contact_newton(target, x, at, forces, CLOSE_CONTACT)
+    if found is None:
+        return None
+    x, at, _ = found
+    return _equilibrium(target, x, arguments, target.stack.pose_like(at))
+
+
+def _free_freedoms(stack: PosedStack, x: Array) -> Array | None:
+    """Return the freedoms (levels, 3) without a load; None where none are found."""
+    pressures = (P0 * np.sinh(x)).tolist()
+    try:
+        kinds = free_equilibrium(stack.springs(pressures), stack.start_freedoms(pressures))
+    except DesignError:
+        return None
+    return np.asarray(kinds[stack.levels])
+
+
+def _contact_newton(
+    target: TipTarget, x: Array, at: Array, forces: Array | None, enough: float
+) -> tuple[Array, Array, Array] | None:
+    """Return asinh(p / P0), freedoms and contact forces after a step below ``enough``; None where
+    there is none.
+    """
+    stack, load = target.stack, target.load
+    assert load is not None
+    for _ in range(PLATE_STEPS):
+        springs = stack.each(stack.springs((P0 * np.sinh(x)).tolist()))
+        now = loaded_energy(springs, stack.pitch, load, at, forces)
+        touch = now.touch
+        assert touch is not None
+        step = _contact_step(target, x, at, now, springs)
+        if step is None:
+            return None
+        move, ahead = step
+        share = float(step_limit(move).min())
+        forces = touch.resists(touch.deep + share * (now.deeper(touch) @ move.ravel()))
+        x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
+        if max(float(np.abs(move).max()), float(np.abs(ahead).max())) < enough:
+            return x, at, forces
+    return None
+
+
+def _contact_step(
+    target: TipTarget, x: Array, at: Array, now: LoadedEnergy, springs: Springs
+) -> tuple[Array, Array] | None:
+    """Return the steps of freedoms (levels, 3) and of asinh(p / P0) (chambers,) to the linearised
+    equilibrium with the contacts at their end; None where it is singular.
+    """
+    touch, size = now.touch, now.gradient.size
+    assert touch is not None
+    lines = now.deeper(touch)
+    motion = tip_motion(now.plates, now.motions)[:3].reshape(3, size)
+    away = target.place - now.plates.places[-1]
+    # A top that lies flat on the plate goes nowhere along its normal: far off, no step is for that.
+    share = LEAST_DAMPING + PLATE_DAMPING * min(float(np.linalg.norm(away)), 1.0)
+    filling = springs.slopes(at)[1].transpose(0, 2, 1) * (P0 * np.cosh(x))
+    # Without what the plate resists.
+    free = hessian(now, at, target.stack.pitch)
+    free -= (lines.T * (touch.stiff * (touch.deep > touch.least))) @ lines
+    gradient = now.gradient - touch.forces @ lines
+    room = (np.maximum(-x, -LONGEST_STEP), np.minimum(target.most - x, LONGEST_STEP))
+    touches = touch.deep > touch.least
+    for _ in range(CONTACT_ROUNDS):
+        stiff = touch.stiff * touches
+        pushes = gradient + (stiff * touch.deep) @ lines
+        right = np.concatenate([-pushes[:, None], filling.reshape(size, -1)], axis=1)
+        try:
+            moves = np.linalg.solve(free + (lines.T * stiff) @ lines, right)
+        except np.linalg.LinAlgError:
+            return None
+        own, by_pressure = moves[:, 0], moves[:, 1:]
+        rates = motion @ by_pressure
+        missing = away - motion @ own
+        if np.linalg.norm(missing) < NEAR / 2:
+            # Friction may let no pressure move it further: these would stray.
+            missing[:] = 0.0
+        damping = share * float((rates * rates).sum()) + 1e-12
+        ahead = bounded_step(rates, missing, damping, room)
+        move = own + by_pressure @ ahead
+        after = touch.deep + lines @ move > touch.least
+        if (after == touches).all():
+            break
+        touches = after
+    return move.reshape(-1, 3), ahead
 
 
 # From equilibrium to equilibrium.

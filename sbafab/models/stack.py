@@ -76,8 +76,7 @@ class Stack(PosedStack):
 
         ``near`` is a pose to start from, such as the last one of a motion; ``load`` are keyword
         arguments of ``pose`` beside pressures. Of several solutions of a stack with many chambers
-        it is one near the start. Below a plate without friction, where the top slides freely, the
-        search takes long and may miss. Raises UnreachableError, with the nearest tip found, and
+        it is one near the start. Raises UnreachableError, with the nearest tip found, and
         DesignError for bad input.
         """
         place = vector_of(tip, "the place of the tip in mm")

@@ -267,6 +267,11 @@ class PosedStack:
         )
         return self.pose_at(pressures, springs, freedoms, None, push / 1000, stable)
 
+    def pose_like(self, freedoms: Array, pressures: Sequence[float] = ()) -> Pose:
+        """Return a pose with freedoms (levels, 3) to start from: not in equilibrium."""
+        none = np.zeros(0)
+        return Pose(tuple(pressures), freedoms, none, none, 0.0, 0.0, True, self.pitch)
+
     def within(self, pose: Pose) -> bool:
         """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
         plates that are computed there. False where one lies outside, or cannot be computed.

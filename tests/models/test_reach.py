@@ -21,6 +21,8 @@ LOADS: dict[str, dict[str, Any]] = {
     "tip": {"tip_load": (0.0, 0.005, -0.005)},
     "gravity": {"gravity": (0.0, 0.6, -1.0)},
     "plate": {"plate": Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0))},
+    "slippery plate": {"plate": Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0), sticks=False)},
+    "level slippery plate": {"plate": Plate((0.0, 0.0, 14.0), sticks=False)},
     "both": {"tip_load": (0.002, 0.0, -0.004), "gravity": True},
 }
 
@@ -53,7 +55,27 @@ def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
 
 @pytest.mark.parametrize("load", LOADS)
 def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    assert missed(three, 8 if load == "plate" else 20, LOADS[load]) == 0
+    assert missed(three, 8 if "plate" in load else 20, LOADS[load]) == 0
+
+
+@pytest.mark.parametrize(
+    "pressures",
+    [
+        (0.4720, 10.0, 10.0),
+        (8.3813, 0.7127, 1.6083),
+        (2.8213, 9.9721, 10.0),
+        (1.5470, 9.9388, 8.7676),
+    ],
+)
+def test_a_target_behind_a_contact_that_closes_is_met(three: Stack, pressures: Any) -> None:
+    """The tip's rates jump where the top's next point meets the plate: steps by the rates of one
+    side alone end there.
+    """
+    load = LOADS["slippery plate"]
+    target = three.pose(pressures, **load)
+    assert target.force > 0
+    reached = three.reach(target.tip, most_pressure=MOST, **load)
+    assert np.linalg.norm(reached.tip - target.tip) < CLOSE
 
 
 def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
@@ -71,7 +93,7 @@ def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("load", LOADS)
 def test_many_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    assert missed(three, 300, LOADS[load]) == 0
+    assert missed(three, 1000, LOADS[load]) == 0
 
 
 @pytest.mark.parametrize("count", [2, 4])
