@@ -87,7 +87,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """``num_envs`` tasks of ``ReachEnvironment`` in one: its arguments, observations and rewards.
 
     Seeds and restarts as of ``gymnasium.vector.SyncVectorEnv``: the step after an episode's end
-    starts the next one. Fast without a load only.
+    starts the next one. Slow against an outer plate.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (as Gymnasium has it)

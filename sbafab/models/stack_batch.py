@@ -1,9 +1,9 @@
 """Many states of one stack at once: poses, and motions as chambers fill through their lines.
 
 The same equilibria as of ``Stack.pose`` and ``Motion``, by Newton's method for all states in one
-step; states that it does not solve soon are solved one by one. Without a load levels of equal
-balloons are equal, and a state has a row a kind of balloon. Under a load states are solved one by
-one. Lengths mm, pressures kPa, volumes ul.
+step; states that it does not solve soon are solved one by one, and so are all against an outer
+plate. Without a load levels of equal balloons are equal, and a state has a row a kind of balloon;
+under one it has a row a level. Lengths mm, pressures kPa, volumes ul.
 """
 
 from __future__ import annotations
@@ -17,51 +17,35 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import (
-    CURVES,
-    DEGREE,
-    PIECES,
-    PIECES_IN_ALL,
-    PRESSURE_SPANS,
-    SLOPES,
-    pieces,
+from sbafab.models.batch_balance import (
+    STRAIGHT,
+    Levels,
+    LevelsAt,
+    descended,
+    solved,
+    step_share,
 )
-from sbafab.models.least_energy import LARGEST_MOVE
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
 from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion
-from sbafab.models.stack_loads import RING_POINTS
 from sbafab.models.stack_poses import NO_LOAD, Pose
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Stack
-    from sbafab.models.stack_poses import PosedStack
+    from sbafab.models.stack_loads import Load
 
-POSE_STEPS, MOTION_STEPS = 40, 16
-"""Most of Newton's steps of a pose and of a motion before a state is solved alone."""
-RESIDUAL = 1e-7
-"""Residual in mN (or mN mm) that counts as none."""
-POSE_ERROR = 1e-9
-"""Error (mm, rad) at which a pose ends."""
+MOTION_STEPS = 16
+"""Most of Newton's steps of a motion before a state is solved alone."""
 MOTION_ERRORS = np.array([[1e-6], [1e-5]])
 """Errors at which a step of a motion ends: mm and rad, and the share of a pressure."""
-HALVINGS = 12
 VOLUME_POWER = 0.3
 """Power of the pressure that volumes grow by, about: of balloons that stretch."""
 ROUNDS = 2
 """Newton's steps of flows and contents in the first step of films."""
-STRAIGHT = 1e-24
-"""Square of a tilt in rad that is taken for 0."""
-CHUNK = 1024
-"""States solved together: more are no faster, and take more memory."""
-BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
-BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
-"""Splines' weights by pressure: of values, first and second derivatives."""
-LEAST_PIVOT = 1e-12
-"""Pivot, as a share of the largest, below which a matrix counts as indefinite."""
+CHUNK, LOADED_CHUNK = 1024, 512
+"""States solved together, without and with a load: more are no faster, and take more memory."""
 
 
 class LevelRun(NamedTuple):
@@ -96,7 +80,7 @@ class BatchPoses:
 
 
 class _State(NamedTuple):
-    """N states in columns: freedoms (kinds, 3, N) and pressures (chambers, N)."""
+    """N states in columns: freedoms (rows, 3, N) and pressures (chambers, N)."""
 
     freedoms: Array
     pressures: Array
@@ -132,15 +116,16 @@ class StackBatch:
             raise DesignError(
                 f"near has {len(near.freedoms)} poses for {len(asked)} states; give one a state"
             )
-        if self.is_loaded(load):
-            return self._one_by_one(asked, near, load)
+        acting = self.load(load)
+        if acting is not None:
+            return self._loaded_poses(asked, near, load, acting)
         p = np.ascontiguousarray(asked.T)
         if near is None:
             rises = [kind.rises(p).T @ self.stack.planes for kind in self.stack.maps]
             start = np.stack([rise.T for rise in rises])
         else:
             start = near.freedoms[:, self.stack.first_levels].transpose(1, 2, 0)
-        freedoms = np.empty((len(self.springs), 3, len(asked)))
+        freedoms = np.empty((len(self.stack.maps), 3, len(asked)))
         volumes = np.empty((self.stack.chambers, len(asked)))
 
         for part in _parts(len(asked)):
@@ -167,14 +152,9 @@ class StackBatch:
         return BatchMotion.of(self, line or Line(), load, start, count)
 
     @cached_property
-    def springs(self) -> tuple[BatchSprings, ...]:
-        """Springs of each kind of balloon."""
-        return tuple(BatchSprings.of(self.stack, kind) for kind in range(len(self.stack.maps)))
-
-    @cached_property
-    def counts(self) -> NDArray[np.int_]:
-        """Number of levels of each kind of balloon."""
-        return np.bincount(self.stack.levels, minlength=len(self.stack.maps))
+    def levels(self) -> Levels:
+        """The rows of a state without a load."""
+        return Levels.of(self.stack, None)
 
     @cached_property
     def runs(self) -> tuple[LevelRun, ...]:
@@ -182,15 +162,14 @@ class StackBatch:
         each = groupby(self.stack.levels.tolist())
         return tuple(LevelRun(kind, sum(1 for _ in levels)) for kind, levels in each)
 
-    def is_loaded(self, load: dict[str, Any]) -> bool:
-        """Return True if the arguments of ``Stack.pose`` are a load. Raises DesignError."""
-        unknown = sorted(set(load) - set(NO_LOAD))
+    def load(self, arguments: dict[str, Any]) -> Load | None:
+        """Return the load that arguments of ``Stack.pose`` are. Raises DesignError."""
+        unknown = sorted(set(arguments) - set(NO_LOAD))
         if unknown:
             raise DesignError(
                 f"a load has no {unknown[0]}; give tip_load, gravity or plate, as of Stack.pose"
             )
-        values = (load.get(name, value) for name, value in NO_LOAD.items())
-        return self.stack.load(*values) is not None
+        return self.stack.load(*(arguments.get(name, value) for name, value in NO_LOAD.items()))
 
     def tips(self, freedoms: Array) -> Array:
         """Return the middles of the top plates in mm of freedoms (kinds, 3, N): (N, 3).
@@ -241,38 +220,62 @@ class StackBatch:
             )
         return table
 
-    def _one_by_one(
-        self, pressures: Array, near: BatchPoses | None, load: dict[str, Any]
+    def _loaded_poses(
+        self, pressures: Array, near: BatchPoses | None, load: dict[str, Any], acting: Load
     ) -> BatchPoses:
-        poses = []
-        for number, row in enumerate(pressures.tolist()):
-            start = None if near is None else self.pose_like(near.freedoms[number])
-            poses.append(self.stack.pose(row, near=start, **load))
-        return batch_of(pressures, poses)
+        """Return the poses under a load; against an outer plate one by one."""
+        count, levels = len(pressures), len(self.stack.levels)
+        freedoms, volumes = (
+            np.empty((levels, 3, count)),
+            np.full((count, self.stack.chambers), np.nan),
+        )
+        if acting.wall is None:
+            rows = Levels.of(self.stack, acting)
+            start = self._starts(pressures) if near is None else near.freedoms
+            for part in _parts(count, LOADED_CHUNK):
+                p = np.ascontiguousarray(pressures[part].T)
+                weights = rows.weights(p, 2)
+                end = freedoms[:, :, part]
+                begin = np.ascontiguousarray(start[part].transpose(1, 2, 0))
+                is_solved = descended(rows, weights[:, :1], begin, end)
+                is_solved &= self.fits(rows, end)
+                found = rows.at(weights, end).volumes.T
+                volumes[part] = np.where(is_solved[:, None], found, np.nan)
+        for number in np.flatnonzero(np.isnan(volumes[:, 0])):
+            like = None if near is None else self.stack.pose_like(near.freedoms[number])
+            alone = self.stack.pose(pressures[number].tolist(), near=like, **load)
+            freedoms[:, :, number], volumes[number] = alone.freedoms, alone.volumes
+        tips = Levels.of(self.stack, acting).tips(freedoms)
+        return BatchPoses(pressures, freedoms.transpose(2, 0, 1), volumes, tips)
 
-    def pose_like(self, freedoms: Array, pressures: Sequence[float] = ()) -> Pose:
-        """Return a pose with freedoms (levels, 3) to start from: not in equilibrium."""
-        none = np.zeros(0)
-        return Pose(tuple(pressures), freedoms, none, none, 0.0, 0.0, True, self.stack.pitch)
+    def _starts(self, pressures: Array) -> Array:
+        """Return freedoms (N, levels, 3) to start from, as of ``Stack.pose``."""
+        rises = [kind.rises(pressures.T).T @ self.stack.planes for kind in self.stack.maps]
+        return np.stack(rises, axis=1)[:, self.stack.levels]
+
+    def fits(self, rows: Levels, freedoms: Array) -> NDArray[np.bool_]:
+        """Return True (n) where no balloon is higher than its map."""
+        most = np.array([self.stack.maps[kind].most_height for kind in rows.kinds])
+        gaps = np.einsum("ic,rin->rcn", self.stack.centres, freedoms)
+        return np.asarray((gaps <= most[:, None, None]).all((0, 1)))
 
     def _free_poses(self, pressures: Array, start: Array) -> tuple[Array, Array]:
         """Return freedoms (kinds, 3, n) and volumes (chambers, n), NaN where none are found."""
         freedoms, total = np.empty_like(start), np.zeros_like(pressures)
-        for springs, count, begin, end in zip(
-            self.springs, self.counts, start, freedoms, strict=True
-        ):
-            weights = springs.weights(pressures, 2)
-            is_solved = _descended(springs, weights[:1], begin, end)
-            volumes = springs.at(weights, end).volumes
-            is_solved &= (self.stack.centres.T @ end <= springs.kind.most_height).all(0)
+        weights = self.levels.weights(pressures, 2)
+        for kind, count in enumerate(self.levels.counts):
+            one, end = self.levels.alone(kind), freedoms[kind : kind + 1]
+            is_solved = descended(one, weights[:, :1], start[kind : kind + 1], end)
+            volumes = one.at(weights, end).volumes
+            is_solved &= self.fits(one, end)
             total += count * np.where(is_solved, volumes, np.nan)
         total[:, np.isnan(total[0])] = np.nan
         return freedoms, total
 
 
-def _parts(count: int) -> list[slice]:
+def _parts(count: int, size: int = CHUNK) -> list[slice]:
     """Return the parts of so many states that are solved together."""
-    return [slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK)]
+    return [slice(begin, begin + size) for begin in range(0, count, size)]
 
 
 def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
@@ -286,58 +289,12 @@ def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
     )
 
 
-def _step_share(move: Array) -> Array:
-    """Return the share (n) of steps (3, n) that stays within ``LARGEST_MOVE``."""
-    limits = LARGEST_MOVE[:, None] / np.maximum(np.abs(move), 1e-12)
-    return np.asarray(np.minimum(1.0, limits.min(0)))
-
-
-def _descended(
-    springs: BatchSprings, weights: Array, start: Array, end: Array
-) -> NDArray[np.bool_]:
-    """Write the freedoms (3, n) of least energy; return True (n) where they are found.
-
-    Newton's method with a line search, of which finished states take no further part: the energy
-    of a level alone is convex.
-    """
-    count = start.shape[1]
-    is_solved = np.zeros(count, dtype=bool)
-    live, at, before = np.arange(count), start.copy(), np.zeros(count)
-    end[:] = start
-    now = springs.at(weights, at)
-    for _ in range(POSE_STEPS):
-        moves, is_firm = solved(now.matrix, -now.gradient[:, None])
-        move = moves[:, 0]
-        largest = np.abs(move).max(0)
-        still = np.abs(now.gradient).max(0) < RESIDUAL
-        still |= is_firm & (largest * largest < POSE_ERROR * before)
-        if still.any():
-            end[:, live[still]] = (at + np.where(is_firm & (largest < 1e-3), move, 0.0))[:, still]
-            is_solved[live[still]] = True
-        rest = ~still & is_firm
-        if not rest.any():
-            break
-        live, at, move, largest = live[rest], at[:, rest], move[:, rest], largest[rest]
-        value, slope = now.energy[rest], (move * now.gradient[:, rest]).sum(0)
-        weights = weights[..., rest]
-        share = full = _step_share(move)
-        for _ in range(HALVINGS):
-            now = springs.at(weights, at + share * move)
-            good = now.energy <= value + 1e-4 * share * slope + 1e-11 * (1 + np.abs(value))
-            if good.all():
-                break
-            share = np.where(good, share, share / 2)
-        at = at + share * move
-        before = np.where((full == 1.0) & (share == 1.0), largest, 0.0)
-    return is_solved
-
-
 @dataclass(eq=False)
 class BatchMotion:
     """N moving stacks, as ``Motion``: ``step`` them, then read ``pressures``, ``tips``, ``times``.
 
-    ``state`` are freedoms (kinds, 3, N) and pressures (chambers, N); ``times`` (N,) in s; ``line``
-    feeds each chamber. Under a ``load`` the states are ``alone``, a motion each.
+    ``state`` are freedoms (rows, 3, N) of ``levels`` and pressures (chambers, N); ``times`` (N,) in
+    s; ``line`` feeds each chamber. Against an outer plate the states are ``alone``, a motion each.
     """
 
     batch: StackBatch
@@ -346,6 +303,7 @@ class BatchMotion:
     start: Pose
     state: _State
     times: Array
+    levels: Levels
     alone: list[Motion]
 
     @classmethod
@@ -353,28 +311,32 @@ class BatchMotion:
         cls, batch: StackBatch, line: Line, load: dict[str, Any], start: Pose, count: int
     ) -> BatchMotion:
         """Return ``count`` motions from a pose without load."""
-        stack, alone = batch.stack, []
-        if batch.is_loaded(load):
-            begin = stack.pose(start.pressures, **load)
-            alone = [Motion(stack, line, load, begin) for _ in range(count)]
-        shape = (len(batch.springs), 3, count), (stack.chambers, count)
+        stack, levels, alone = batch.stack, batch.levels, []
+        acting = batch.load(load)
+        if acting is not None:
+            start = stack.pose(start.pressures, **load)
+            levels = Levels.of(stack, acting)
+            if acting.wall is not None:
+                alone = [Motion(stack, line, load, start) for _ in range(count)]
+        shape = (len(levels.kinds), 3, count), (stack.chambers, count)
         state = _State(np.empty(shape[0]), np.empty(shape[1]))
-        motion = cls(
-            batch, line, load, alone[0].pose if alone else start, state, np.zeros(count), alone
-        )
+        motion = cls(batch, line, load, start, state, np.zeros(count), levels, alone)
         motion.restart(slice(None))
         return motion
 
     def restart(self, where: Any) -> None:
         """Put some of the states (a mask, their numbers or a slice) at the start, at 0 s."""
         self.times[where] = 0.0
-        self.state.freedoms[:, :, where] = self.start.freedoms[self.batch.stack.first_levels][
-            :, :, None
-        ]
+        self.state.freedoms[:, :, where] = self._rows(self.start)[:, :, None]
         self.state.pressures[:, where] = np.array(self.start.pressures)[:, None]
         if self.alone:
             for number in np.arange(len(self.times))[where].tolist():
                 self.alone[number] = Motion(self.batch.stack, self.line, self.load, self.start)
+
+    def _rows(self, pose: Pose) -> Array:
+        """Return the freedoms (rows, 3) of a pose."""
+        is_free = self.levels.load is None
+        return pose.freedoms[self.batch.stack.first_levels] if is_free else pose.freedoms
 
     @property
     def pressures(self) -> Array:
@@ -388,6 +350,8 @@ class BatchMotion:
         """Middles of the top plates in mm: (N, 3)."""
         if self.alone:
             return np.array([motion.pose.tip for motion in self.alone])
+        if self.levels.load is not None:
+            return self.levels.tips(self.state.freedoms)
         return self.batch.tips(self.state.freedoms)
 
     @property
@@ -396,15 +360,12 @@ class BatchMotion:
         if self.alone:
             return batch_of(self.pressures, [motion.pose for motion in self.alone])
         freedoms, pressures = self.state
-        volumes = sum(
-            count * springs.at(springs.weights(pressures, 2), at).volumes
-            for springs, count, at in zip(
-                self.batch.springs, self.batch.counts, freedoms, strict=True
-            )
-        )
-        return BatchPoses(
-            self.pressures, self.batch.every_level(freedoms), np.asarray(volumes).T, self.tips
-        )
+        volumes = self.levels.at(self.levels.weights(pressures, 2), freedoms).volumes
+        if self.levels.load is None:
+            each = self.batch.every_level(freedoms)
+        else:
+            each = freedoms.transpose(2, 0, 1)
+        return BatchPoses(self.pressures, each, volumes.T, self.tips)
 
     def step(self, dt: float, pressures: ArrayLike) -> None:
         """Move on by ``dt`` s with pressures (N, chambers) in kPa at the valves. Raises
@@ -424,13 +385,13 @@ class BatchMotion:
         is_solved = np.zeros(count, dtype=bool)
         ahead = _State(np.empty_like(self.state.freedoms), np.empty_like(self.state.pressures))
 
-        for part in _parts(count):
+        for part in _parts(count, CHUNK if self.levels.load is None else LOADED_CHUNK):
             state = self.state.at(part)
             is_solved[part], after = self._stepped(state, acts[part], sources[:, part])
             ahead.freedoms[:, :, part], ahead.pressures[:, part] = after
         for number in np.flatnonzero(~is_solved).tolist():
             pose = self._pose_after(number, dt, valves[number])
-            ahead.freedoms[:, :, number] = pose.freedoms[self.batch.stack.first_levels]
+            ahead.freedoms[:, :, number] = self._rows(pose)
             ahead.pressures[:, number] = pose.pressures
         self.state = ahead
         self.times += dt
@@ -439,9 +400,10 @@ class BatchMotion:
         """Return the pose of one state after a step, solved alone."""
         stack = self.batch.stack
         state = self.state.at(number)
-        like = self.batch.pose_like(state.freedoms[stack.levels])
-        begin = stack.pose(tuple(state.pressures.tolist()), near=like)
-        motion = Motion(stack, self.line, {}, begin, float(self.times[number]))
+        is_free = self.levels.load is None
+        like = stack.pose_like(state.freedoms[stack.levels] if is_free else state.freedoms)
+        begin = stack.pose(tuple(state.pressures.tolist()), near=like, **self.load)
+        motion = Motion(stack, self.line, self.load, begin, float(self.times[number]))
         return motion.step(dt, pressures=valves.tolist())
 
     def _stepped(
@@ -460,32 +422,31 @@ class BatchMotion:
         y = _place_of(p)
         contents = np.zeros(0)
         for number in range(MOTION_STEPS):
-            each = [
-                springs.at(springs.weights(p, 3), one)
-                for springs, one in zip(self.batch.springs, at, strict=True)
-            ]
+            now = self.levels.at(self.levels.weights(p, 3), at)
             if not number:
-                contents = self._volumes(each) * self._squeezed(p)
-            moves, dy = self._newton_step(
-                each, p, y, contents, acts, sources, 1 if number else ROUNDS
+                contents = self._volumes(now) * self._squeezed(p)
+            moves, dy, is_firm = self._newton_step(
+                now, p, y, contents, acts, sources, 1 if number else ROUNDS
             )
             share = np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(dy).max(0), 1e-12))
-            for move in moves:
-                share = np.minimum(share, _step_share(move))
+            share = np.minimum(share, step_share(moves))
             at = at + share * moves
             y = np.maximum(y + share * dy, 0.0)
             after = np.minimum(_pressure_at(y), most)
             change = np.abs(after - p) / (p + SCALE_PRESSURE)
             largest = np.stack([np.abs(moves).max((0, 1)), change.max(0)])
             p = after
-            still = (largest * largest < MOTION_ERRORS * before).all(0)
-            still |= (largest < MOTION_ERRORS).all(0)
-            if still.any():
+            still = (largest < MOTION_ERRORS).all(0)
+            if self.levels.load is None:
+                # Under a load the error falls linearly (``LOADED_STEP``).
+                still |= (largest * largest < MOTION_ERRORS * before).all(0)
+            still &= is_firm
+            rest = ~still & is_firm
+            if not rest.all():
                 which = live[still]
                 end.freedoms[:, :, which] = at[:, :, still]
                 end.pressures[:, which] = p[:, still]
                 is_solved[which] = self._fits(at[:, :, still], p[:, still])
-                rest = ~still
                 if not rest.any():
                     break
                 live, at, y, p = live[rest], at[:, :, rest], y[:, rest], p[:, rest]
@@ -497,18 +458,12 @@ class BatchMotion:
     def _fits(self, freedoms: Array, pressures: Array) -> NDArray[np.bool_]:
         """Return True (n) where no balloon is higher than its map, nor a pressure at its end."""
         fits = (pressures < self.batch.stack.most_pressure).all(0)
-        for springs, at in zip(self.batch.springs, freedoms, strict=True):
-            fits &= (self.batch.stack.centres.T @ at <= springs.kind.most_height).all(0)
-        return np.asarray(fits)
+        return np.asarray(fits & self.batch.fits(self.levels, freedoms))
 
-    def _volumes(self, each: Sequence[SpringBatch]) -> Array:
+    def _volumes(self, now: LevelsAt) -> Array:
         """Return the volumes of the chambers in ul, of a gas with its line: (chambers, n)."""
-        volumes = np.zeros_like(each[0].volumes)
-        if self.line.fluid.is_gas:
-            volumes += self.line.dead_volume + self.line.tube_volume
-        for count, springs in zip(self.batch.counts, each, strict=True):
-            volumes += count * springs.volumes
-        return volumes
+        more = self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
+        return now.volumes + more
 
     def _squeezed(self, pressures: Array) -> Array | float:
         """Return contents by volumes: a gas is counted at the atmosphere."""
@@ -516,35 +471,30 @@ class BatchMotion:
 
     def _newton_step(
         self,
-        each: Sequence[SpringBatch],
+        at: LevelsAt,
         p: Array,
         y: Array,
         contents: Array,
         acts: Array,
         sources: Array,
         rounds: int,
-    ) -> tuple[Array, Array]:
-        """Return the step of freedoms (kinds, 3, n) and of pressures (chambers, n).
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the step of freedoms (rows, 3, n) and of pressures (chambers, n), and True (n)
+        where the tangent stiffness is positive definite.
 
         With the freedoms' own steps put in, the volumes' rates by pressure are a matrix that is
         symmetric and positive definite.
         """
-        chambers, count = p.shape
-        matrix = np.zeros((chambers, chambers, count))
-        settled, parts = np.zeros_like(p), []
-        for number, springs in zip(self.batch.counts, each, strict=True):
-            pulls = np.concatenate(
-                [springs.filling.transpose(1, 0, 2), -springs.gradient[:, None]], axis=1
-            )
-            moved, _ = solved(springs.matrix, pulls)
-            filled = number * np.einsum("cin,ijn->cjn", springs.filling, moved)
-            matrix += filled[:, :-1]
-            settled += filled[:, -1]
-            np.einsum("iin->in", matrix)[:] += number * springs.swelling
-            parts.append(moved)
+        filling = at.filling.transpose(0, 2, 1, 3)
+        pulls = np.concatenate([filling, -at.gradient[:, :, None]], axis=2)
+        moved, is_firm = at.solved(pulls)
+        counts = self.levels.counts[:, None, None, None]
+        filled = np.einsum("ricn,rijn->cjn", counts * filling, moved)
+        matrix, settled = filled[:, :-1], filled[:, -1]
+        np.einsum("iin->in", matrix)[:] += at.swelling
         total = np.zeros_like(p)
         now, place, rate = p, y, _pressure_rate(p, y)
-        first_rate, volumes = rate, self._volumes(each) + settled
+        first_rate, volumes = rate, self._volumes(at) + settled
         ahead = volumes
         for number in range(rounds):
             if number:
@@ -560,8 +510,8 @@ class BatchMotion:
             wrong = ahead - (contents + acts * flow) / squeezed
             more = own / squeezed * (rate / first_rate)
             total = total + _free_step(matrix, more, -wrong, now <= 0)
-        moves = [moved[:, -1] + np.einsum("ijn,jn->in", moved[:, :-1], total) for moved in parts]
-        return np.stack(moves), total / first_rate
+        moves = moved[:, :, -1] + np.einsum("rijn,jn->rin", moved[:, :, :-1], total)
+        return moves, total / first_rate, is_firm
 
 
 def _place_of(pressures: Array) -> Array:
@@ -599,160 +549,3 @@ def _free_step(matrix: Array, more: Array, right: Array, at_end: NDArray[np.bool
         np.einsum("iin->in", reduced)[held] = 1.0
         step = solved(reduced, np.where(free, right, 0.0)[:, None])[0][:, 0]
     return step
-
-
-# Springs, a state a column.
-
-
-class SpringBatch(NamedTuple):
-    """Springs of n states of one kind of balloon: ``energy`` (n), ``gradient`` (3, n) and
-    ``matrix`` (3, 3, n) by rise and tilt; ``volumes`` (chambers, n), their rates by rise and tilt,
-    ``filling`` (chambers, 3, n), and by pressure, ``swelling`` (chambers, n).
-    """
-
-    energy: Array
-    gradient: Array
-    matrix: Array
-    volumes: Array
-    filling: Array
-    swelling: Array
-
-
-@dataclass(frozen=True, eq=False)
-class BatchSprings:
-    """Springs of one kind of balloon for many states at once, by pressures of their own.
-
-    As ``stack_loads.Springs`` with a state a column: numpy is the faster the longer its last axis.
-
-    ``table`` (powers, pieces, coefficients by pressure) are the pieces of its potential, a ring's
-    point's share of it; ``meet`` (points, 3), ``squares`` (9, points), ``shut`` (9, points) as of
-    ``GapPlaces``, ``tilts`` (chambers x 3, points) sum the ring's gaps by chamber.
-    """
-
-    kind: BalloonMap
-    table: Array
-    meet: Array
-    squares: Array
-    shut: Array
-    tilts: Array
-
-    @classmethod
-    def of(cls, stack: PosedStack, number: int) -> BatchSprings:
-        """Return the springs of a stack's kind of balloon."""
-        kind, places = stack.maps[number], stack.places
-        ring = places.ring[number]
-        tilts = np.zeros((stack.chambers, 3, len(ring)))
-        for chamber in range(stack.chambers):
-            part = slice(chamber * RING_POINTS, (chamber + 1) * RING_POINTS)
-            tilts[chamber, :, part] = ring[part].T
-        return cls(
-            kind,
-            np.ascontiguousarray(pieces(kind.coefficients).transpose(2, 1, 0) / RING_POINTS),
-            np.ascontiguousarray(places.meet[number].T),
-            np.ascontiguousarray(places.squares[number].T),
-            np.ascontiguousarray(places.shut[number].T),
-            tilts.reshape(-1, len(ring)),
-        )
-
-    def weights(self, pressures: Array, orders: int) -> Array:
-        """Return the splines' weights at pressures (chambers, n) of values and of derivatives by
-        pressure: (orders, coefficients, chambers, n).
-        """
-        x, rate = self.kind.scaled(pressures)
-        first = x.astype(np.int_)
-        powers = np.empty((DEGREE + 1, x.size))
-        powers[0] = 1.0
-        powers[1] = (x - first).ravel()
-        for k in range(2, DEGREE + 1):
-            np.multiply(powers[k - 1], powers[1], out=powers[k])
-        each = (BY_PRESSURE[:orders].reshape(-1, DEGREE + 1) @ powers).reshape(orders, -1, x.size)
-        if orders > 1:
-            rate = rate.ravel()
-            if orders > 2:
-                p = pressures.ravel()
-                each[2] *= rate * rate
-                each[2] -= each[1] * (rate * p / (p * p + self.kind.scale_pressure**2))
-            each[1] *= rate
-        whole = np.zeros((orders, PRESSURE_SPANS + DEGREE, x.size))
-        places = first.ravel() * x.size + np.arange(x.size)
-        where = places + (np.arange(DEGREE + 1) * x.size)[:, None]
-        for one, weights in zip(whole, each, strict=True):
-            one.reshape(-1)[where] = weights
-        return whole.reshape(orders, -1, *x.shape)
-
-    def at(self, weights: Array, freedoms: Array) -> SpringBatch:
-        """Return the springs at pressures of ``weights`` and freedoms (3, n)."""
-        orders, _, chambers, count = weights.shape
-        points = chambers * RING_POINTS
-        gaps = self.meet @ freedoms
-        after = gaps[:points] + 1.0
-        piece = np.minimum(np.maximum(after, 0.0), PIECES_IN_ALL - 1).astype(np.int_)
-        u = after - piece
-        low, high = int(piece.min()), int(piece.max()) + 1
-        size = chambers * count
-        part = self.table[:, low:high].reshape(-1, self.table.shape[2])
-        # (orders, powers, pieces x chambers x n)
-        rows = (part @ weights.reshape(orders, -1, size)).reshape(orders, DEGREE + 1, -1)
-        piece -= low
-        piece *= size
-        begin = piece.reshape(chambers, RING_POINTS, count)
-        begin += np.arange(chambers * count).reshape(chambers, 1, count)
-        value, ahead = np.empty((2, orders, points, count))
-        for one, table in zip(value, rows, strict=True):
-            table[DEGREE].take(piece, out=one, mode="clip")
-        first, second = np.zeros((min(orders, 2), points, count)), np.zeros_like(u)
-        for k in range(DEGREE - 1, -1, -1):
-            if k < DEGREE - 2:
-                second *= u
-            if k < DEGREE - 1:
-                second += first[0]
-                first *= u
-            first += value[:2]
-            for one, table in zip(ahead, rows, strict=True):
-                table[k].take(piece, out=one, mode="clip")
-            value *= u
-            value += ahead
-        energy = value[0].sum(0)
-        gradient = self.tilts.reshape(chambers, 3, points).sum(0) @ first[0]
-        matrix = self.squares @ (2 * second)
-        meets = gaps < 0
-        if meets.any():
-            stiffer = self.shut @ meets
-            push = (stiffer.reshape(3, 3, count) * freedoms).sum(1)
-            energy += (push * freedoms).sum(0) / 2
-            gradient += push
-            matrix += stiffer
-        sums = [-each.reshape(chambers, RING_POINTS, count).sum(1) for each in value[1:]]
-        none = np.zeros((chambers, 0))
-        return SpringBatch(
-            energy,
-            gradient,
-            matrix.reshape(3, 3, count),
-            sums[0] if orders > 1 else none,
-            (self.tilts @ -first[1]).reshape(chambers, 3, count) if orders > 1 else none,
-            sums[1] if orders > 2 else none,
-        )
-
-
-def solved(matrices: Array, right: Array) -> tuple[Array, Array]:
-    """Return the solutions (size, k, n) of symmetric matrices (size, size, n) by right sides (size,
-    k, n), and True (n) where a matrix is positive definite: others have no solution.
-    """
-    size = len(matrices)
-    a, b = matrices.copy(), right.copy()
-    least = LEAST_PIVOT * np.abs(np.einsum("iin->in", matrices)).max(0)
-    is_firm = np.ones(matrices.shape[2], dtype=bool)
-    inverse = []
-    for i in range(size):
-        fits = a[i, i] > least
-        is_firm &= fits
-        inverse.append(1 / np.where(fits, a[i, i], 1.0))
-        for j in range(i + 1, size):
-            share = a[j, i] * inverse[i]
-            a[j, i + 1 :] -= share * a[i, i + 1 :]
-            b[j] -= share * b[i]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            b[i] -= a[i, j] * b[j]
-        b[i] *= inverse[i]
-    return b, is_firm

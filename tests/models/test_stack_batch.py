@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import stack as stacks
+from sbafab.models.batch_balance import Levels
+from sbafab.models.least_energy import is_positive_definite
 from sbafab.models.pneumatics import AIR, WATER, Line
-from sbafab.models.stack import Stack
+from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_batch import StackBatch
+from sbafab.models.stack_loads import loaded_energy, with_diagonal_blocks
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +62,78 @@ def test_levels_of_unlike_balloons_turn_each_in_its_own_plane(three: Stack) -> N
         assert moving.tips[number] == pytest.approx(single.tip, abs=1e-3)
 
 
-def test_loaded_poses_are_the_single_ones(three: Stack) -> None:
-    pressures = drawn_pressures(3, 3)
-    batch = StackBatch(three).poses(pressures, tip_load=(0.0, 0.0, -0.005))
-    for row, tip in zip(pressures.tolist(), batch.tips, strict=True):
-        assert tip == pytest.approx(three.pose(row, tip_load=(0.0, 0.0, -0.005)).tip, abs=1e-6)
+LOADS: dict[str, dict[str, Any]] = {
+    "tip": {"tip_load": (0.002, 0.005, -0.005)},
+    "gravity": {"gravity": (0.3, 0.6, -1.0)},
+    "both": {"tip_load": (0.0, 0.005, -0.005), "gravity": True},
+    "plate": {"plate": Plate((0.0, 0.0, 12.0), sticks=False)},
+}
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_loaded_poses_are_the_single_ones(
+    three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sbafab.models.batch_balance.FEW", 0)
+    pressures = drawn_pressures(3, 4)
+    batch = StackBatch(three).poses(pressures, **LOADS[load])
+    near = batch if load == "plate" else StackBatch(three).poses(pressures + 0.1, **LOADS[load])
+    again = StackBatch(three).poses(pressures, near=near, **LOADS[load])
+    for number, row in enumerate(pressures.tolist()):
+        pose = three.pose(row, **LOADS[load])
+        for poses in (batch, again):
+            assert poses.tips[number] == pytest.approx(pose.tip, abs=1e-6)
+            assert poses.freedoms[number] == pytest.approx(pose.freedoms, abs=1e-6)
+            assert poses.volumes[number] == pytest.approx(pose.volumes, abs=1e-5)
+
+
+def test_levels_under_a_load_are_solved_together(three: Stack) -> None:
+    """Energy, gradient and solutions beside the dense matrix of one state at a time, of two kinds
+    of balloons, away from equilibrium.
+    """
+    kinds = (three.maps[0], three.maps[0].stiffened(2.0))
+    mixed = replace(three, maps=kinds, levels=np.array([0, 1, 1, 0]))
+    load = StackBatch(mixed).load(LOADS["both"])
+    assert load is not None
+    levels, numbers = Levels.of(mixed, load), np.random.default_rng(5)
+    pressures = numbers.uniform(1.0, 9.0, (3, 2))
+    freedoms = numbers.uniform([[0.6], [-0.03], [-0.03]], [[1.0], [0.03], [0.03]], (4, 3, 2))
+    right = numbers.normal(size=(4, 3, 2, 2))
+    now = levels.at(levels.weights(pressures, 3), freedoms)
+    moves, is_firm = now.solved(right)
+    for state in range(2):
+        springs = mixed.each(mixed.springs(pressures[:, state].tolist()))
+        one = loaded_energy(springs, mixed.pitch, load, freedoms[..., state])
+        matrix = with_diagonal_blocks(one.rest(), one.blocks)
+        assert now.energy[state] == pytest.approx(one.value, rel=1e-9)
+        assert now.gradient[..., state].ravel() == pytest.approx(one.gradient, abs=1e-7)
+        solution = np.linalg.solve(matrix, right[..., state].reshape(12, 2))
+        assert moves[..., state].reshape(12, 2) == pytest.approx(solution, rel=1e-6, abs=1e-12)
+        assert is_firm[state] == is_positive_definite(matrix)
+    # A pull upwards that no film withstands.
+    soft = now._replace(blocks=now.blocks - 1e6 * np.eye(3)[:, :, None])
+    assert not soft.solved(right)[1].any()
+
+
+@pytest.mark.parametrize("load", ["tip", "gravity"])
+def test_loaded_motions_are_the_single_ones(
+    three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stacks, "TOLERANCE", 1e-7)
+    short = replace(three, levels=three.levels[:5])
+    moving = StackBatch(short).motion(2, **LOADS[load])
+    singles = [short.motion(**LOADS[load]) for _ in range(2)]
+    for valves in ([[8.0, 2.0, 0.0], [3.0, 3.0, 5.0]], [[1.0, 6.0, 2.0], [0.0, 0.0, 0.0]]):
+        moving.step(0.02, valves)
+        for single, row in zip(singles, valves, strict=True):
+            single.step(0.02, pressures=row)
+        assert moving.tips == pytest.approx(np.array([s.pose.tip for s in singles]), abs=2e-5)
+        pressures = np.array([single.pressures for single in singles])
+        assert moving.pressures == pytest.approx(pressures, rel=2e-5, abs=1e-6)
+    freedoms = np.array([single.pose.freedoms for single in singles])
+    assert moving.poses.freedoms == pytest.approx(freedoms, abs=2e-5)
+    moving.restart([0])
+    assert moving.tips[0] == pytest.approx(short.pose((0, 0, 0), **LOADS[load]).tip, abs=1e-6)
 
 
 @pytest.mark.parametrize("line", [Line(AIR, delay=0.03), Line(WATER)])
@@ -86,14 +157,16 @@ def test_motions_are_the_single_ones(
     assert moving.poses.volumes == pytest.approx(volumes, abs=0.01)
 
 
+@pytest.mark.parametrize("load", [{}, {"tip_load": (0.0, 0.0, -0.002)}])
 def test_a_state_that_takes_many_steps_is_solved_alone(
-    three: Stack, monkeypatch: pytest.MonkeyPatch
+    three: Stack, load: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sbafab.models.stack_batch.POSE_STEPS", 1)
+    monkeypatch.setattr("sbafab.models.batch_balance.POSE_STEPS", 1)
     monkeypatch.setattr("sbafab.models.stack_batch.MOTION_STEPS", 1)
     batch = StackBatch(three)
-    assert batch.poses([[5.0, 1.0, 0.0]]).tips[0] == pytest.approx(three.pose((5, 1, 0)).tip)
-    moving, single = batch.motion(1), three.motion()
+    tip = batch.poses([[5.0, 1.0, 0.0]], **load).tips[0]
+    assert tip == pytest.approx(three.pose((5, 1, 0), **load).tip)
+    moving, single = batch.motion(1, **load), three.motion(**load)
     moving.step(0.02, [[5.0, 1.0, 0.0]])
     assert moving.tips[0] == pytest.approx(single.step(0.02, (5, 1, 0)).tip)
 
