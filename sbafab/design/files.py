@@ -5,14 +5,15 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
@@ -41,6 +42,7 @@ def sentence(
     record: type[BaseModel],
     families: Mapping[str, type[BaseModel]],
     prefix: str,
+    file: str = "design file",
 ) -> str:
     problems = error.errors(include_url=False)
     unknown = [problem for problem in problems if problem["type"] == "extra_forbidden"]
@@ -52,12 +54,12 @@ def sentence(
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
     if first["type"] == "extra_forbidden":
-        return prefix + _unknown_key(where, record, families) + more
+        return prefix + _unknown_key(where, record, families, file) + more
     if first["type"] == "missing" and isinstance(first["loc"][-1], int):
         short = ".".join(where[:-1])
         return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
     if first["type"] == "missing":
-        return f"{field} is missing; add it to the design file{more}"
+        return f"{field} is missing; add it to the {file}{more}"
     if not where:
         return f"{field} {_allowed(first)}{more}"
     return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
@@ -115,7 +117,10 @@ def _allowed(problem: Any) -> str:
 
 
 def _unknown_key(
-    where: Sequence[str], record: type[BaseModel], families: Mapping[str, type[BaseModel]]
+    where: Sequence[str],
+    record: type[BaseModel],
+    families: Mapping[str, type[BaseModel]],
+    file: str,
 ) -> str:
     field = ".".join(where)
     families_with_key = [name for name, model in families.items() if field in key_paths(model)]
@@ -124,15 +129,17 @@ def _unknown_key(
     if where[-2:-1] == ["faces"]:
         return f"{field} is not a key of a film's faces; they are upper and lower"
     paths = key_paths(record)
-    siblings = [path for path in paths if path.split(".")[:-1] == list(where[:-1])]
+    table = ".".join(where[:-1])
+    own = next(_tables_at(record, where[:-1]), None)
+    siblings = [f"{table}.{key}".lstrip(".") for key in _keys(own)] if own else []
     near = _nearest(where[-1], siblings, 0.6)
     # A key cut short is one of its own table, not one of another that is spelled alike.
     if near is None and not any(path.startswith(field) for path in siblings):
         near = _nearest(where[-1], paths, 0.75)
     if near:
-        return f"{field} is not a key of a design file; did you mean {near}?"
+        return f"{field} is not a key of a {file}; did you mean {near}?"
     known = f"; known here: {', '.join(siblings)}" if siblings else ""
-    return f"{field} is not a key of a design file{known}"
+    return f"{field} is not a key of a {file}{known}"
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
@@ -142,11 +149,33 @@ def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
     return leaves[near[0]] if near else None
 
 
+def _keys(record: type[BaseModel]) -> dict[str, FieldInfo]:
+    """Return the keys of a table, as a file spells them."""
+    return {info.alias or name: info for name, info in record.model_fields.items()}
+
+
+def _tables_at(kind: Any, where: Sequence[str]) -> Iterator[type[BaseModel]]:
+    """Yield the records of the table at a place, past rows of lists and names that a user gave."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        keys = _keys(kind)
+        if not where:
+            yield kind
+        elif where[0] in keys:
+            yield from _tables_at(keys[where[0]].annotation, where[1:])
+        elif kind.model_config.get("extra") == "allow":
+            # Tables that a user names, such as further films.
+            yield from _tables_at(get_type_hints(kind)["__pydantic_extra__"], where)
+        return
+    # A list and a table of tables take a part of the place; alternatives take none.
+    takes = isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Collection)
+    for inner in get_args(kind):
+        yield from _tables_at(inner, where[1:] if takes else where)
+
+
 def key_paths(record: type[BaseModel], prefix: str = "") -> dict[str, object]:
     """Return every dotted key of a record, as a file spells it, with its annotation."""
     paths: dict[str, object] = {}
-    for name, info in record.model_fields.items():
-        key = info.alias or name
+    for key, info in _keys(record).items():
         paths[prefix + key] = info.annotation
         if isinstance(info.annotation, type) and issubclass(info.annotation, BaseModel):
             paths.update(key_paths(info.annotation, f"{prefix}{key}."))
@@ -375,12 +404,16 @@ def checked(
     data: Mapping[str, Any],
     families: Mapping[str, type[BaseModel]],
     prefix: str = "",
+    file: str = "design file",
 ) -> AnyRecord:
-    """The record of a table; ``prefix`` leads to it. Raises DesignError with one sentence."""
+    """The record of a table; ``prefix`` leads to it, in a ``file`` of this kind.
+
+    Raises DesignError with one sentence.
+    """
     try:
         return record.model_validate(data)
     except ValidationError as error:
-        raise DesignError(sentence(error, record, families, prefix)) from None
+        raise DesignError(sentence(error, record, families, prefix, file)) from None
 
 
 # Designs out: resolved TOML, design hash, JSON schema.

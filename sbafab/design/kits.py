@@ -172,10 +172,9 @@ def _kit(tables: Mapping[str, Any], path: Path, contents: bytes) -> Kit:
         if name in _table(plain, section):
             raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
     try:
-        record = checked(KitFile, plain, {})
+        record = checked(KitFile, plain, {}, file="kit")
     except DesignError as error:
-        message = str(error).replace("a design file", "a kit").replace("the design file", "the kit")
-        raise DesignError(f"{path}: {message}") from None
+        raise DesignError(f"{path}: {error}") from None
     text = json.dumps(tables, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return Kit(
         name=record.name,

@@ -116,7 +116,7 @@ def read_stock(path: Path) -> StockFile:
     """Return a stock file. Raises DesignError with one sentence where it cannot be read."""
     if not path.exists():
         raise DesignError(f"there is no stock file {path}; write one, as docs/cutting.md shows")
-    stock = checked(StockFile, read_toml(path), {}, f"{path.name}: ")
+    stock = checked(StockFile, read_toml(path), {}, f"{path.name}: ", "stock file")
     names = [piece.id for piece in stock.piece]
     repeated = next((name for name in names if names.count(name) > 1), None)
     if repeated is not None:

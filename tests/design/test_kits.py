@@ -210,6 +210,16 @@ BAD = {
         "cuting_error =",
         r"registration.cuting_error is not a key of a kit; did you mean .*cutting_error\?",
     ),
+    "unknown key in a list": (
+        "[rules]",
+        '[[laser.recipe]]\npowr_percent = { value = 3, source = "x" }\n[rules]',
+        r"laser.recipe.0.powr_percent is not a key of a kit; did you mean .*0.power_percent\?",
+    ),
+    "unknown key of a tube": (
+        "outer_diameter =",
+        "outr_diameter =",
+        r"outr_diameter is not a key of a kit; did you mean tubes\.Brain.*\.outer_diameter\?",
+    ),
     "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive is a design's to say"),
     "no version": ('version = "1"\n', "", r"version is missing; add it to the kit"),
     "another schema": ("kit@1", "kit@9", r"schema = 'sbafab/kit@9' must be 'sbafab/kit@1'"),

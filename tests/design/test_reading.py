@@ -60,6 +60,7 @@ def test_not_a_length(text: object) -> None:
         (["stack.ballons=5"], "did you mean stack.balloons?"),
         (["balloons=5"], "did you mean stack.balloons?"),
         (["films.tpe.xyzzy=1"], "known here: films.tpe.product"),
+        (["films.tpu.melting_pont=9"], "did you mean films.tpu.melting_point?"),
         (["tube.outer_diameter=15"], 'it belongs to "radial"'),
         (["chamber.diameter=-5"], "chamber.diameter = -5 must be at least 0.001 mm"),
         (["chamber.diameter=2000"], "must be at most 1000 mm"),

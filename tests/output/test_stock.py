@@ -141,7 +141,8 @@ def test_the_largest_rectangle_is_the_largest_by_exhaustion() -> None:
         ([PIECES[0], PIECES[0]], (), "two pieces with id 'full'"),
         (PIECES, ("sheets.tpe.roll=true",), r"sheets\.tpe\.roll does not go with sheets\.stock"),
         ([{**PIECES[0], "width": -1}], (), "width"),
-        ([{**PIECES[0], "colour": "red"}], (), "colour"),
+        ([{**PIECES[0], "colour": "red"}], (), "colour is not a key of a stock file; known here"),
+        ([{**PIECES[0], "lenght": 9}], (), "did you mean piece.0.length?"),
     ],
 )
 def test_faults_of_a_stock_file_are_a_sentence(
