@@ -261,6 +261,8 @@ def _share(
         partners[i].append(j)
         partners[j].append(i)
     new = {i: points for i, points in enumerate(cuts) if points}
+    # Edges of a grid of channels run along hundreds of others.
+    known = {i: set(points) for i, points in new.items()}
     while new:
         shared: dict[int, list[Point]] = defaultdict(list)
         for i, points in new.items():
@@ -269,7 +271,8 @@ def _share(
                 for p in points:
                     if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
                         continue
-                    if p not in cuts[j] and distance_to(edges[j], p) < tolerance:
+                    if p not in known[j] and distance_to(edges[j], p) < tolerance:
+                        known[j].add(p)
                         cuts[j].append(p)
                         shared[j].append(p)
         new = shared
