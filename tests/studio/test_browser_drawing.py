@@ -66,10 +66,14 @@ class Sketch:
         )
         return left, top
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Drags what lies at one place to another one."""
+    def drag(self, start: tuple[float, float], end: tuple[float, float], key: str = "") -> None:
+        """Drags what lies at one place to another one, with a key held down when it is taken."""
         self.page.mouse.move(*self.pixel(*start))
+        if key:
+            self.page.keyboard.down(key)
         self.page.mouse.down()
+        if key:
+            self.page.keyboard.up(key)
         self.page.mouse.move(*self.pixel(*end), steps=6)
         self.page.mouse.up()
 
@@ -82,6 +86,11 @@ class Sketch:
         """Likewise, with the text a step of the history."""
         self.seen.until("studio.history[studio.place] === studio.text")
         return self.shapes()
+
+    def table(self) -> Any:
+        """All tables of the text, a step of the history."""
+        self.settled()
+        return tomllib.loads(self.seen.say("studio.text"))
 
     def type(self, label: str, value: str) -> None:
         field = self.page.get_by_label(label, exact=True)
@@ -308,3 +317,62 @@ def test_seams_folds_and_ports_are_edited_in_forms(sketch: Sketch) -> None:
     sketch.settled()
     assert "ports" not in tomllib.loads(sketch.seen.say("studio.text"))
     assert sketch.seen.say("studio.error") is None
+
+
+def test_points_of_seams_and_folds_and_ports_are_dragged_and_undone(sketch: Sketch) -> None:
+    text = api.template("folded") + '\n[[ports]]\nname = "middle"\nlayers = [1, 2]\nat = [0, 1]\n'
+    sketch.page.evaluate("text => studio.open(text)", text)
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    before = sketch.table()
+    (x, y), *rest = before["seams"][0]["path"]
+    # Off the grid of 0.5 mm, on which the point lands; all else of the file stays.
+    sketch.drag((x, y), (x + 0.6, y + 0.9))
+    after = sketch.table()
+    assert after["seams"][0]["path"] == [[x + 0.5, y + 1], *rest]
+    assert {**after, "seams": before["seams"]} == before
+    # Its other end stays as it is in the form, whose field has the new place.
+    field = sketch.page.get_by_label("seam 1: Path: x y [bulge]; …, mm")
+    assert field.input_value().startswith(f"{x + 0.5:g} {y + 1:g}; ")
+    sketch.page.locator("#view-draw .surface").focus()
+    sketch.page.keyboard.press("Control+z")
+    sketch.seen.until(f"studio.values.seams[0].path[0][0] === {x}")
+    assert sketch.table() == before
+    # A port snaps to the end of a seam, though the hand is beside it.
+    sketch.drag((0, 1), (x + 0.2, y - 0.1))
+    assert sketch.table()["ports"][0]["at"] == [x, y]
+    # A point of a fold lies straight from its other one: 0 degrees, not the grid.
+    sketch.page.get_by_label("Grid", exact=True).uncheck()
+    sketch.page.get_by_label("Points", exact=True).uncheck()
+    sketch.page.get_by_label("Edges", exact=True).uncheck()
+    (u, v), (_, w) = sketch.table()["folds"][0]["line"]
+    assert v == w
+    sketch.drag((u, v), (u - 3.37, v + 0.05))
+    (moved, level), _ = sketch.table()["folds"][0]["line"]
+    assert level == pytest.approx(v, abs=1e-6)
+    assert moved == pytest.approx(u - 3.37, abs=0.2)
+
+
+def test_shift_takes_a_seams_point_that_lies_on_a_shapes(sketch: Sketch) -> None:
+    sketch.page.evaluate("text => studio.open(text)", api.template("folded"))
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    before = sketch.table()
+    place = tuple(before["seams"][0]["path"][1])
+    assert list(place) in before["shapes"]["middle"]["polygon"]
+    sketch.drag(place, (-17, 10), "Shift")
+    after = sketch.table()
+    assert (after["seams"][0]["path"][1], after["shapes"]) == ([-17, 10], before["shapes"])
+    sketch.drag(place, (-17.5, 11))
+    assert [-17.5, 11] in sketch.table()["shapes"]["middle"]["polygon"]
+
+
+def test_an_arc_of_a_seam_keeps_its_bulge_when_its_point_is_dragged(sketch: Sketch) -> None:
+    text = api.template("folded")
+    path = tomllib.loads(text)["seams"][0]["path"]
+    bent = f"[[{path[0][0]}, {path[0][1]}, 0.25], [{path[1][0]}, {path[1][1]}]]"
+    key = "seams.0.path"
+    sketch.page.evaluate("text => studio.open(text)", text)
+    sketch.seen.until("studio.laminate?.name === 'folded'")
+    sketch.page.evaluate("([key, value]) => studio.edit([[key, value]])", [key, bent])
+    sketch.seen.until("studio.values.seams[0].path[0][2] === 0.25")
+    sketch.drag(tuple(path[0]), (path[0][0] + 1, path[0][1]))
+    assert sketch.table()["seams"][0]["path"][0] == [path[0][0] + 1, path[0][1], 0.25]

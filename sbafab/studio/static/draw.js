@@ -10,7 +10,7 @@ import { NewShape } from "./new_shape.js";
 const GRIDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 5];
 // Pixels within which a handle is taken, and a place snaps.
 const NEAR = 9, SNAP = 6;
-const HELP = "On the drawing: N and P step through the points, arrows move the point by the grid (with Shift ten times as far), I adds one, A bends or straightens the edge after it, Delete takes it out, Escape lets go. Alt while dragging does not snap.";
+const HELP = "On the drawing: N and P step through the points, arrows move the point by the grid (with Shift ten times as far), I adds one, A bends or straightens the edge after it, Delete takes it out, Escape lets go. Alt while dragging does not snap; Shift takes a point of a seam, fold or port where one of the shape lies on it.";
 
 export class Draw {
   title = "Draw";
@@ -43,7 +43,7 @@ export class Draw {
     this.surface.addEventListener("click", (event) => { if (!this.sketching && this.eye.dragged <= 3) this.chooseUnder(event); });
     studio.on("design", () => this.load());
     studio.on("shapes", (named) => this.heard(named));
-    studio.on("opened", () => { this.eye.touched = false; Object.assign(this, { name: null, shapes: null, shape: null, corner: null, sketching: null, mark: null }); this.fresh.close(); });
+    studio.on("opened", () => { this.eye.touched = false; Object.assign(this, { name: null, shapes: null, shape: null, corner: null, sketching: null, mark: null }); this.joints.moved = {}; this.fresh.close(); });
     studio.on("laminate", () => { if (studio.laminate) this.eye.bounds(studio.laminate.bounds, this.margin); });
     studio.on("laminate checked failed theme pick", () => this.draw());
     studio.on("design failed laminate", () => this.warn());
@@ -57,6 +57,7 @@ export class Draw {
   // The file's shapes, unless the hand is quicker than the answers.
   load() {
     if (!this.present || this.dragging || [...this.studio.pending.keys()].some((key) => key.startsWith("shapes."))) return;
+    this.joints.heard();
     this.shapes = this.studio.values.shapes;
     this.layers = this.studio.values.layers;
     const names = Object.keys(this.shapes);
@@ -99,21 +100,21 @@ export class Draw {
     this.fill();
     this.draw();
   }
-  // What the chosen shape does not carry along is there to snap to.
-  snapTargets() {
-    if (!this.targets) {
-      const moving = dependents(this.shapes, this.name);
+  // What the chosen shape does not carry along is there to snap to; all shapes where none moves.
+  snapTargets(all = false) {
+    if (!this.targets || this.targets.all !== all) {
+      const moving = all ? new Set() : dependents(this.shapes, this.name);
       const still = [...this.named].filter(([name]) => !moving.has(name)).map(([name, contours]) => ({ words: name, contours }));
       const { points, lines } = targetsOf(still);
       points.push({ p: [0, 0], words: "origin" });
       for (const { name, centres, mouth } of this.studio.values?.chambers ?? []) points.push(...(centres ?? []).map((p) => ({ p, words: `centre of ${name}` })), ...(mouth ? [{ p: mouth, words: `mouth of ${name}` }] : []));
-      this.targets = { points, lines };
+      this.targets = { points, lines, all };
     }
     return this.targets;
   }
-  snapAt(p, event, neighbours, others = []) {
+  snapAt(p, event, neighbours, others = [], all = false) {
     if (event.altKey) return { p, words: "" };
-    const { points, lines } = this.snapTargets(), on = (name) => this.snaps[name].box.checked;
+    const { points, lines } = this.snapTargets(all), on = (name) => this.snaps[name].box.checked;
     return snapped(p, { reach: SNAP / this.eye.scale, points: on("points") ? [...points, ...others] : [], lines: on("edges") ? lines : [], guides: on("angles") ? guidesThrough(neighbours, true) : [], grid: on("grid") ? Number(this.grid.value) : 0 });
   }
   neighbours(i) {
@@ -138,9 +139,9 @@ export class Draw {
   place(event) { const box = this.surface.getBoundingClientRect(); return this.eye.at(event.clientX - box.left, event.clientY - box.top); }
   under(event) {
     const [x, y] = this.place(event), reach = (event.pointerType === "touch" ? 2.2 : 1) * NEAR / this.eye.scale;
-    const near = handles(this.shape ?? {}).map((handle) => ({ handle, away: Math.hypot(handle.p[0] - x, handle.p[1] - y) })).filter(({ away }) => away <= reach);
-    // A point lies over the middle of an edge.
-    near.sort((a, b) => (a.handle.edge !== undefined) - (b.handle.edge !== undefined) || a.away - b.away);
+    const near = [...handles(this.shape ?? {}), ...this.joints.handles()].map((handle) => ({ handle, away: Math.hypot(handle.p[0] - x, handle.p[1] - y) })).filter(({ away }) => away <= reach);
+    // A point lies over the middle of an edge; of a shape's and a seam's in one place Shift takes the seam's.
+    near.sort((a, b) => (event.shiftKey ? !a.handle.joint - !b.handle.joint : 0) || (a.handle.edge !== undefined) - (b.handle.edge !== undefined) || a.away - b.away);
     if (near.length) return { handle: near[0].handle };
     const all = edges(outline(this.shape ?? {})).map((edge, i) => { const [px, py, share] = nearestOn(edge, x, y); return { edge: i, share, away: Math.hypot(px - x, py - y) }; }).filter(({ away }) => away <= reach * 0.7).sort((a, b) => a.away - b.away);
     return all[0] ?? null;
@@ -178,6 +179,12 @@ export class Draw {
   }
   drag(handle, start, event) {
     const p = this.place(event);
+    if (handle.joint) {
+      this.snap = this.snapAt(p, event, handle.beside, this.joints.handles().filter(({ id }) => id !== handle.id), true);
+      handle.move(this.snap.p);
+      this.words(this.snap.p, [handle.words, this.snap.words].filter(Boolean).join(" · "));
+      return;
+    }
     if (handle.edge !== undefined) {
       const edge = edges(outline(start))[handle.edge], chord = Math.hypot(edge.x1 - edge.x0, edge.y1 - edge.y0);
       const raw = bulgeThrough(edge, p), { b, words } = event.altKey ? { b: raw, words: "" } : snappedBulge(start, handle.edge, raw, (2 * NEAR) / this.eye.scale / chord);
@@ -200,7 +207,7 @@ export class Draw {
     if (!hit && !this.sketching) return;
     event.stopPropagation();
     event.preventDefault();
-    if (hit && hasCorners(this.shape) && hit.handle?.corner === undefined) this.addPoint(hit.edge ?? hit.handle.edge, hit.share ?? 0.5);
+    if (hit && hasCorners(this.shape) && hit.handle?.corner === undefined && !hit.handle?.joint) this.addPoint(hit.edge ?? hit.handle.edge, hit.share ?? 0.5);
   }
   chooseUnder(event) {
     const [x, y] = this.place(event), reach = NEAR / this.eye.scale;
@@ -378,7 +385,8 @@ export class Draw {
     }
     const drawn = handles(this.shape ?? {}).length ? outline(this.shape) : this.named.get(this.name) ?? [];
     if (!this.sketching) world.append(el("path", { id: "drawn-shape", d: pathOf(drawn), fill: "var(--accent)", "fill-opacity": 0.1, stroke: "var(--accent)", "stroke-width": 2, ...line }));
-    this.svg.replaceChildren(el("g", {}, ...this.gridLines()), world, ...this.axes(), ...this.labels(drawn), ...this.handleMarks(), ...this.findingMarks(), ...this.sketchMarks(), ...this.snapMark(), ...this.errorMark(), ...this.scaleBar());
+    world.append(...this.joints.lines());
+    this.svg.replaceChildren(el("g", {}, ...this.gridLines()), world, ...this.axes(), ...this.labels(drawn), ...this.handleMarks(), ...(this.sketching ? [] : this.joints.marks()), ...this.findingMarks(), ...this.sketchMarks(), ...this.snapMark(), ...this.errorMark(), ...this.scaleBar());
     this.svg.setAttribute("aria-label", `${this.name}: ${KINDS[kindOf(this.shape)] ?? ""}, ${corners(this.shape ?? {}).length} points`);
   }
   gridLines() {

@@ -1,6 +1,7 @@
-// Forms beside the drawing: the name of a shape, and the seams, folds and ports of drawn layers.
+// Seams, folds and ports of drawn layers: their points on the drawing, their forms beside it; and the name of a shape.
 import { el } from "./dom.js";
-import { kindOf, literal, parts, tableLiteral, writes } from "./sketch.js";
+import { openPathOf } from "./shapes.js";
+import { inward, kindOf, literal, parts, tableLiteral, writes } from "./sketch.js";
 
 const NAME = /^[a-z][a-z0-9_-]{0,31}$/;
 const TOOLS = ["laser", "hot-tip", "ultrasonic", "roller"];
@@ -17,10 +18,51 @@ const KINDS = {
   ports: { title: "Ports", one: "port", columns: [name, layers, ["at", "Place: x y, mm", (p) => p.join(" "), (text) => numbers(text, 2, 2)], ["kind", "Kind", ["place", "hole"]]], fresh: (id, p) => ({ name: id, layers: [1, 2], at: p }) },
 };
 
+// The key of each kind that holds its points.
+const POINTS = { seams: "path", folds: "line", ports: "at" };
+
 export class JointsForm {
-  constructor(draw) { this.draw = draw; }
+  // `moved`: rows as the hand has them, until the file's values have caught up.
+  constructor(draw) { Object.assign(this, { draw, moved: {} }); }
   // What the file says, without what it leaves to defaults.
-  rows(kind) { return (this.draw.studio.values[kind] ?? []).map((row) => Object.fromEntries(Object.entries(row).filter(([, value]) => value !== null && value !== false))); }
+  rows(kind) { return (this.moved[kind] ?? this.draw.studio.values?.[kind] ?? []).map((row) => Object.fromEntries(Object.entries(row).filter(([, value]) => value !== null && value !== false))); }
+  heard() { for (const kind of Object.keys(this.moved)) if (![...this.draw.studio.pending.keys()].some((key) => key.startsWith(`${kind}.`))) delete this.moved[kind]; }
+  // What can be dragged, as handles of shapes are; a seam along a shape's boundary goes with the shape.
+  handles() {
+    return Object.entries(POINTS).flatMap(([kind, key]) => this.rows(kind).flatMap((row, i) => {
+      if (!row[key]) return [];
+      const list = kind === "ports" ? [row.at] : row[key], title = row.name ?? `${KINDS[kind].one} ${i + 1}`;
+      const words = (j) => (kind === "ports" ? `port ${title}` : `${title}, point ${j + 1}`);
+      return list.map((p, j) => ({
+        id: `${kind}-${i}-${j}`, joint: kind, words: words(j), p: p.slice(0, 2),
+        beside: [j - 1, j + 1].filter((n) => list[n]).map((n) => [list[n][0], list[n][1], words(n)]),
+        move: (to) => { const next = [...inward({}, to), ...p.slice(2)]; this.moveTo(kind, i, key, kind === "ports" ? next : row[key].with(j, next)); },
+      }));
+    }));
+  }
+  moveTo(kind, i, key, value) {
+    const { draw } = this, rows = this.rows(kind);
+    if (JSON.stringify(rows[i][key]) === JSON.stringify(value)) return;
+    this.moved[kind] = rows.with(i, { ...rows[i], [key]: value });
+    // The plan stays where it is under the hand.
+    draw.eye.touched = true;
+    draw.studio.edit([[`${kind}.${i}.${key}`, literal(value)]]);
+    draw.fill();
+    draw.draw();
+  }
+  // Seams as wide as they are made, and the lines of folds, in mm.
+  lines() {
+    const seams = this.rows("seams").filter(({ path }) => path).map(({ path, width }) => el("path", { d: openPathOf(path), fill: "none", stroke: "var(--select)", "stroke-opacity": 0.22, "stroke-width": width, class: "joint-seam" }));
+    const folds = this.rows("folds").map(({ line }) => el("path", { d: openPathOf(line), fill: "none", stroke: "var(--select)", "stroke-width": 1.4, "stroke-dasharray": "7 4", "vector-effect": "non-scaling-stroke", class: "joint-fold" }));
+    return [...seams, ...folds];
+  }
+  // Ports are rings, points of seams and folds turned squares.
+  marks() {
+    return this.handles().map(({ id, joint, p }) => {
+      const [x, y] = this.draw.eye.px(...p), common = { "data-handle": id, stroke: "var(--select)", "stroke-width": 1.6, fill: "var(--canvas)" };
+      return joint === "ports" ? el("circle", { cx: x, cy: y, r: 5, ...common }) : el("path", { d: `M${x - 5} ${y}L${x} ${y - 5}L${x + 5} ${y}L${x} ${y + 5}Z`, ...common });
+    });
+  }
   write(kind, rows) { this.draw.studio.edit([[kind, rows.length ? `[\n${rows.map((row) => `  ${tableLiteral(row)},\n`).join("")}]` : null]]); }
   text(id, label, value, read, send) {
     const input = el("input", { type: "text", "aria-label": label, value, "data-field": id, maxlength: 20000 });

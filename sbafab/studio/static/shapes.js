@@ -1,21 +1,23 @@
 // Shapes: contours of x, y, bulge. An arc stays an arc in a path and in a section.
 
-// Path data in mm, y up.
+// Path data in mm, y up: of closed contours, and of points in a row with the bulges of the edges between them.
+function along(c, count) {
+  const n = c.length / 3;
+  let d = `M${c[0]} ${c[1]}`;
+  for (let i = 0; i < count; i++) {
+    const j = ((i + 1) % n) * 3, b = c[i * 3 + 2];
+    if (b === 0) d += `L${c[j]} ${c[j + 1]}`;
+    else {
+      const r = radius(c[i * 3], c[i * 3 + 1], c[j], c[j + 1], b);
+      d += `A${r} ${r} 0 ${Math.abs(b) > 1 ? 1 : 0} ${b > 0 ? 1 : 0} ${c[j]} ${c[j + 1]}`;
+    }
+  }
+  return d;
+}
+export function openPathOf(points) { return along(points.flatMap(([x, y, b = 0]) => [x, y, b]), points.length - 1); }
 export function pathOf(shape) {
   let d = "";
-  for (const c of shape) {
-    const n = c.length / 3;
-    d += `M${c[0]} ${c[1]}`;
-    for (let i = 0; i < n; i++) {
-      const j = ((i + 1) % n) * 3, b = c[i * 3 + 2];
-      if (b === 0) d += `L${c[j]} ${c[j + 1]}`;
-      else {
-        const r = radius(c[i * 3], c[i * 3 + 1], c[j], c[j + 1], b);
-        d += `A${r} ${r} 0 ${Math.abs(b) > 1 ? 1 : 0} ${b > 0 ? 1 : 0} ${c[j]} ${c[j + 1]}`;
-      }
-    }
-    d += "Z";
-  }
+  for (const c of shape) d += `${along(c, c.length / 3)}Z`;
   return d;
 }
 const radius = (x0, y0, x1, y1, b) => Math.hypot(x1 - x0, y1 - y0) * (1 + b * b) / (4 * Math.abs(b));
