@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from sbafab.design.files import listed, shown
-from sbafab.design.outline import closed_loops, content, refuse_crossings, traced
+from sbafab.design.outline import closed_loops, content, crossing, refuse_crossings, traced
 from sbafab.design.strands import MOST_OF_ENTITY, Strand, counted, is_closed, sealed
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
@@ -62,13 +62,12 @@ def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
 
 
 def _refuse_meetings(loops: list[Strand]) -> None:
-    try:
-        refuse_crossings(tuple(edge for loop in loops for edge in loop))
-    except DesignError as error:
-        place = str(error).partition(" at ")[2].partition(";")[0]
+    p = crossing(tuple(edge for loop in loops for edge in loop))
+    if p is not None:
         raise DesignError(
-            f"has contours that cross or touch each other at {place}; draw them apart, or join them"
-        ) from None
+            f"has contours that cross or touch each other at x {p[0]:.4f}, y {p[1]:.4f}; draw them "
+            "apart, or join them"
+        )
 
 
 def _refuse_extent(contours: list[Contour]) -> None:

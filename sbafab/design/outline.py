@@ -189,24 +189,28 @@ def _surrounds(region: Region, p: Point) -> bool:
 
 def refuse_crossings(loop: Strand) -> None:
     """Raises DesignError where a closed loop crosses or touches itself."""
+    p = crossing(loop)
+    if p is not None:
+        raise DesignError(
+            f"crosses or touches itself at x {p[0]:.4f}, y {p[1]:.4f}; draw it without the loop"
+        )
+
+
+def crossing(loop: Strand) -> Point | None:
+    """Return a place where edges of closed loops cross or touch, beside ends that follow."""
     # A tangle is told at its first knot: there may be one for every two edges.
     for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
         ends = loop[i].start, loop[i].end, loop[j].start, loop[j].end
         for p in meeting_points(loop[i], loop[j]):
             if min(math.dist(p, end) for end in ends) > JOIN:
-                raise _crossing(p)
+                return p
     corners: set[Point] = set()
     for edge, pieces in zip(loop, split_edges(loop).parts, strict=True):
         start = pieces[0].start if pieces else edge.start
         if len(pieces) != 1 or start in corners:
-            raise _crossing(pieces[0].end if len(pieces) > 1 else edge.start)
+            return pieces[0].end if len(pieces) > 1 else edge.start
         corners.add(start)
-
-
-def _crossing(p: Point) -> DesignError:
-    return DesignError(
-        f"crosses or touches itself at x {p[0]:.4f}, y {p[1]:.4f}; draw it without the loop"
-    )
+    return None
 
 
 # The strands of a DXF drawing: what its model space holds, in mm.

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, NoReturn
 from sbafab.actuators.drawn import FAMILY
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.files import shown
+from sbafab.design.outline import crossing
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Line, Point, box_round
 from sbafab.geometry.offset import swept
@@ -350,6 +351,10 @@ class _Frame(NamedTuple):
         x, y = (p[0] - self.middle[0]) * MM, (self.middle[1] - p[1]) * MM
         return round(x, 6) + 0.0, round(y, 6) + 0.0
 
+    def of_file(self, p: Point) -> Point:
+        """Return the point of the file, um, behind one in mm."""
+        return self.middle[0] + p[0] / MM, self.middle[1] - p[1] / MM
+
 
 def _design(circuit: Circuit) -> Imported:
     frame = _Frame(_middle(circuit))
@@ -358,6 +363,8 @@ def _design(circuit: Circuit) -> Imported:
     masks = {layer: mask for layer, mask in drawn.items() if not mask.is_empty}
     empty = [f"layer {circuit.titles[layer]}" for layer in drawn if layer not in masks]
     remarks += named("holds nothing; it is not imported", empty)
+    for key, mask in masks.items():
+        _refuse_touching(mask, circuit.titles[key], frame)
     if not masks:
         raise DesignError("no layer holds anything; there is nothing to import")
     numbers = {layer: 2 * i + 2 for i, layer in enumerate(masks)}
@@ -446,6 +453,17 @@ def _mask(circuit: Circuit, layer: str, frame: _Frame) -> Region:
         if connection.layer == layer:
             parts += [_channel(route, connection, frame) for route in connection.routes]
     return union(part for part in parts if not part.is_empty)
+
+
+def _refuse_touching(mask: Region, title: str, frame: _Frame) -> None:
+    """Raises DesignError where contours share a single point: nobody can say what it joins."""
+    place = crossing(tuple(edge for contour in mask.contours for edge in contour.edges))
+    if place is not None:
+        x, y = frame.of_file(place)
+        raise DesignError(
+            f"layer {title}: channels or components touch in a single point at x {x:.6g}, "
+            f"y {y:.6g} um; draw them apart, or over each other"
+        )
 
 
 def _outline(component: Component, frame: _Frame) -> Region:

@@ -183,6 +183,20 @@ def test_a_channel_that_ends_before_its_component_is_an_open(tmp_path: Path) -> 
     assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"open"}
 
 
+def test_a_single_point_that_two_channels_share_is_named_in_the_file(
+    importing: Importing, tmp_path: Path
+) -> None:
+    """Round ends of 0.5 mm whose middles lie 1 mm apart, on two channels of one connection."""
+    document = rewired(circuit(), [[1500, 11500], [10000, 11500]])
+    source, sinks = document["connections"][1]["source"], document["connections"][1]["sinks"]
+    path = {"source": source, "sink": sinks[0], "wayPoints": [[11000, 11500], [21500, 11500]]}
+    document["connections"][1]["paths"].append(path)
+    file = tmp_path / "circuit.json"
+    file.write_text(json.dumps(document), encoding="utf-8")
+    said = importing(file).output
+    assert "layer flow: channels or components touch in a single point at x 10500, y 11500 um" in said
+
+
 def test_places_and_channels_may_be_features(tmp_path: Path) -> None:
     plain = written(circuit(), tmp_path).laminate
     document = circuit()
