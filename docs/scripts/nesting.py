@@ -5,8 +5,8 @@
 sparrow packs a strip as wide as a sheet, whose length over a sheet's is rounded up; a cut at a
 sheet's end may cross parts, so it is a lower bound of what it needs. For films of one shape ``most``
 is what we can put on a sheet, and ``one_more`` is "no" if sparrow cannot put one copy more on it.
-libnest2d puts parts by no-fit polygons, first fit. ``area`` and ``bars`` are lower bounds for any
-nester with quarter turns: by the area of the parts, and by bars that lie in every part.
+libnest2d puts parts by no-fit polygons, first fit. ``area`` and ``rectangle`` are lower bounds for any
+nester with quarter turns: by the area of the parts, and by a rectangle that lies in every part.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import csv
 import math
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations, product
@@ -40,13 +40,14 @@ SECONDS = 25
 """By the clock, of sparrow for each strip; the processor's time is written."""
 MOST_PARTS = 130
 """libnest2d, whose time grows with the square of the parts, gets no more."""
-LONGEST_BAR = 6
-"""Widths that a bar of the bound is long, at most."""
+MOST_RECTANGLES = 30
+"""Rectangles on a sheet, by area, up to which their most is found."""
+TINY = 1e-7
 SLACK = 0.01
 """mm by which libnest2d's parts may be nearer: its outlines are polygons."""
 TABLE = Path(__file__).parents[1] / "measured" / "nesting.csv"
 COLUMNS = (
-    "design", "copies", "film", "parts", "area", "bars", "bottom_left", "sbafab", "seconds",
+    "design", "copies", "film", "parts", "area", "rectangle", "bottom_left", "sbafab", "seconds",
     "sparrow", "sparrow_seconds", "most", "one_more", "libnest2d", "libnest2d_seconds",
 )  # fmt: skip
 
@@ -73,12 +74,12 @@ def measured(parts: Sequence[NestPart], stock: Stock) -> dict[str, Any]:
     (result,) = nest(parts, {parts[0].material: stock})
     seconds = time.process_time() - began
     check_nest(result)
-    area, bars = area_bound(parts, stock), bar_bound(parts, stock)
+    area, rectangle = area_bound(parts, stock), rectangle_bound(parts, stock)
     plain = 1 + max(place.sheet for place in bottom_left(parts, stock, lattices=False))
-    row = {"parts": sum(part.count for part in parts), "area": area, "bars": bars}
+    row = {"parts": sum(part.count for part in parts), "area": area, "rectangle": rectangle}
     row |= {"bottom_left": plain, "sbafab": result.sheets, "seconds": round(seconds, 2)}
     # One sheet, or as few as a bound allows, cannot be beaten.
-    if result.sheets == max(1, area, bars):
+    if result.sheets == max(1, area, rectangle):
         return row
     row |= sparrow(parts, stock) | libnest2d(parts, stock)
     if len({Region(part.region.outers) for part in parts}) == 1:
@@ -107,30 +108,66 @@ def area_bound(parts: Sequence[NestPart], stock: Stock) -> int:
     return math.ceil(sum(grown) / room - 1e-6)
 
 
-def bar_bound(parts: Sequence[NestPart], stock: Stock) -> int:
-    """Return the sheets that the parts need by the bars that lie in each of them.
-
-    Points in rows ``pitch`` apart, every k-th place of a row taken and each row one place further:
-    a bar of k pitches by one, lying or standing, holds exactly one of them (its far sides not
-    counted). So a sheet holds no more bars than it holds points, however these are moved.
-    """
-    shapes = {Region(part.region.outers) for part in parts}
+def rectangle_bound(parts: Sequence[NestPart], stock: Stock) -> int:
+    """Return the sheets that the parts need by a rectangle that lies in each of them."""
+    each = [rectangles(shape) for shape in {Region(part.region.outers) for part in parts}]
+    shared = {
+        (a, b)
+        for sides in each
+        for a, b in sides
+        if all(any(a <= c and b <= d for c, d in others) for others in each)
+    }
     # Parts that are ``spacing`` apart are that over the root of two apart along x or along y.
     room = stock.spacing / math.sqrt(2)
     low_x, low_y, high_x, high_y = stock.usable
-    sides = [rectangles(shape) for shape in shapes]
-    most = math.inf
-    for k in range(1, LONGEST_BAR + 1):
-        # The largest bar of this form that every shape holds.
-        pitch = min(
-            max((min((a + room) / k, b + room) for a, b in each), default=0.0) for each in sides
+    sheet = high_x - low_x + room, high_y - low_y + room
+    most = min(
+        (
+            most_rectangles((a + room, b + room), sheet)
+            for a, b in shared
+            if (a + room) * (b + room) * MOST_RECTANGLES > math.prod(sheet)
+        ),
+        default=math.inf,
+    )
+    return math.ceil(sum(part.count for part in parts) / most)
+
+
+def most_rectangles(sides: tuple[float, float], sheet: tuple[float, float]) -> int:
+    """Return the most rectangles, lying or standing, that a sheet holds, by an integer program.
+
+    Moved left and down as far as they go, their corners lie at sums of sides (Herz 1972).
+    """
+    import numpy as np
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    a, b = sides
+    sums = {
+        i * a + j * b
+        for i in range(int(max(sheet) / a) + 1)
+        for j in range(int(max(sheet) / b) + 1)
+    }
+    columns, rows = (np.array(sorted(at for at in sums if at <= end)) for end in sheet)
+    covered = [
+        np.outer(
+            (x - TINY < columns) & (columns < x + w - TINY),
+            (y - TINY < rows) & (rows < y + h - TINY),
         )
-        if pitch > 2 * room:
-            columns = math.floor((high_x - low_x + room) / pitch + 1e-9)
-            rows = math.floor((high_y - low_y + room) / pitch + 1e-9)
-            counts = Counter((i + j) % k for i in range(columns) for j in range(rows))
-            most = min([most, *(counts[rest] for rest in range(k))])
-    return math.ceil(sum(part.count for part in parts) / max(most, 1))
+        for w, h in ((a, b), (b, a))
+        for x in columns[columns + w <= sheet[0] + TINY]
+        for y in rows[rows + h <= sheet[1] + TINY]
+    ]
+    if not covered:
+        return 0
+    table = np.array([cells.ravel() for cells in covered], dtype=float).T
+    solved = milp(
+        -np.ones(len(covered)),
+        constraints=LinearConstraint(table, ub=1.0),
+        integrality=np.ones(len(covered)),
+        bounds=Bounds(0, 1),
+        options={"time_limit": SECONDS},
+    )
+    # The bound that is proven, where the time was not enough.
+    return math.floor(-solved.mip_dual_bound + 1e-6)
 
 
 def rectangles(shape: Region) -> list[tuple[float, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import shlex
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ import pytest
 
 from docs.scripts import measured, tables
 from docs.scripts.measured import BLOCK, FOLDER, HOW, filled, record
+from docs.scripts.nesting import most_rectangles
 from docs.scripts.rates import WORDS
 from docs.scripts.tables import SUMMARIES, Table
 from sbafab.cli import COMMANDS
@@ -160,14 +162,35 @@ def test_the_rules_of_the_page_are_rules_of_the_deck() -> None:
 def test_the_page_on_cutting_counts_the_sheets_of_the_record() -> None:
     with (FOLDER / "nesting.csv").open(encoding="utf-8", newline="") as opened:
         rows = list(csv.DictReader(opened))
-    totals = {
-        name: sum(max(1, int(row[name])) for row in rows)
-        for name in ("sbafab", "bottom_left", "area")
-    }
-    packed = [row for row in rows if row["sparrow"]]
-    fewer = sum(int(row["sparrow"]) < int(row["sbafab"]) for row in packed)
+    totals = {name: sum(int(row[name]) for row in rows) for name in ("sbafab", "bottom_left")}
+    least = [max(1, int(row["area"]), int(row["rectangle"])) for row in rows]
     page = text("cutting")
     assert "take {sbafab} sheets, by bottom-left alone {bottom_left}".format(**totals) in page
-    assert f"no fewer than {totals['area']}" in page
-    assert f"fewer in {fewer} of {len(packed)} films" in page
-    assert sum(row["one_more"] == "yes" for row in packed) == 2
+    assert f"no fewer than {sum(least)}" in page
+    assert "sparrow saves none" in page
+    open_rows = [row for row, bound in zip(rows, least, strict=True) if int(row["sbafab"]) > bound]
+    assert open_rows
+    for row in open_rows:
+        if row["most"]:
+            assert row["one_more"] == "no"
+            assert int(row["sbafab"]) == math.ceil(int(row["parts"]) / int(row["most"]))
+        else:
+            assert int(row["sparrow"]) >= int(row["sbafab"])
+
+
+@pytest.mark.parametrize(
+    ("sides", "sheet", "most"),
+    [
+        # 4 k + 2 unit squares a side do not fill with bars of four (de Bruijn 1969).
+        ((4.0, 1.0), (6.0, 6.0), 8),
+        ((4.0, 1.0), (6.6, 6.6), 8),
+        # Four round a square hole of one.
+        ((3.0, 2.0), (5.0, 5.0), 4),
+        ((10.0, 3.0), (26.0, 30.0), 26),
+        ((3.0, 3.0), (2.9, 9.0), 0),
+    ],
+)
+def test_the_most_rectangles_of_a_sheet(
+    sides: tuple[float, float], sheet: tuple[float, float], most: int
+) -> None:
+    assert most_rectangles(sides, sheet) == most
