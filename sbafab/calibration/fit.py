@@ -7,7 +7,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import tomli_w
@@ -54,6 +54,14 @@ class HeldOutPoint:
     def is_inside(self) -> bool:
         """True if the measured value lies in the interval."""
         return self.low <= self.measured <= self.high
+
+
+class LeftOutFit(NamedTuple):
+    """A fit without the curves of a ``test``, and the ``seed`` of its random numbers."""
+
+    test: str
+    seed: int
+    posterior: Posterior
 
 
 @dataclass(frozen=True)
@@ -141,7 +149,7 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
     posterior = sampled(curves)
     points = held_out(usable, curves, progress)
     return Fit(
-        _calibration(name, about, films[0], sources, posterior, points),
+        as_calibration(name, about, films[0], sources, posterior, points),
         tuple(points),
         tuple(open_set_ups(usable, curves, posterior)),
         tuple(left_out),
@@ -202,18 +210,23 @@ def held_out(
     """Return each curve's points as a fit without its test predicts them; none where all curves
     are of one test.
     """
+    return [
+        point
+        for left_out in left_out_fits(curves, progress)
+        for source, curve in zip(measured, curves, strict=True)
+        if curve.test == left_out.test
+        for point in predicted_points(source, curve, left_out.posterior, left_out.seed)
+    ]
+
+
+def left_out_fits(curves: Sequence[SampledCurve], progress: Progress) -> Iterator[LeftOutFit]:
+    """Yield a fit without each test, one after the other; none where all curves are of one."""
     tests = list(dict.fromkeys(curve.test for curve in curves))
-    rows: list[HeldOutPoint] = []
-    if len(tests) < 2:
-        return rows
-    for done, test in enumerate(tests):
+    for done, test in enumerate(tests if len(tests) > 1 else ()):
         progress("held out", done, len(tests))
         seed = zlib.crc32(test.encode())
-        without = sampled([curve for curve in curves if curve.test != test], seed)
-        for source, curve in zip(measured, curves, strict=True):
-            if curve.test == test:
-                rows += predicted_points(source, curve, without, seed)
-    return rows
+        rest = [curve for curve in curves if curve.test != test]
+        yield LeftOutFit(test, seed, sampled(rest, seed))
 
 
 def predicted_points(
@@ -230,7 +243,7 @@ def predicted_points(
     ]
 
 
-def _calibration(
+def as_calibration(
     name: str,
     about: str,
     film: str,
@@ -238,6 +251,7 @@ def _calibration(
     posterior: Posterior,
     points: Sequence[HeldOutPoint],
 ) -> ModelCalibration:
+    """Return the calibration that a posterior stands for."""
     sentences = tuple(
         f"{row['first']} and {row['second']}: correlation {row['correlation']:.2f}"
         for row in correlations(posterior.covariance, TOLD_APART)

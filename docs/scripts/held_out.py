@@ -1,0 +1,180 @@
+"""Coverage of the calibration's intervals over all evidence: docs/measured/held_out.json.
+
+python -m docs.scripts.held_out takes about four minutes; it needs the extra "calibrate". Each curve
+is predicted by a fit without its test. What right intervals would hold is drawn from the same
+predictions, as those have points of one test depend on each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from datetime import date
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from docs.scripts.measured import Record, keep, texts, versions
+from docs.scripts.tables import Table
+from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
+from sbafab.calibration.fit import (
+    as_calibration,
+    film_of,
+    left_out_fits,
+    sampled_curve,
+    usable_curves,
+)
+from sbafab.calibration.posterior import Posterior, SampledCurve
+from sbafab.calibration.surface import surfaces
+from sbafab.evidence.files import shipped_evidence
+from sbafab.evidence.records import Evidence, MeasuredCurve
+
+if TYPE_CHECKING:
+    from sbafab.models.film_elements import Array
+
+COMMAND = "python -m docs.scripts.held_out"
+NAME = "held_out"
+SHARES = (0.5, 0.8, 0.9, 0.95)
+"""Probabilities of the intervals whose coverage is counted."""
+POINTS = (
+    "curve",
+    "test",
+    "at",
+    "measured",
+    "predicted",
+    "low",
+    "high",
+    "rank",
+    "predict low",
+    "predict high",
+)
+COVERAGE = (
+    "interval",
+    "points inside",
+    "right intervals would hold",
+    "that many or more by chance",
+    "curves inside",
+)
+SOURCES = ("source", "values", "held out", "curves", "tests", "in 90 % intervals", "not predicted")
+ALL = "all"
+
+
+class LeftOutCurve(NamedTuple):
+    """A curve, its prediction by the fit without its test, drawn logarithms (n, points) of what
+    would be measured, and the 90 % intervals (mm, N, ...) as ``predict`` states them.
+    """
+
+    source: str
+    measured: MeasuredCurve
+    curve: SampledCurve
+    drawn: Array
+    stated: Sequence[tuple[float, float] | None]
+
+    def ranks(self, values: Array) -> Array:
+        """Return the share of the drawn values below each one (rows, points): its rank."""
+        ordered = np.sort(self.drawn, axis=0)
+        pairs = zip(ordered.T, values.T, strict=True)
+        return np.stack([np.searchsorted(*pair) for pair in pairs], -1) / len(ordered)
+
+
+def left_out_curves(sources: Sequence[Evidence]) -> Iterator[LeftOutCurve]:
+    """Yield each curve that the models can predict, by a fit to all of its film but its test."""
+    for source in sources:
+        usable, _ = usable_curves([source])
+        if not usable:
+            continue
+        made = surfaces(usable, _quiet)
+        curves = [sampled_curve(*pair) for pair in zip(usable, made, strict=True)]
+        for left_out in left_out_fits(curves, _quiet):
+            generator = np.random.default_rng(left_out.seed)
+            for measured, curve in zip(usable, curves, strict=True):
+                if curve.test == left_out.test:
+                    drawn = left_out.posterior.predicted(curve, generator)
+                    stated = _stated(source, measured, left_out.posterior)
+                    yield LeftOutCurve(source.id, measured, curve, drawn, stated)
+
+
+def _quiet(step: str, done: int, total: int) -> None:
+    print(step, done, total, flush=True)
+
+
+def _stated(
+    source: Evidence, measured: MeasuredCurve, posterior: Posterior
+) -> Sequence[tuple[float, float] | None]:
+    calibration = as_calibration(NAME, "", film_of(measured), [source], posterior, [])
+    intervals = curve_intervals(measured, uncertainty_for(measured, calibration))
+    return intervals or [None] * len(measured.y)
+
+
+def point_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
+    """Yield a row a point, by POINTS."""
+    for each in curves:
+        ranks = each.ranks(each.curve.measured[None])[0]
+        low, median, high = np.exp(np.quantile(each.drawn, (0.05, 0.5, 0.95), axis=0))
+        places = each.measured.x or ("",) * len(ranks)
+        for n, place in enumerate(places):
+            values = each.measured.y[n], median[n], low[n], high[n], ranks[n]
+            ends = each.stated[n] or ("", "")
+            yield [
+                f"{each.source}: {each.measured.id}",
+                each.curve.test,
+                f"{place}",
+                *(f"{value:.4g}" for value in values),
+                *(end if isinstance(end, str) else f"{end:.4g}" for end in ends),
+            ]
+
+
+def coverage_rows(curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
+    """Yield a row an interval, by COVERAGE."""
+    tests = dict.fromkeys((each.source, each.curve.test) for each in curves)
+    ranks = [each.ranks(each.curve.measured[None])[0] for each in curves]
+    for share in SHARES:
+        inside = [np.abs(rank - 0.5) < share / 2 for rank in ranks]
+        held, points = sum(int(one.sum()) for one in inside), sum(map(len, inside))
+        whole = sum(bool(one.all()) for one in inside)
+        # Points of one test stand together in a draw, tests are drawn apart.
+        numbers, expected = np.random.default_rng(0), np.zeros(0)
+        for source, test in tests:
+            group = [each for each in curves if (each.source, each.curve.test) == (source, test)]
+            count = sum((np.abs(each.ranks(each.drawn) - 0.5) < share / 2).sum(1) for each in group)
+            drawn = numbers.permutation(count)
+            expected = expected + drawn if expected.size else drawn
+        yield [
+            f"{100 * share:g} %",
+            f"{held} of {points}",
+            f"{expected.mean():.1f} +- {expected.std():.1f}",
+            f"{100 * (expected >= held).mean():.0f} %",
+            f"{whole} of {len(curves)}",
+        ]
+
+
+def source_rows(sources: Sequence[Evidence], curves: Sequence[LeftOutCurve]) -> Iterator[list[str]]:
+    """Yield a row a source and one of all, by SOURCES."""
+    totals = np.zeros(5, dtype=int)
+    for source in sources:
+        mine = [each for each in curves if each.source == source.id]
+        ranks = [each.ranks(each.curve.measured[None])[0] for each in mine]
+        inside = sum(int((np.abs(rank - 0.5) < 0.45).sum()) for rank in ranks)
+        points, tests = sum(map(len, ranks)), len({each.curve.test for each in mine})
+        values = sum(len(curve.y) for curve in source.curves)
+        counts = np.array([values, points, len(mine), tests, inside])
+        totals += counts
+        reasons = "; ".join(f"{name}: {why}" for name, why in usable_curves([source])[1])
+        yield [source.id, *texts([counts.tolist()])[0], reasons]
+    yield [ALL, *texts([totals.tolist()])[0], ""]
+
+
+def main() -> None:
+    """Predict all curves and keep the record."""
+    sources = shipped_evidence()
+    curves = list(left_out_curves(sources))
+    tables = {
+        "sources": Table(SOURCES, list(source_rows(sources, curves))),
+        "coverage": Table(COVERAGE, list(coverage_rows(curves))),
+        "points": Table(POINTS, list(point_rows(curves))),
+    }
+    used = versions(sbafab="sbafab", emcee="emcee", numpy="numpy")
+    keep(NAME, Record(COMMAND, date.today().isoformat(), used, tables))
+
+
+if __name__ == "__main__":
+    main()
