@@ -43,6 +43,8 @@ P0 = 0.1
 """Pressure in kPa below which pressures are counted evenly, above in their logarithm."""
 NEAR, MET = 1e-4, 1e-3
 """Distances in mm from the place at which a search ends, and at which the tip has reached it."""
+STRANDED = 0.5
+"""Distance in mm from the place within which a search that ended is tried again about there."""
 STEPS, LAST_STEP = 25, 2e-3
 """Newton's steps of freedoms and pressures; one so small (mm, rad, asinh) is the last."""
 WHOLE_STEPS = 5
@@ -177,7 +179,7 @@ def _against_plate(
         best = _nearer(target, best, pose)
         if best is not None and _distance(target, best) < NEAR:
             return best
-    if best is None or _distance(target, best) < MET:
+    if best is None or not MET <= _distance(target, best) < STRANDED:
         return best
     # The descents end where a contact opens or closes: from places about there.
     for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
@@ -396,8 +398,9 @@ def _by_contacts(
     for stiffness in soft:
         softer = target._replace(load=load._replace(stiffness=stiffness))
         tried = _contact_newton(softer, x, at, forces, ROUGH_CONTACT)
-        if tried is not None:
-            x, at, forces = tried
+        if tried is None:
+            return None
+        x, at, forces = tried
     found = _contact_newton(target, x, at, forces, CLOSE_CONTACT)
     if found is None:
         return None
