@@ -7,7 +7,7 @@ predictions, as those have points of one test depend on each other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from datetime import date
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,15 +76,19 @@ class LeftOutCurve(NamedTuple):
         return np.stack([np.searchsorted(*pair) for pair in pairs], -1) / len(ordered)
 
 
-def left_out_curves(sources: Sequence[Evidence]) -> Iterator[LeftOutCurve]:
-    """Yield each curve that the models can predict, by a fit to all of its film but its test."""
+def left_out_curves(
+    sources: Sequence[Evidence], only: Collection[str] = ()
+) -> Iterator[LeftOutCurve]:
+    """Yield each curve that the models can predict, or those of ``only`` some tests, by a fit to all
+    of its source but its test.
+    """
     for source in sources:
         usable, _ = usable_curves([source])
         if not usable:
             continue
         made = surfaces(usable, _quiet)
         curves = [sampled_curve(*pair) for pair in zip(usable, made, strict=True)]
-        for left_out in left_out_fits(curves, _quiet):
+        for left_out in left_out_fits(curves, _quiet, only):
             generator = np.random.default_rng(left_out.seed)
             for measured, curve in zip(usable, curves, strict=True):
                 if curve.test == left_out.test:

@@ -5,7 +5,7 @@ whose points are then predicted.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -219,10 +219,16 @@ def held_out(
     ]
 
 
-def left_out_fits(curves: Sequence[SampledCurve], progress: Progress) -> Iterator[LeftOutFit]:
-    """Yield a fit without each test, one after the other; none where all curves are of one."""
+def left_out_fits(
+    curves: Sequence[SampledCurve], progress: Progress, only: Collection[str] = ()
+) -> Iterator[LeftOutFit]:
+    """Yield a fit without each test, or each of ``only`` these, one after the other; none where all
+    curves are of one.
+    """
     tests = list(dict.fromkeys(curve.test for curve in curves))
     for done, test in enumerate(tests if len(tests) > 1 else ()):
+        if only and test not in only:
+            continue
         progress("held out", done, len(tests))
         seed = zlib.crc32(test.encode())
         rest = [curve for curve in curves if curve.test != test]

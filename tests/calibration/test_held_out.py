@@ -73,14 +73,16 @@ def test_the_page_says_what_the_record_has() -> None:
 
 
 @pytest.mark.long
-def test_a_new_fit_without_each_test_gives_the_record() -> None:
+def test_a_new_fit_without_a_test_gives_the_record() -> None:
     """The sampler's seeds are fixed: only other versions of numpy and emcee may move a figure."""
     pytest.importorskip("emcee")
     (paper,) = (source for source in shipped_evidence() if source.id == "paper")
-    rows = list(held_out.point_rows(list(held_out.left_out_curves([paper]))))
-    for new, kept in zip(rows, TABLES["points"].rows, strict=True):
-        assert new[:4] == list(kept[:4])
-        assert [float(cell) for cell in new[4:7]] == pytest.approx(
-            [float(cell) for cell in kept[4:7]], rel=0.1
-        )
-        assert float(new[7]) == pytest.approx(float(kept[7]), abs=0.05)
+    only = ("energy", "force-3dof")
+    rows = list(held_out.point_rows(list(held_out.left_out_curves([paper], only))))
+    kept = [row for row in TABLES["points"].rows if row[1] in only]
+    assert len(rows) == 6
+    for new, old in zip(rows, kept, strict=True):
+        assert new[:4] == list(old[:4])
+        ends = [[float(cell) for cell in row[4:7]] for row in (new, old)]
+        assert ends[0] == pytest.approx(ends[1], rel=0.1)
+        assert float(new[7]) == pytest.approx(float(old[7]), abs=0.05)
