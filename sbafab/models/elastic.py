@@ -19,6 +19,7 @@ from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import (
+    OF_CALIBRATION,
     Factors,
     Figure,
     LeftOut,
@@ -58,7 +59,7 @@ CALIBRATED_TRUST = (
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
     if factors.calibration:
-        name = f"{model.name}, calibration {factors.calibration}"
+        name = f"{model.name}{OF_CALIBRATION}{factors.calibration}"
         return replace(model, name=name, trust=CALIBRATED_TRUST)
     factor_names = []
     if factors.press_factor != 1:

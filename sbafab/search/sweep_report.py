@@ -23,6 +23,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.models.figures import is_of_calibration
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE
@@ -124,7 +125,11 @@ class Table:
         """Yield each leading figure's first column, by the model to design with."""
         each = [f"{figure} at {kpa:g} kPa" for kpa in self.pressures_kpa for figure in MOVED]
         for begins in (*FIRST, *each):
-            yield from [name for name in names if name.startswith(begins)][:1]
+            figures = [name for name in names if name.startswith(begins)]
+            # A force's name goes on with its height. Of models ``predict``'s own is taken.
+            stem = ", ".join(figures[0].split(", ")[:2]) if figures else ""
+            of_models = [name for name in figures if name.startswith(stem)]
+            yield from sorted(of_models, key=lambda name: not is_of_calibration(name))[:1]
         yield from YIELD
 
     def _binding(self) -> Iterator[str]:

@@ -70,6 +70,16 @@ def test_a_table_opens_with_what_was_varied_asked_for_and_binding(
     # A narrow bond fails bond-width, and the others have nothing to spare.
     assert {"bond-width.verdict", "bond-width.margin"} <= set(first)
     assert "piece-count.verdict" not in first
+    # Its force is the one that ``predict`` designs with, of the four that it has.
+    row = next(row for row in _rows(found) if row["outcome"] == "passes")
+    changes = {key: float(row[key]) for key in varied}
+    predicted = sbafab.predict("1dof-5mm", changes, pressures_kpa=QUICK["pressures_kpa"]).figures
+    forces = [one for one in predicted if one.name == "blocked force at 10 kPa, flat"]
+    (force,) = (one for one in forces if not one.other)
+    column = f"{force.name}, {force.model.name} [N]"
+    assert len(forces) > 1
+    assert [name for name in first if name.startswith("blocked force")] == [column]
+    assert float(row[column]) == pytest.approx(force.value, rel=1e-4)
     # All columns later: nothing is measured anew.
     again = _swept(tmp_path, all_columns=True)
     assert again.measured == 0
