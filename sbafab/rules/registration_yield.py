@@ -609,9 +609,16 @@ def finding_of(outcome: Yield, laminate: Laminate, limits: Limits) -> Finding:
         place = Place(worst, laminate.interfaces[worst - 1].layer_indices)
     share = outcome.whole
     return Finding(
-        NAME, verdict, target, share.value, "", place, message,
-        remedy=remedy, interval=share.interval,
-    )  # fmt: skip
+        NAME,
+        verdict,
+        target,
+        share.value,
+        "",
+        place,
+        message,
+        remedy=remedy,
+        interval=share.interval,
+    )
 
 
 def _remedy(laminate: Laminate) -> str:

@@ -236,6 +236,7 @@ def test_the_interfaces_that_lose_most_are_told_first(
         f"{share:.2%} of 400 random builds keep every limit (95 % interval {low:.2%} to "
         f"{high:.2%}){says}; errors are assumed spread evenly, up to 0.3 mm and 2 degree where a "
         "hand places; no least share is asked for (rules.target_yield)",
+        interval=(low, high),
     )
 
 
