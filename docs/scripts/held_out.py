@@ -86,9 +86,9 @@ def left_out_curves(
         usable, _ = usable_curves([source])
         if not usable:
             continue
-        made = surfaces(usable, _quiet)
+        made = surfaces(usable, _print_progress)
         curves = [sampled_curve(*pair) for pair in zip(usable, made, strict=True)]
-        for left_out in left_out_fits(curves, _quiet, only):
+        for left_out in left_out_fits(curves, _print_progress, only):
             generator = np.random.default_rng(left_out.seed)
             for measured, curve in zip(usable, curves, strict=True):
                 if curve.test == left_out.test:
@@ -97,7 +97,7 @@ def left_out_curves(
                     yield LeftOutCurve(source.id, measured, curve, drawn, stated)
 
 
-def _quiet(step: str, done: int, total: int) -> None:
+def _print_progress(step: str, done: int, total: int) -> None:
     print(step, done, total, flush=True)
 
 

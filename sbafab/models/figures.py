@@ -531,10 +531,9 @@ def chosen(
 
     ``to_come`` are beginnings of models whose figures are left out for now; if calibrated ones, all
     blocked forces are marked. Of one name the first with an interval is chosen, which comes from a
-    calibrated model; where no intervals were computed, the first of a calibration. Without one it
-    is the first: the paper's Eq. 4, whose force is nearest to the six that the paper measured at
-    100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times Eqs. 1-3, 0.47 to 0.86 times the elastic
-    stack).
+    calibrated model. Without a calibration it is the first: the paper's Eq. 4, whose force is
+    nearest to the six that the paper measured at 100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times
+    Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
     """
     candidates = tuple(figures)
     forces_to_come = bool(to_come) and is_calibrated
@@ -549,18 +548,10 @@ def chosen(
     )
 
 
-def is_of_calibration(model: str) -> bool:
-    """Return True for the name of a model, or what ends with one, that a calibration is part of."""
-    return OF_CALIBRATION in model
-
-
 def _is_superseded(subject: Figure, figures: Sequence[Figure], to_come: tuple[str, ...]) -> bool:
     group_figures = [figure for figure in figures if figure.group == subject.group]
     named = [figure for figure in group_figures if figure.name == subject.name]
-    bounded = [figure for figure in named if figure.interval is not None]
-    if not any(figure.interval is not None for figure in figures):
-        bounded = [figure for figure in named if is_of_calibration(figure.model.name)]
-    preferred = bounded[0] if bounded else named[0]
+    preferred = next((figure for figure in named if figure.interval is not None), named[0])
     if preferred is not subject:
         return True
     if any(figure.name == subject.name + FREE_SUFFIX for figure in group_figures):

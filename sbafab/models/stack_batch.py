@@ -229,8 +229,8 @@ class StackBatch:
             np.empty((levels, 3, count)),
             np.full((count, self.stack.chambers), np.nan),
         )
+        rows = Levels.of(self.stack, acting)
         if acting.wall is None:
-            rows = Levels.of(self.stack, acting)
             start = self._starts(pressures) if near is None else near.freedoms
             for part in _parts(count, LOADED_CHUNK):
                 p = np.ascontiguousarray(pressures[part].T)
@@ -245,7 +245,7 @@ class StackBatch:
             like = None if near is None else self.stack.pose_like(near.freedoms[number])
             alone = self.stack.pose(pressures[number].tolist(), near=like, **load)
             freedoms[:, :, number], volumes[number] = alone.freedoms, alone.volumes
-        tips = Levels.of(self.stack, acting).tips(freedoms)
+        tips = rows.tips(freedoms)
         return BatchPoses(pressures, freedoms.transpose(2, 0, 1), volumes, tips)
 
     def _starts(self, pressures: Array) -> Array:

@@ -23,7 +23,7 @@ from typing import IO, TYPE_CHECKING, Any, NamedTuple
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.models.figures import is_of_calibration
+from sbafab.models.figures import OF_CALIBRATION
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart_of_column
 from sbafab.reports.charts import PLAIN, STYLE
@@ -125,11 +125,7 @@ class Table:
         """Yield each leading figure's first column, by the model to design with."""
         each = [f"{figure} at {kpa:g} kPa" for kpa in self.pressures_kpa for figure in MOVED]
         for begins in (*FIRST, *each):
-            figures = [name for name in names if name.startswith(begins)]
-            # A force's name goes on with its height. Of models ``predict``'s own is taken.
-            stem = ", ".join(figures[0].split(", ")[:2]) if figures else ""
-            of_models = [name for name in figures if name.startswith(stem)]
-            yield from sorted(of_models, key=lambda name: not is_of_calibration(name))[:1]
+            yield from _designed_with([name for name in names if name.startswith(begins)])
         yield from YIELD
 
     def _binding(self) -> Iterator[str]:
@@ -169,6 +165,16 @@ class Table:
         with begun.open("w", encoding="utf-8", newline="") as opened:
             yield opened
         begun.replace(path)
+
+
+def _designed_with(columns: Sequence[str]) -> Sequence[str]:
+    """Return the column of the first figure of these by the model that ``predict`` designs with:
+    the calibrated one, else the first.
+    """
+    # A force's name goes on with its height, and then with its model.
+    figure = ", ".join(columns[0].split(", ")[:2]) if columns else ""
+    of_models = [name for name in columns if name.startswith(figure)]
+    return sorted(of_models, key=lambda name: OF_CALIBRATION not in name)[:1]
 
 
 def _rules(row: SweepRow) -> dict[str, Any]:
@@ -529,8 +535,11 @@ def _objectives(table: Table) -> list[Objective]:
         Objective(name, _label(name), more) for name, more in INTRODUCTION if name in names
     ]
     strokes = [name for name in names if name.startswith(("free stroke", "full stroke"))]
-    forces = [n for n in names if n.startswith("blocked force") and ", flat" in n]
-    for group in (sorted(strokes, key=lambda name: name.startswith("full")), forces[::-1]):
+    flat = [n for n in names if n.startswith("blocked force") and ", flat" in n]
+    # Of the highest pressure, which comes last.
+    highest = flat[-1].split(", ")[0] if flat else ""
+    forces = _designed_with([name for name in flat if name.startswith(f"{highest}, ")])
+    for group in (sorted(strokes, key=lambda name: name.startswith("full")), forces):
         if group:
             objectives.append(Objective(group[0], _label(group[0]), True))
     return [*objectives, GOOD_BUILDS] if YIELD[0] in names else objectives

@@ -136,3 +136,16 @@ def test_paths_of_seams_are_printed_on_the_films_at_one_to_one(sheet_files: Any)
     assert seams_pdf(built("pouch")[1], SHA) is None
     assert "Print seams.pdf at 100 %" in words_of(page(sheet_files, "folded"))
     assert float(x) > 0
+
+
+def test_films_are_named_and_held_as_what_they_are(sheet_files: Any) -> None:
+    vacuum = words_of(page(sheet_files, "vacuum"))
+    # Its masks are PET, which adhesives hold; seven of them are alike.
+    assert "PET50, 0.05 mm thick: stick it" in vacuum
+    assert "PTFE hardly sticks" not in vacuum
+    assert "Lay layers 3 to 9, all alike: PET50 chamber mask P03." in vacuum
+    assert "PTFE hardly sticks" in words_of(page(sheet_files, "3dof-15mm"))
+    finger = words_of(page(sheet_files, "finger"))
+    # The cells of a row follow each other without a space.
+    assert "parts in 1 layersee the cut files" in finger
+    assert "PETPE, PE and PTFE kerf uncalibrated" in finger

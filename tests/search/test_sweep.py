@@ -21,7 +21,7 @@ from sbafab.search import sweep as module
 from sbafab.search.measure import measured
 from sbafab.search.pool import MeasureJob
 from sbafab.search.sweep import SweptDesigns
-from sbafab.search.sweep_report import Dots, Objective, passes_svg, trades_svg
+from sbafab.search.sweep_report import Dots, Objective, Table, _objectives, passes_svg, trades_svg
 from tests.site.formats import hold
 
 HAS_PARQUET = find_spec("pyarrow") is not None
@@ -230,3 +230,17 @@ def test_a_table_that_no_sweep_wrote_is_left_alone(
     with pytest.raises(OutputError, match="not written by sbafab sweep"):
         _swept(tmp_path)
     assert (folder / "sweep.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize("ending", ["", ", calibration paper"])
+def test_page_and_table_lead_with_one_force(ending: str) -> None:
+    """Without a calibration ``predict`` designs with Eq. 4, the first."""
+    flat = [f"blocked force at {kpa} kPa, flat, " for kpa in (10, 100)]
+    models = ["virtual work on Eq. 4", f"elastic stack{ending}"]
+    names = [f"{begins}{model} [N]" for model in models for begins in flat]
+    row = {"outcome": "passes", "reason": "", "figures": dict.fromkeys(names, 1.0)}
+    table = Table(lambda: iter([row]), [{}], (10.0, 100.0))
+    leading = [column.name for column in table.written if column.name.startswith("blocked")]
+    model = models[bool(ending)]
+    assert leading == [f"{begins}{model} [N]" for begins in flat]
+    assert leading[-1] in [objective.column for objective in _objectives(table)]

@@ -113,7 +113,9 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
         weight = f", the lightest of {shown} mg"
     thin = units.millimetres(film.thickness)
     how = HOLDING[hold_down(works[0], film)]
-    sticks = SILICONE if film.is_mask and hold_down(works[0], film) == "carrier" else ""
+    sticks = ""
+    if film.material == "PTFE" and hold_down(works[0], film) == "carrier":
+        sticks = SILICONE
     up = ""
     if film.faces is not None and film.faces[0] != film.faces[1]:
         up = f" Its {film.faces[0]} face is up, its {film.faces[1]} face down: mark the upper one."

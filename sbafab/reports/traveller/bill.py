@@ -142,7 +142,7 @@ def _films(work: Work) -> list[Item]:
             Item(
                 f"{film.material} film",
                 f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of "
-                f"parts in {len(layers) * work.job.copies} layers",
+                f"parts in {units.count(len(layers) * work.job.copies, 'layer')}",
                 ", ".join(needed) or "see the cut files",
                 len(sheets) or None,
                 sum(sheet.width * sheet.length for sheet in sheets) / 1e6 if sheets else None,

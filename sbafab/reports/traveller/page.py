@@ -375,7 +375,7 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
     if nominal:
         yield (
-            f"{' and '.join(nominal)} kerf uncalibrated",
+            f"{joined_words(nominal)} kerf uncalibrated",
             "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
             "Cut, measure and compute a calibration piece (“sbafab new coupon”, “sbafab kerf”), "
             "and generate again.",

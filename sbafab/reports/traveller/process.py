@@ -268,9 +268,11 @@ def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
 def _lay_round(things: Things, turn: Round, pins: Sequence[Pin]) -> Action:
     """Return the laying of a round with one box for every turn, so that nobody loses count."""
     order = ", then ".join(_named(layer) for layer in turn.turns[0])
+    size = len(turn.places)
+    often = f"{turn.count} times the same {size}, lowest first" if size > 1 else "all alike"
     return Action(
-        f"Lay layers {turn.first.index} to {turn.last.index}, {turn.count} times the same "
-        f"{len(turn.places)}, lowest first: {order}." + _by_eye(things, turn.layers, pins),
+        f"Lay layers {turn.first.index} to {turn.last.index}, {often}: {order}."
+        + _by_eye(things, turn.layers, pins),
         tuple(layer.index for layer in turn.layers),
         tuple(layer_numbers([layer.index for layer in part]) for part in turn.turns),
     )
