@@ -17,6 +17,7 @@ from sbafab.design.files import listed, shown
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
 from sbafab.importing.polygons import SUFFIXES, polygon_layer
+from sbafab.importing.popupcad import SUFFIX, cad_layer
 from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.laminate import Role
 
@@ -57,19 +58,21 @@ class CsvRow(NamedTuple):
 def import_table(folder: Path) -> Imported:
     """Return the design of a folder of DXF or SVG files and its tables. Raises DesignError.
 
-    A layer of polygons of foldable_robotics, by its number, is a drawing too. A ``kit.toml`` beside
-    the tables gives films, press, laser and limits.
+    A layer of polygons of foldable_robotics, by its number, is a drawing too, and so is one of a
+    popupCAD design, by "OPERATION/NUMBER". A ``kit.toml`` beside the tables gives films, press,
+    laser and limits.
     """
     rows = read_table(folder / LAYERS, LAYER_COLUMNS)
     shapes: dict[str, dict[str, Any]] = {}
     names: dict[tuple[str, str | None], str] = {}
     drawings: dict[str, bytes] = {}
-    layers = []
+    layers, remarks = [], []
     for row in rows:
         drawing = row.cells["file"], row.cells.get("layer")
         if drawing not in names:
             names[drawing] = key_name(drawing[1] or Path(drawing[0]).stem, shapes, "layer-")
-            name, content = _drawing(folder, row)
+            name, content, read_as = _drawing(folder, row)
+            remarks += read_as
             if drawings.setdefault(name, content) != content:
                 raise DesignError(f"{row.place}: two files are named {name}; rename one of them")
             is_part = drawing[1] is not None and name == Path(drawing[0]).name
@@ -94,8 +97,8 @@ def import_table(folder: Path) -> Imported:
         for path in folder.iterdir()
         if path.suffix.lower() in DRAWINGS and path.name not in drawings
     )
-    remarks = [f"{name}: {LAYERS} does not name it, so it is not imported" for name in unused]
-    return Imported(tables, drawings, tuple(remarks))
+    remarks += [f"{name}: {LAYERS} does not name it, so it is not imported" for name in unused]
+    return Imported(tables, drawings, tuple(dict.fromkeys(remarks)))
 
 
 def read_table(path: Path, columns: Mapping[str, bool]) -> list[CsvRow]:
@@ -154,21 +157,23 @@ def _row(
     return CsvRow(place, cells)
 
 
-def _drawing(folder: Path, row: CsvRow) -> tuple[str, bytes]:
-    """The name and content of a row's drawing, which must be one."""
+def _drawing(folder: Path, row: CsvRow) -> tuple[str, bytes, list[str]]:
+    """The name and content of a row's drawing, which must be one, and remarks on it."""
     path, layer = folder / row.cells["file"], row.cells.get("layer", "")
     suffix = path.suffix.lower()
-    if suffix not in (*DRAWINGS, *SUFFIXES):
+    if suffix not in (*DRAWINGS, *SUFFIXES, SUFFIX):
         raise DesignError(
-            f"{row.place}: file = {shown(row.cells['file'])} is no DXF or SVG, and no JSON or YAML "
-            "of polygons"
+            f"{row.place}: file = {shown(row.cells['file'])} is no DXF or SVG, no JSON or YAML of "
+            "polygons, and no popupCAD design"
         )
     try:
-        if suffix in SUFFIXES:
-            region = polygon_layer(path, layer)
-            return f"{path.stem}-{layer}.dxf", dxf_text(region.contours, {}).encode()
+        if suffix in (*SUFFIXES, SUFFIX):
+            is_cad = suffix == SUFFIX
+            region, remarks = cad_layer(path, layer) if is_cad else (polygon_layer(path, layer), [])
+            name = f"{path.stem}-{file_name(layer)}.dxf"
+            return name, dxf_text(region.contours, {}).encode(), remarks
         read_drawing(path, row.cells.get("layer"))
-        return path.name, path.read_bytes()
+        return path.name, path.read_bytes(), []
     except DesignError as error:
         raise DesignError(f"{row.place}: {error}") from None
 

@@ -1,4 +1,4 @@
-"""Layers of polygons that foldable_robotics saves, and why a popupCAD design holds none.
+"""Layers of polygons that foldable_robotics saves.
 
 A laminate of foldable_robotics is an object with ``layers``, bottom to top, each with ``geoms`` in
 well-known text (WKT), as JSON or YAML. It says nothing of films, roles or units: a table does.
@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 from sbafab.design.files import shown
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, polygon, union
-from sbafab.importing.records import not_json, read_text
+from sbafab.importing.records import not_json, read_text, yaml_of
 
 if TYPE_CHECKING:
     import shapely
 
 SUFFIXES = (".json", ".yaml", ".yml")
-POPUPCAD = ".cad"
 MOST_BYTES = 20_000_000
 LAMINATE_TAGS = ("!Laminate", "!Layer")
 """Tags that foldable_robotics gives its objects in YAML; what they mark are plain objects."""
@@ -52,11 +51,6 @@ def polygon_layers(path: Path) -> list[list[str]]:
 
 def refuse_without_table(path: Path, table: str) -> DesignError:
     """Return the error of a laminate of polygons that is imported without a table of its layers."""
-    if path.suffix.lower() == POPUPCAD:
-        return DesignError(
-            f"{path} is a popupCAD design, which holds operations on sketches and no layers; save "
-            f"its laminate as DXF there, a file a layer, and import the folder with a {table}"
-        )
     count = len(polygon_layers(path))
     return DesignError(
         f"{path} holds {count} layers of polygons and not what they are for; write {table} beside "
@@ -86,13 +80,7 @@ def _document(path: Path, text: str) -> Any:
             return json.loads(text)
         except (ValueError, RecursionError) as error:
             raise not_json(path, error) from None
-    try:
-        import yaml
-    except ImportError:
-        raise DesignError(
-            f"{path} is YAML, which takes PyYAML to read; "
-            'pip install "sbafab[yaml]", or save it as JSON'
-        ) from None
+    yaml = yaml_of(path)
     # Objects of foldable_robotics are plain ones here, and no other is made.
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:

@@ -109,3 +109,14 @@ def read_text(path: Path, most_bytes: int) -> str:
     if size > most_bytes:
         raise DesignError(f"{path} has {size:,} bytes, where at most {most_bytes:,} are allowed")
     return text
+
+
+def yaml_of(path: Path) -> Any:
+    """Return PyYAML, for a file that needs it. Raises DesignError without the extra."""
+    try:
+        import yaml
+    except ImportError:
+        raise DesignError(
+            f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
+        ) from None
+    return yaml

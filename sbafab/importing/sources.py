@@ -11,7 +11,8 @@ from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import LAYERS, import_table
 from sbafab.importing.parchmint import import_parchmint
-from sbafab.importing.polygons import MOST_BYTES, POPUPCAD, refuse_without_table
+from sbafab.importing.polygons import MOST_BYTES, refuse_without_table
+from sbafab.importing.popupcad import SUFFIX, refuse_alone
 from sbafab.importing.records import Imported, not_json, read_text
 from sbafab.laminate.laminate_validator import SCHEMA
 
@@ -68,11 +69,19 @@ def _has_table(source: Path) -> bool:
 
 def _is_polygons(source: Path) -> bool:
     suffix = source.suffix.lower()
-    return suffix in (POPUPCAD, ".yaml", ".yml") or _holds('"geoms"')(source)
+    return suffix in (".yaml", ".yml") or _holds('"geoms"')(source)
 
 
 def _no_table(source: Path) -> Imported:
     raise refuse_without_table(source, LAYERS)
+
+
+def _is_popupcad(source: Path) -> bool:
+    return source.suffix.lower() == SUFFIX and source.is_file()
+
+
+def _no_table_of_popupcad(source: Path) -> Imported:
+    raise refuse_alone(source, LAYERS)
 
 
 FORMATS = (
@@ -81,4 +90,7 @@ FORMATS = (
     SourceFormat("a laminate.json", _holds(SCHEMA), import_laminate),
     SourceFormat("a circuit in ParchMint JSON", _holds('"components"'), import_parchmint),
     SourceFormat("a laminate of polygons, with a table of its layers", _is_polygons, _no_table),
+    SourceFormat(
+        "a popupCAD design, with a table of its layers", _is_popupcad, _no_table_of_popupcad
+    ),
 )

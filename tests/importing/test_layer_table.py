@@ -209,9 +209,6 @@ def test_polygons_without_a_table_say_what_is_missing(importing: Importing, tmp_
     assert "holds 3 layers of polygons and not what they are for; write layers.csv" in (
         importing(source).output
     )
-    (tmp_path / "hinge.cad").write_text("!!python/object:popupcad.filetypes.design.Design\n")
-    said = importing(tmp_path / "hinge.cad").output
-    assert "is a popupCAD design, which holds operations on sketches and no layers" in said
 
 
 def test_yaml_without_pyyaml_names_its_extra(
