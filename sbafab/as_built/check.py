@@ -240,7 +240,7 @@ def read_folder(
     files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
     problems += file_errors
     files = _as_laid(files, expected)
-    seams, file_errors = read_seams(folder, claims, expected)
+    seams, file_errors = read_seams(folder, claims, design, expected)
     problems += file_errors
     panel, files, file_errors = read_panel(folder, claims, files, expected)
     problems += file_errors

@@ -31,9 +31,19 @@ from sbafab.cutting.properties import (
     kerf_properties,
     kerf_text,
 )
-from sbafab.cutting.seam_files import deviation, read_seam, seam_path, stated_width
+from sbafab.cutting.seam_files import (
+    CENTRED,
+    deviation,
+    moved,
+    offset_text,
+    read_seam,
+    seam_path,
+    stated_width,
+)
 from sbafab.cutting.verify import check_datum
+from sbafab.design.records import Design
 from sbafab.errors import OutputError
+from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.joints import Seam
@@ -269,11 +279,12 @@ def check_sequence(drawing: ReadBack) -> None:
 
 
 def read_seams(
-    folder: Path, claims: Manifest, expected: ExpectedLaminate | None
+    folder: Path, claims: Manifest, design: Design, expected: ExpectedLaminate | None
 ) -> tuple[tuple[Seam, ...] | None, list[Problem]]:
     """Return the seams as their files draw them, and problems; None where the design has none.
 
-    A path within a micrometre of the design's is the design's own.
+    A path within a micrometre of the design's is the design's own. Each lies where its tool, which
+    the design says is beside the machine's head, comes when the head follows the file.
     """
     designed = () if expected is None else expected.laminate.seams
     problems = _seam_problems(claims, designed)
@@ -286,7 +297,8 @@ def read_seams(
         if claim is None:
             continue
         try:
-            seams.append(_read_seam(folder, claim, seam, problems))
+            offset = design.seam_offsets.get(seam.tool)
+            seams.append(_read_seam(folder, claim, seam, offset, problems))
         except OutputError as error:
             reason = str(error).removeprefix(f"{PurePosixPath(claim.file or claim.name).name}: ")
             problems.append(Problem(INTEGRITY, f"seam {seam.name} ({claim.file}): {reason}"))
@@ -324,10 +336,26 @@ def _seam_problems(claims: Manifest, designed: tuple[Seam, ...]) -> list[Problem
     return problems
 
 
-def _read_seam(folder: Path, claim: SeamClaim, seam: Seam, problems: list[Problem]) -> Seam:
+def _read_seam(
+    folder: Path,
+    claim: SeamClaim,
+    seam: Seam,
+    offset: Point | None,
+    problems: list[Problem],
+) -> Seam:
     path = path_in_folder(folder, claim.file)
     sound_digest(path)
     chains, properties = read_seam(path)
+    chains = moved(chains, offset or CENTRED)
+    stated = None if offset is None else offset_text(offset)
+    if properties.get("TOOL_OFFSET") != stated:
+        problems.append(
+            Problem(
+                CLAIMS,
+                f"seam {seam.name} ({claim.file}): TOOL_OFFSET is "
+                f"{properties.get('TOOL_OFFSET')!r}, and by design.toml {stated!r}",
+            )
+        )
     width = stated_width(properties)
     if width is None or abs(width - claim.width) > TOLERANCE:
         problems.append(

@@ -60,6 +60,7 @@ class CutSettings:
     recipes: Mapping[Material, Recipes] = field(default_factory=dict)
     entries: Mapping[Material, Entries] = field(default_factory=dict)
     program: LaserProgram | None = None
+    seam_offsets: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def kerf_width(self, material: Material) -> Kerf | None:
         return self.kerf_widths.get(material)

@@ -1,7 +1,8 @@
 """Files of seam paths: what the middle of a tool follows, one file a seam, in order.
 
 A path lies on the layer SEAM and nothing else is cut; the tool bonds half of its width on both
-sides of it. Coordinates are those of the layer files, mm.
+sides of it. Coordinates are those of the layer files, mm. The file of a tool that is mounted beside
+its machine's head is for that head: shifted by minus the tool's offset, which it states.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.dxf_write import seam_text
 from sbafab.cutting.properties import FOLDER, REFERENCE, SEAM, CutSettings
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Edge, Point, distance_to
+from sbafab.geometry.contour import Similarity, shift
+from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import Laminate
 
@@ -22,6 +24,9 @@ TOLERANCE = 0.001
 """mm within which a path read back is the one that was written."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places along an edge at which it is compared."""
+
+CENTRED: Point = (0.0, 0.0)
+"""Offset of a tool in the place of its machine's head."""
 
 Chains = Sequence[Sequence[Edge]]
 
@@ -33,6 +38,7 @@ def seam_path(seam: Seam) -> str:
 
 def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
     """Return the custom properties of a seam's file."""
+    offset = settings.seam_offsets.get(seam.tool)
     return {
         "DESIGN": settings.design,
         "DESIGN_SHA256": settings.design_sha256,
@@ -42,6 +48,7 @@ def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
         "TOOL": seam.tool,
         "TOOL_WIDTH": f"{seam.width:g}",
         "KIND": seam.kind,
+        **({} if offset is None else {"TOOL_OFFSET": offset_text(offset)}),
         "UNITS": "mm",
         "GENERATOR": settings.generator,
     }
@@ -55,11 +62,31 @@ def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) ->
         path = folder / seam_path(seam)
         path.parent.mkdir(parents=True, exist_ok=True)
         properties = seam_properties(seam, settings)
-        path.write_text(seam_text(seam.path, properties), encoding="utf-8", newline="\n")
+        x, y = settings.seam_offsets.get(seam.tool, CENTRED)
+        text = seam_text(moved(seam.path, (-x, -y)), properties)
+        path.write_text(text, encoding="utf-8", newline="\n")
         chains, written = read_seam(path)
-        off = deviation(chains, seam.path)
+        off = deviation(moved(chains, (x, y)), seam.path)
         if off is not None or written != properties:
             raise OutputError(f"{path.name}: {off or 'its properties differ'}; regenerate it.")
+
+
+def moved(chains: Chains, by: Point) -> tuple[tuple[Edge, ...], ...]:
+    """Return chains moved by so many mm along x and y; the same ones for none."""
+    if by == CENTRED:
+        return tuple(map(tuple, chains))
+    return tuple(tuple(_moved(edge, shift(*by)) for edge in chain) for chain in chains)
+
+
+def _moved(edge: Edge, to: Similarity) -> Edge:
+    if isinstance(edge, Line):
+        return Line(to(edge.start), to(edge.end))
+    return Arc(to(edge.start), to(edge.end), to(edge.centre), edge.radius, edge.ccw)
+
+
+def offset_text(offset: Point) -> str:
+    """Return an offset as a seam's file states it: "12, -3.5"."""
+    return f"{offset[0]:.9g}, {offset[1]:.9g}"
 
 
 def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]:

@@ -116,6 +116,7 @@ def actuator_sha256(design: Design) -> str:
 
 NO_ACTUATOR = (
     *("name", "kit", "films", "laser", "sheets", "order", "rules", "models", "acceptance"),
+    "seam_tools",
     FITS,
 )
 """Sections that do not make another actuator; of films and laser the layup says what counts."""

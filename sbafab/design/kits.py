@@ -38,6 +38,7 @@ from sbafab.design.sections import (
     Press,
     Registration,
     Rules,
+    SeamTools,
     Sheets,
 )
 from sbafab.design.toml_table import Section, writable
@@ -55,6 +56,7 @@ SECTIONS = (
         "layup",
         "face_bonds",
         "registration",
+        "seam_tools",
         "press",
         "acceptance",
         "laser",
@@ -106,6 +108,7 @@ class KitFile(Section):
     layup: LayerFilms = LayerFilms.model_construct()
     face_bonds: FaceBondings | None = None
     registration: Registration = Registration.model_construct()
+    seam_tools: SeamTools | None = None
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()

@@ -58,6 +58,7 @@ from sbafab.design.sections import (
     Press,
     Registration,
     Rules,
+    SeamTools,
     Sheets,
     Stack,
 )
@@ -105,6 +106,8 @@ class Design(Section):
     face_bonds: FaceBondings | None = None
     """Which faces of films bond, and by what; by default all structural films in the press."""
     registration: Registration = Registration.model_construct()
+    seam_tools: SeamTools | None = None
+    """Tools that make seams beside their machine's head; by default each is in its place."""
     panel: PanelSection = PanelSection.model_construct()
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()
@@ -191,6 +194,11 @@ class Design(Section):
             FaceBond(name, bond.faces, bond.by, bond.temperature_c, bond.after)
             for name, bond in bonds.items()
         )
+
+    @property
+    def seam_offsets(self) -> dict[str, tuple[float, float]]:
+        """Where tools are from their machine's head, mm, by the tools' names; none in its place."""
+        return {} if self.seam_tools is None else self.seam_tools.offsets
 
     @property
     def thickest_pin(self) -> float:

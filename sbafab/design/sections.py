@@ -318,6 +318,36 @@ class Registration(Section):
         return self.pin_diameter + self.pin_clearance
 
 
+MountCoordinate = Annotated[float, Millimetres(-500, 500)]
+
+
+class SeamTool(Section):
+    """How a tool that makes seams is mounted on its machine."""
+
+    offset: Annotated[tuple[MountCoordinate, MountCoordinate], Field(strict=False)]
+    """Where its middle is, x and y from the laser or pen head by which the machine's origin is set.
+    Seam files are shifted by minus that; all else shows seams where they are made."""
+
+
+class SeamTools(Section):
+    """Tools that make seams, where they are not mounted in place of the machine's head."""
+
+    laser: SeamTool | None = None
+    """The laser."""
+    hot_tip: SeamTool | None = None
+    """The hot tip."""
+    ultrasonic: SeamTool | None = None
+    """The ultrasonic horn."""
+    roller: SeamTool | None = None
+    """The roller."""
+
+    @property
+    def offsets(self) -> dict[str, tuple[float, float]]:
+        """The offsets other than none, by the tools' names in seams."""
+        rows = {name.replace("_", "-"): getattr(self, name) for name in SeamTools.model_fields}
+        return {tool: row.offset for tool, row in rows.items() if row and any(row.offset)}
+
+
 class PanelSection(Section):
     """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
 

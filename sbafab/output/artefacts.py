@@ -261,7 +261,8 @@ def _seams(folder: DesignFolder) -> bytes | None:
     # Only a folder with a traveller has pages of seams.
     from sbafab.reports.underlay import seams_pdf
 
-    return seams_pdf(folder.laminate, design_sha256(folder.design))
+    design = folder.design
+    return seams_pdf(folder.laminate, design_sha256(design), design.seam_offsets)
 
 
 # Meshes and pictures.

@@ -165,6 +165,7 @@ def cut_settings(
         recipes=recipes(design),
         entries=entries(design),
         program=design.sheets.program,
+        seam_offsets=design.seam_offsets,
     )
 
 

@@ -10,7 +10,7 @@ how much steadier it makes a hand was not measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
@@ -349,26 +349,43 @@ SEAM_USE = (
 )
 
 
-def seams_pdf(laminate: Laminate, design_sha256: str) -> bytes | None:
+def file_shift_words(tool: str, offset: Point) -> str:
+    """Return that the files of a tool are shifted, and by how much."""
+    x, y = offset
+    return f"the files of the {tool} are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm."
+
+
+def seams_pdf(
+    laminate: Laminate, design_sha256: str, offsets: Mapping[str, Point] | None = None
+) -> bytes | None:
     """Return pages of seam paths at 1:1, one for all seams of the same films in hand; None without
-    a seam.
+    a seam. Paths lie where the seams are made, for tools with ``offsets`` too, which a line says.
     """
     steps: dict[tuple[int, ...], list[tuple[int, Seam]]] = {}
     for step in laying(laminate):
         if step.joining is not None and step.joining.seam is not None:
             steps.setdefault(step.layers, []).append((step.number, step.joining.seam))
-    pages = [_seam_page(laminate, layers, seams, design_sha256) for layers, seams in steps.items()]
+    offsets = offsets or {}
+    pages = [
+        _seam_page(laminate, layers, seams, design_sha256, offsets)
+        for layers, seams in steps.items()
+    ]
     return pdf(pages, f"{laminate.name}: paths of seams") if pages else None
 
 
 def _seam_page(
-    laminate: Laminate, layers: Sequence[int], seams: Sequence[tuple[int, Seam]], sha256: str
+    laminate: Laminate,
+    layers: Sequence[int],
+    seams: Sequence[tuple[int, Seam]],
+    sha256: str,
+    offsets: Mapping[str, Point],
 ) -> PdfPage:
+    shifted = [tool for tool in dict.fromkeys(seam.tool for _, seam in seams) if tool in offsets]
     films = union([laminate.layer(index).profile for index in layers])
     low_x, low_y, high_x, high_y = box_round(
         [films.bounds, *(seam.region.bounds for _, seam in seams)]
     )
-    foot = 24 + ROW * (len(seams) + 2)
+    foot = 24 + ROW * (len(seams) + len(shifted) + 2)
     width = max(PAPER[0], high_x - low_x + 2 * SIDE)
     height = max(PAPER[1], high_y - low_y + HEAD + foot)
     page = PdfPage(width, height)
@@ -398,6 +415,9 @@ def _seam_page(
     for step, seam in seams:
         words = f"step {step}: seam {seam.name}, {seam.tool}, {seam.width:g} mm wide, layers "
         page.text((14, y), f"{words}{seam.below} and {seam.above}; begins at its circle", WORDS)
+        y -= ROW
+    for tool in shifted:
+        page.text((14, y), f"As made: {file_shift_words(tool, offsets[tool])}", WORDS)
         y -= ROW
     lines = f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its"
     page.text((14, y), f"{lines} width.", WORDS)

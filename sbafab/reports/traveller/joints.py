@@ -102,6 +102,14 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
         f"of the picture), {_start_words(work.laminate, step.layers, seam)}. A machine takes the "
         "file below."
     )
+    offset = work.design.seam_offsets.get(seam.tool)
+    if offset is not None:
+        x, y = offset
+        yield Action(
+            f"The {seam.tool}'s paths are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm: the tool is "
+            f"{x:.2f}, {y:.2f} mm from its machine's head. Set that head, not the tool, on the "
+            "cross of the file."
+        )
     yield Action(f"Follow the path ({path}) with the middle of the tool, once, without a stop.")
     yield Action("Look along the seam: no gap, no hole, nothing bonded beside it.")
 
