@@ -60,6 +60,13 @@ class Record:
             raise DesignError(f"{place} has no {key} that can be read; save the design again")
         return value
 
+    def links(self, group: str, key: str, place: str) -> list[Any]:
+        """Return what an operation links under a key of a group; nothing where it has none."""
+        row = self.need(group, place, dict).get(key) or ()
+        if not isinstance(row, list | tuple):
+            raise DesignError(f"{place} has no list of {key} in {group}; save the design again")
+        return [*row]
+
 
 def _records(path: Path, text: str) -> Any:
     """The document, with plain values and records alone. Raises DesignError."""
@@ -231,6 +238,8 @@ def _shape(shape: Any, place: str) -> Flat:
             raise DesignError(f"{place} is a rectangle without area; remove it")
         return Flat(polygon([(x, y), (x, v), (u, v), (u, y)]))
     holes = shape.values.get("interiors") or []
+    if not isinstance(holes, list | tuple):
+        raise DesignError(f"{place} has no list of interiors; save the design again")
     return Flat(_polygon(points, [_points(hole, place) for hole in holes], place))
 
 
@@ -305,6 +314,10 @@ class CadDesign:
             raise DesignError(f"{place} names a layer that is not there; save the design again")
         return [self.layer_numbers[link] for link in links]
 
+    def linked_sketch(self, operation: Record, key: str, place: str) -> list[tuple[str, Any]]:
+        """Return the shapes of the first sketch that an operation links under a key."""
+        return self.sketch(_first(operation.links("sketch_links", key, place)), place)
+
     def sketch(self, identity: Any, place: str) -> list[tuple[str, Any]]:
         """Return the shapes of a sketch but for construction, each with its place."""
         sketch = self.sketches.get(identity) if _is_id(identity) else None
@@ -352,8 +365,8 @@ class CadDesign:
 
     def parents(self, operation: Record, key: str, place: str) -> list[Stack]:
         """Return what the operations of a link have made."""
-        links = operation.need("operation_links", place, dict)
-        return [self.stacks[self.index_of(ref, place)] for ref in links.get(key) or ()]
+        links = operation.links("operation_links", key, place)
+        return [self.stacks[self.index_of(ref, place)] for ref in links]
 
     def parent(self, operation: Record, place: str, key: str = "parent") -> Stack:
         """Return what the operation that one changes has made. Raises DesignError."""
@@ -371,9 +384,13 @@ def _is_id(value: Any) -> bool:
     return isinstance(value, int | str)
 
 
+def _first(links: Sequence[Any]) -> Any:
+    return links[0] if links else None
+
+
 def _sketched(design: CadDesign, operation: Record, place: str) -> Stack:
-    links = operation.need("sketch_links", place, dict).get("sketch") or [None]
-    flat = _joined(_shape(shape, where) for where, shape in design.sketch(links[0], place))
+    shapes = design.linked_sketch(operation, "sketch", place)
+    flat = _joined(_shape(shape, where) for where, shape in shapes)
     return design.spread(dict.fromkeys(design.layer_indices(operation, "layer_links", place), flat))
 
 
@@ -456,20 +473,19 @@ def _moved(design: CadDesign, stack: Stack, shift: int) -> Stack:
 
 def _transformed(design: CadDesign, operation: Record, place: str) -> Stack:
     stack = design.parent(operation, place, "from")
-    links = operation.need("sketch_links", place, dict)
-    source = design.sketch((links.get("sketch_from") or [None])[0], place)
+    source = design.linked_sketch(operation, "sketch_from", place)
     return _placed(design, operation, place, stack, source)
 
 
 def _placed_design(design: CadDesign, operation: Record, place: str) -> Stack:
-    links = operation.need("design_links", place, dict).get("subdesign") or [None]
-    if links[0] not in design.placed:
-        part = design.subdesigns.get(links[0]) if _is_id(links[0]) else None
-        if not isinstance(part, Record) or design.depth >= DEEPEST:
-            raise DesignError(f"{place} takes a design that is not there; save the design again")
-        name = part.values.get("_basename", links[0])
-        design.placed[links[0]] = _design(part, f"{place}, design {name}", design.depth + 1)
-    part_design = design.placed[links[0]]
+    identity = _first(operation.links("design_links", "subdesign", place))
+    part = design.subdesigns.get(identity) if _is_id(identity) else None
+    if not isinstance(part, Record) or design.depth >= DEEPEST:
+        raise DesignError(f"{place} takes a design that is not there; save the design again")
+    if identity not in design.placed:
+        name = part.values.get("_basename", identity)
+        design.placed[identity] = _design(part, f"{place}, design {name}", design.depth + 1)
+    part_design = design.placed[identity]
     index = part_design.index_of(operation.need("subopref", place), place)
     stack = part_design.stack(index)
     design.remarks |= part_design.remarks
@@ -485,8 +501,7 @@ def _placed(
     source: Sequence[tuple[str, Any]],
 ) -> Stack:
     """A stack laid from the first shape of a sketch onto each shape of another one."""
-    links = operation.need("sketch_links", place, dict)
-    targets = design.sketch((links.get("sketch_to") or [None])[0], place)
+    targets = design.linked_sketch(operation, "sketch_to", place)
     if not source:
         raise DesignError(f"{place} is laid from a sketch without a line; save the design again")
     first = _two_points(*source[0])

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import math
+import random
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -443,6 +445,14 @@ UNREAD: dict[str, tuple[list[str], str]] = {
     "none": ([combined(1, "union", [77], [])], "takes an operation that is not there"),
     "a layer": ([drawn(1, 1, (99,))], "operation 1 (SimpleSketchOp) names a layer that is not"),
     "a sketch": ([drawn(1, 77)], "operation 1 (SimpleSketchOp) takes a sketch that is not there"),
+    "no list": (
+        [drawn(1, 1).replace("sketch: [1]", "sketch: 1")],
+        "operation 1 (SimpleSketchOp) has no list of sketch in sketch_links",
+    ),
+    "no list of parents": (
+        [combined(1, "union", [], []).replace("unary: []", "unary: 1.5")],
+        "operation 1 (LaminateOperation2) has no list of unary in operation_links",
+    ),
     "text": ([drawn(1, 31)], "sketch text, shape 1 is a GenericText, which is not read"),
     "a crossing": ([drawn(1, 32)], "sketch bow, shape 1 is a polygon with Self-intersection[2 2]"),
     "a number": ([drawn(1, 33)], "sketch far, shape 1 has 1e+06 mm, where at most 100000"),
@@ -502,6 +512,21 @@ DAMAGED: dict[str, tuple[Callable[[str], str], str]] = {
     "no design": (lambda text: "layers: []", "hinge.cad holds no design of popupCAD"),
     "no layers": (lambda text: text.replace("layers: [!!", "layer: [!!"), "has no list of layers"),
 }
+
+
+def test_values_put_in_at_random_are_refused_or_read(tmp_path: Path) -> None:
+    draw = random.Random(7)
+    places = [found.span(1) for found in re.finditer(r": (\[?[^\s,\[\]{}]+)[,}\]]", POUCH)]
+    values = ("null", "[]", "{}", "1.5", "-3", ".nan", "x", "2001-01-01", "!!python/tuple [1]")
+    refused = 0
+    for _ in range(80):
+        start, end = draw.choice(places)
+        path = saved(tmp_path, POUCH[:start] + draw.choice(values) + POUCH[end:])
+        try:
+            cad_layer(path, f"{draw.randint(1, 4)}/{draw.randint(1, 3)}")
+        except DesignError:
+            refused += 1
+    assert 10 < refused < 80
 
 
 @pytest.mark.parametrize("name", DAMAGED)
