@@ -24,6 +24,8 @@ from sbafab.models.balloon import Balloon, Shapes
 from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import ArrayLike, NDArray
 
     from sbafab.models.film_elements import Array
@@ -106,6 +108,22 @@ WINDOWS = np.arange(HEIGHT_SPANS)[:, None] + np.arange(DEGREE + 1)
 PIECES_IN_ALL = HEIGHT_SPANS + 2
 """Pieces of a spline by height, with an extrapolation at either end."""
 CURVES = np.stack([SLOPES[:, k] * k for k in range(1, DEGREE)], -1)
+
+
+def _near_pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Return the pairs (first, second) of ``count`` coefficients that share a piece of the spline,
+    and, for each element of a matrix by products of coefficients (pressure x height, twice), its
+    place in a matrix by pairs (pressure, height); the last of these, one further, is of no pair.
+    """
+    first, second = np.nonzero(np.triu(np.tri(count, k=DEGREE)))
+    pair = np.full((count, count), len(first))
+    pair[first, second] = pair[second, first] = np.arange(len(first))
+    size = count**2
+    places = pair[:, None, :, None] * (len(first) + 1) + pair[None, :, None, :]
+    return first, second, places.reshape(size, size)
+
+
+*PAIRS, PAIR_OF = _near_pairs(HEIGHT_SPANS + DEGREE)
 
 
 def basis(x: Array, order: int = 0) -> tuple[NDArray[np.int_], Array]:
@@ -454,7 +472,8 @@ def _free_rows(frame: BalloonMap, free: _Free, area: float) -> tuple[Array, tupl
     return force * frame.spans, (volume, free.volume * room)
 
 
-class MapLimits(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class MapLimits:
     """Functions of a spline's coefficients that must be above 0, and are to be MARGIN: the matrices
     by pressure and by height (Bernstein coefficients, coefficients) of each kind, and a constant
     for each row by pressure, to which these are added.
@@ -467,15 +486,25 @@ class MapLimits(NamedTuple):
         grid = coefficients.reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
         return [across @ grid @ along.T + room[:, None] for across, along, room in self.kinds]
 
-    def rows(self, chosen: list[NDArray[np.bool_]]) -> tuple[Array, Array]:
-        """Return the equations of the values chosen, (values, coefficients), and constants."""
-        rows, rooms = [], []
-        for (across, along, room), these in zip(self.kinds, chosen, strict=True):
-            i, j = np.nonzero(these)
-            size = across.shape[1] * along.shape[1]
-            rows.append((across[i][:, :, None] * along[j][:, None]).reshape(len(i), size))
-            rooms.append(room[i])
-        return np.concatenate(rows), np.concatenate(rooms)
+    @cached_property
+    def outer_products(self) -> list[tuple[Array, Array]]:
+        """Products of pairs of near coefficients, of each kind's rows: (rows, pairs), twice."""
+        return [
+            (across[:, PAIRS[0]] * across[:, PAIRS[1]], along[:, PAIRS[0]] * along[:, PAIRS[1]])
+            for across, along, _ in self.kinds
+        ]
+
+    def lengths(self, metric: Array) -> list[Array]:
+        """Return the lengths of the values' gradients g: sqrt(g @ metric @ g)."""
+        count = PRESSURE_SPANS + DEGREE
+        pairs = metric.reshape((count, count) * 2).swapaxes(1, 2).reshape(count**2, count**2)
+        return [
+            np.sqrt(_squares(across) @ pairs @ _squares(along).T) for across, along, _ in self.kinds
+        ]
+
+
+def _squares(rows: Array) -> Array:
+    return (rows[:, :, None] * rows[:, None]).reshape(len(rows), -1)
 
 
 def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> MapLimits:
@@ -566,16 +595,15 @@ def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | 
     upper = np.linalg.qr(np.concatenate([matrix, stiff]), mode="r")
     back = np.linalg.inv(upper)
     free = back.T @ (matrix.T @ right_side)
-    best, chosen = back @ free, [np.zeros(kind.shape, bool) for kind in limits.values(back @ free)]
+    lengths = limits.lengths(back @ back.T)
+    best, chosen = back @ free, [np.zeros(kind.shape, bool) for kind in lengths]
     for _ in range(ACTIVE_SET_ROUNDS):
         values = limits.values(best)
         if min(kind.min() for kind in values) >= MARGIN / 2:
             return np.asarray(best)
         chosen = [old | (kind < 2 * MARGIN) for old, kind in zip(chosen, values, strict=True)]
-        rows, room = limits.rows(chosen)
-        rows = rows @ back
-        size = np.linalg.norm(rows, axis=1)
-        closest = nearest_admissible(free, rows / size[:, None], (MARGIN - room) / size)
+        size = np.concatenate([kind[these] for kind, these in zip(lengths, chosen, strict=True)])
+        closest = nearest_admissible(free, ChosenLimits(limits, chosen, back, size))
         if closest is None:
             return None
         best = back @ closest
@@ -606,34 +634,88 @@ STEP_SHARE = 0.99
 """Share of the way to the next limit that a step may go."""
 
 
-def nearest_admissible(point: Array, rows: Array, least: Array) -> Array | None:
-    """Return the x nearest to ``point`` (n,) with ``rows @ x >= least``; None where there is none.
+class ChosenLimits(NamedTuple):
+    """Limits ``rows @ x >= least`` on x, where ``back @ x`` are a spline's coefficients: the values
+    ``chosen`` of each kind, divided by the lengths ``size`` of their gradients by x.
 
-    Rows (m, n) are unit vectors. Mehrotra's predictor and corrector (Nocedal and Wright, Numerical
-    Optimization, Sec. 16.6).
+    A row is the product of one by pressure and one by height, of six coefficients each. All
+    products with ``rows``, (values, coefficients), are made of these.
     """
-    x = point.copy()
-    room = rows @ x - least
+
+    limits: MapLimits
+    chosen: list[NDArray[np.bool_]]
+    back: Array
+    size: Array
+
+    @property
+    def least(self) -> Array:
+        rooms = [
+            np.broadcast_to(room[:, None], these.shape)[these]
+            for (*_, room), these in zip(self.limits.kinds, self.chosen, strict=True)
+        ]
+        return np.asarray((MARGIN - np.concatenate(rooms)) / self.size)
+
+    def times(self, x: Array) -> Array:
+        """Return ``rows @ x``."""
+        grid = (self.back @ x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
+        values = [
+            (across @ grid @ along.T)[these]
+            for (across, along, _), these in zip(self.limits.kinds, self.chosen, strict=True)
+        ]
+        return np.asarray(np.concatenate(values) / self.size)
+
+    def transposed(self, factors: Array) -> Array:
+        """Return ``factors @ rows``."""
+        total = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
+        grids = self._on_grids(factors / self.size)
+        for (across, along, _), grid in zip(self.limits.kinds, grids, strict=True):
+            total += across.T @ grid @ along
+        return np.asarray(total.ravel() @ self.back)
+
+    def normal_matrix(self, weights: Array) -> Array:
+        """Return ``rows.T @ diag(weights) @ rows``."""
+        pairs = np.zeros((len(PAIRS[0]) + 1,) * 2)
+        grids = self._on_grids(weights / self.size**2)
+        for (across, along), grid in zip(self.limits.outer_products, grids, strict=True):
+            pairs[:-1, :-1] += across.T @ (grid @ along)
+        matrix = self.back.T @ pairs.ravel()[PAIR_OF] @ self.back
+        return np.asarray((matrix + matrix.T) / 2)
+
+    def _on_grids(self, values: Array) -> Iterator[Array]:
+        """Yield each kind's values at their places by pressure and height, with 0 elsewhere."""
+        ends = np.cumsum([these.sum() for these in self.chosen])
+        for part, these in zip(np.split(values, ends[:-1]), self.chosen, strict=True):
+            grid = np.zeros(these.shape)
+            grid[these] = part
+            yield grid
+
+
+def nearest_admissible(point: Array, limits: ChosenLimits) -> Array | None:
+    """Return the x nearest to ``point`` (n,) within the limits; None where there is none.
+
+    Mehrotra's predictor and corrector (Nocedal and Wright, Numerical Optimization, Sec. 16.6).
+    """
+    x, least = point.copy(), limits.least
+    room = limits.times(x) - least
     begin = max(1e-2 * float(np.abs(room).max(initial=0.0)), 1e-4)
-    slack, push = np.maximum(room, begin), np.full(len(rows), begin)
+    slack, push = np.maximum(room, begin), np.full(len(least), begin)
     for _ in range(QP_STEPS):
-        off = x - point - push @ rows
-        gap = rows @ x - slack - least
-        mean = float(slack @ push) / len(rows)
+        off = x - point - limits.transposed(push)
+        gap = limits.times(x) - slack - least
+        mean = float(slack @ push) / len(least)
         if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
             return x
-        weighted = rows * np.sqrt(push / slack)[:, None]
-        # A matrix times its own transpose: BLAS does half of the work.
-        inverse = np.linalg.inv(np.eye(len(x)) + weighted.T @ weighted)
+        matrix = np.eye(len(x)) + limits.normal_matrix(push / slack)
 
         def step(target: Array) -> tuple[Array, Array, Array]:
-            ahead = inverse @ (((-target - push * gap) / slack) @ rows - off)  # noqa: B023
-            slacker = rows @ ahead + gap  # noqa: B023
+            right_side = limits.transposed((-target - push * gap) / slack) - off  # noqa: B023
+            ahead = np.linalg.solve(matrix, right_side)  # noqa: B023
+            slacker = limits.times(ahead) + gap  # noqa: B023
             return ahead, slacker, (-target - push * slacker) / slack  # noqa: B023
 
         _, slacker, harder = step(slack * push)
         to = _share(slack, slacker), _share(push, harder)
-        remainder = (slack + to[0] * slacker) @ (push + to[1] * harder) / len(rows)
+        remainder = (slack + to[0] * slacker) @ (push + to[1] * harder) / len(least)
         aim = (remainder / mean) ** 3 * mean
         ahead, slacker, harder = step(slack * push + slacker * harder - aim)
         share = min(1.0, STEP_SHARE * min(_share(slack, slacker), _share(push, harder)))
