@@ -709,7 +709,7 @@ def nearest_admissible(point: Array, limits: ChosenLimits) -> Array | None:
 
         def step(target: Array) -> tuple[Array, Array, Array]:
             right_side = limits.transposed((-target - push * gap) / slack) - off  # noqa: B023
-            ahead = np.linalg.solve(matrix, right_side)  # noqa: B023
+            ahead = np.asarray(np.linalg.solve(matrix, right_side), float)  # noqa: B023
             slacker = limits.times(ahead) + gap  # noqa: B023
             return ahead, slacker, (-target - push * slacker) / slack  # noqa: B023
 
