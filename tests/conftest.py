@@ -27,8 +27,12 @@ settings.register_profile(
 )
 settings.load_profile("sbafab")
 
-LONG = "SBAFAB_LONG" in os.environ
-"""Whether only the tests marked ``long`` run, as ``.ci/run`` has them beside the suite."""
+LONG = os.environ.get("SBAFAB_LONG", "")
+"""Whether only the tests marked ``long`` run, as ``.ci/run`` has them beside the suite; if ``all``,
+whole random campaigns with them.
+"""
+MARKS = {"": set[str](), "all": {"long", "campaign"}}.get(LONG, {"long"})
+"""Marks of the tests that run; the suite has those without any."""
 SLOW_ROOMS = {"calibration", "models", "search", "simulators", "site", "validation"}
 """Folders of tests that take up to a minute each: of those marked ``long`` they run first, lest a
 worker begins one when the others are done."""
@@ -50,10 +54,13 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """The suite leaves out what is marked ``long``; with ``SBAFAB_LONG=1`` only that runs."""
-    left_out = [item for item in items if (item.get_closest_marker("long") is not None) != LONG]
+    """The suite leaves out what is marked ``long`` or ``campaign``; see MARKS for other runs."""
+    chosen, left_out = [], []
+    for item in items:
+        marks = {mark.name for mark in item.iter_markers()} & {"long", "campaign"}
+        (chosen if (marks <= MARKS and bool(marks) == bool(MARKS)) else left_out).append(item)
     config.hook.pytest_deselected(items=left_out)
-    items[:] = [item for item in items if item not in set(left_out)]
+    items[:] = chosen
     if LONG:
         items.sort(key=lambda item: item.path.parent.name not in SLOW_ROOMS)
 

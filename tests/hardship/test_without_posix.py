@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -25,33 +26,42 @@ PACKAGE = Path(__file__).parents[2] / "sbafab"
 POSIX_ONLY = {"fcntl", "grp", "posix", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 
 
-def calls() -> Iterator[tuple[str, ast.Call, str]]:
-    """Every call in the package with its file and the name of what is called."""
+def nodes(words: set[str]) -> Iterator[tuple[str, ast.AST]]:
+    """Every node, with its place, of the modules in which one of these words occurs."""
+    written = re.compile(rf"\b({'|'.join(words)})\b")
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                yield f"{path.relative_to(PACKAGE)}:{node.lineno}", node, node.func.attr
+        text = path.read_text(encoding="utf-8")
+        if written.search(text):
+            for node in ast.walk(ast.parse(text)):
+                line = getattr(node, "lineno", 0)
+                yield f"{path.relative_to(PACKAGE)}:{line}", node
 
 
-def test_no_module_is_imported_that_only_posix_has() -> None:
-    imported = {
+def imported(words: set[str]) -> set[str]:
+    """Those of the words that are imported somewhere."""
+    return words & {
         alias.name
-        for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for _, node in nodes(words)
         if isinstance(node, ast.Import | ast.ImportFrom)
         for alias in node.names
     }
-    assert "json" in imported
-    assert imported & POSIX_ONLY == set()
+
+
+def test_no_module_is_imported_that_only_posix_has() -> None:
+    assert imported({"tomllib"}) == {"tomllib"}
+    assert imported(POSIX_ONLY) == set()
 
 
 def test_text_files_have_one_encoding_and_line_feeds_everywhere() -> None:
     wanted = {"read_text": {"encoding"}, "write_text": {"encoding", "newline"}}
     found = [
-        (where, wanted[name] - {keyword.arg for keyword in node.keywords})
-        for where, node, name in calls()
+        (where, wanted[node.func.attr] - {keyword.arg for keyword in node.keywords})
+        for where, node in nodes(set(wanted))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
         # An encoding may be given by its place.
-        if name in wanted and not (name == "read_text" and node.args)
+        and node.func.attr in wanted
+        and not (node.func.attr == "read_text" and node.args)
     ]
     assert len(found) > 20
     assert [one for one in found if one[1]] == []

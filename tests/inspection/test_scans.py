@@ -72,7 +72,7 @@ def random_camera(seed: int) -> Camera:
     )
 
 
-@pytest.mark.parametrize("seed", few(range(20), 2))
+@pytest.mark.parametrize("seed", few(range(20), 2, long=6))
 def test_a_scan_is_measured(seed: int, folder: Path, tmp_path: Path) -> None:
     camera = random_camera(seed)
     # Pieces that fell out of a skeleton move no window.
@@ -95,7 +95,7 @@ def test_a_photograph_is_measured(
     assert inspection.scale.reference.startswith("none")
 
 
-@pytest.mark.parametrize("seed", few(range(50), 1))
+@pytest.mark.parametrize("seed", few(range(50), 1, long=9))
 def test_a_clean_sheet_gives_no_alarm(seed: int, folder: Path, lobed: Path, tmp_path: Path) -> None:
     of = lobed if seed % 5 == 4 else folder
     sheet = ("PTFE_1", "TPE_1")[seed % 2]

@@ -260,7 +260,7 @@ UNMADE = ("wide top", "no neck")
 ORDERED = [n for n in range(160) if welded_draft(5, n).fault not in UNMADE][:100]
 
 
-@pytest.mark.parametrize("number", few(ORDERED, 6))
+@pytest.mark.parametrize("number", few(ORDERED, 6, long=24))
 def test_random_seams_and_folds_are_read_back_exactly(number: int, tmp_path: Path) -> None:
     draft = welded_draft(5, number)
     laminate = build(load_design(draft.write(tmp_path)))

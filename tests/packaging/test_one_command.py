@@ -95,5 +95,10 @@ def test_cases_keep_their_names_marks_and_values() -> None:
     assert [mark.name for mark in long.marks] == ["skip", "long"]
     assert pair.values == (3, 4)
     assert few(["a", ("b", "c")], 1)[1].values == (("b", "c"),)
+    marks = [getattr(case, "marks", ()) for case in few(range(10), 2, long=3)]
+    assert [mark.name for (mark,) in filter(None, marks)] == [
+        *("long", "campaign", "campaign", "campaign"),
+        *("long", "campaign", "campaign", "long"),
+    ]
     with pytest.raises(ValueError, match="count = 0"):
         few([1], 0)
