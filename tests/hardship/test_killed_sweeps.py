@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ARGUMENTS = [
     *("sweep", "1dof-5mm", "--workers", "1", "--pressure", "10"),
-    *("--vary", "chamber.diameter=2,3,4,5", "--vary", "bond.width=0.7,0.75"),
+    *("--vary", "bond.width=0.7,0.75", "--vary", "stack.balloons=2:5:1"),
     *("--set", "rules.yield_builds=100"),
 ]
 FILES = ("sweep.csv", "sweep.parquet", "sweep.html")
