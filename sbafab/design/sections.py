@@ -321,7 +321,7 @@ class Registration(Section):
 MountCoordinate = Annotated[float, Millimetres(-500, 500)]
 
 
-class SeamTool(Section):
+class SeamToolSection(Section):
     """How a tool that makes seams is mounted on its machine."""
 
     offset: Annotated[tuple[MountCoordinate, MountCoordinate], Field(strict=False)]
@@ -332,13 +332,13 @@ class SeamTool(Section):
 class SeamTools(Section):
     """Tools that make seams, where they are not mounted in place of the machine's head."""
 
-    laser: SeamTool | None = None
+    laser: SeamToolSection | None = None
     """The laser."""
-    hot_tip: SeamTool | None = None
+    hot_tip: SeamToolSection | None = None
     """The hot tip."""
-    ultrasonic: SeamTool | None = None
+    ultrasonic: SeamToolSection | None = None
     """The ultrasonic horn."""
-    roller: SeamTool | None = None
+    roller: SeamToolSection | None = None
     """The roller."""
 
     @property

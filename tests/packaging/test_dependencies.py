@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from sbafab.cli import EXTRAS
+from tests.packaging.sources import sources
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED_AS = {
@@ -22,16 +21,6 @@ INSTALLED_AS = {
     "yaml": "pyyaml",
     "zxingcpp": "zxing-cpp",
 }
-
-
-def imported_modules(folder: Path) -> Iterator[str]:
-    """Top-level names of all modules imported below the folder, at any place in a file."""
-    for path in folder.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                yield from (alias.name.partition(".")[0] for alias in node.names)
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                yield node.module.partition(".")[0]
 
 
 OUR_OWN = {
@@ -53,7 +42,8 @@ def names(requirements: list[str]) -> set[str]:
 
 
 def third_party(folder: Path) -> set[str]:
-    modules = set(imported_modules(folder)) - sys.stdlib_module_names
+    imported = {name for source in sources(folder) for name in source.imported}
+    modules = imported - sys.stdlib_module_names
     return {INSTALLED_AS.get(name, name) for name in modules} - OUR_OWN
 
 

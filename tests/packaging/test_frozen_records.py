@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Iterator
 from pathlib import Path
 
 import sbafab
+from tests.packaging.sources import sources
 
 ROOT = Path(sbafab.__file__).parent
 STATES = {
@@ -23,25 +22,10 @@ STATES = {
 """Dataclasses that gather or step: by module."""
 
 
-def unfrozen(tree: ast.Module) -> Iterator[str]:
-    """Yield the names of dataclasses that may be changed."""
-    for node in ast.walk(tree):
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for mark in node.decorator_list:
-            call = mark.func if isinstance(mark, ast.Call) else mark
-            if not isinstance(call, ast.Name) or call.id != "dataclass":
-                continue
-            options = mark.keywords if isinstance(mark, ast.Call) else []
-            values = {option.arg: ast.literal_eval(option.value) for option in options}
-            if values.get("frozen") is not True:
-                yield node.name
-
-
 def test_records_are_frozen() -> None:
     changeable = {
-        path.relative_to(ROOT).as_posix(): names
-        for path in sorted(ROOT.rglob("*.py"))
-        if (names := set(unfrozen(ast.parse(path.read_text(encoding="utf-8")))))
+        source.path.relative_to(ROOT).as_posix(): source.unfrozen
+        for source in sources(ROOT)
+        if source.unfrozen
     }
     assert changeable == STATES
