@@ -46,7 +46,7 @@ LINES = frozenset({"GenericLine", "GenericPolyline"})
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class CadRecord:
     """An object of the file: the last word of its class's name, and its attributes or items."""
 
     kind: str
@@ -73,8 +73,8 @@ def _records(path: Path, text: str) -> Any:
     yaml = yaml_of(path)
     loader: Any = type("Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
 
-    def record(made: Any, suffix: str, node: Any) -> Iterator[Record]:
-        entry = Record(suffix.rsplit(".", 1)[-1])
+    def record(made: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
+        entry = CadRecord(suffix.rsplit(".", 1)[-1])
         yield entry
         if isinstance(node, yaml.MappingNode):
             entry.values.update(made.construct_mapping(node))
@@ -111,7 +111,7 @@ class Flat(NamedTuple):
     points: tuple[Point, ...] = ()
 
 
-Stack = tuple[Flat, ...]
+CadLayers = tuple[Flat, ...]
 """What an operation makes, by layers from the bottom."""
 
 
@@ -185,7 +185,7 @@ def _number(value: Any, place: str) -> float:
 
 def _vertex(vertex: Any, place: str) -> Point:
     """The place of a vertex, in any of the forms that popupCAD has saved."""
-    kind = vertex.kind if isinstance(vertex, Record) else ""
+    kind = vertex.kind if isinstance(vertex, CadRecord) else ""
     unit, pair = 1.0, None
     if kind.removesuffix("_1") in VERTICES and vertex.items:
         unit, pair = 1.0 if kind.endswith("_1") else OLD_UNIT, vertex.items[1:3]
@@ -211,7 +211,7 @@ def _points(vertices: Any, place: str) -> list[Point]:
 
 
 def _is_construction(shape: Any) -> bool:
-    if not isinstance(shape, Record):
+    if not isinstance(shape, CadRecord):
         return False
     if shape.kind.startswith("DrawnPoint") and len(shape.items) > 3:
         return bool(shape.items[3])
@@ -220,7 +220,7 @@ def _is_construction(shape: Any) -> bool:
 
 def _shape(shape: Any, place: str) -> Flat:
     """A shape of a sketch. Raises DesignError for one that is not read, or crosses itself."""
-    kind = shape.kind if isinstance(shape, Record) else str(type(shape).__name__)
+    kind = shape.kind if isinstance(shape, CadRecord) else str(type(shape).__name__)
     if kind.startswith("DrawnPoint"):
         return Flat(points=(_vertex(shape, place),))
     if kind not in AREAS | LINES:
@@ -272,7 +272,7 @@ class CadLayer:
     thickness: float | None
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class CadDesign:
     """A design: layers bottom to top, sketches and other designs by id, operations in order.
 
@@ -283,10 +283,10 @@ class CadDesign:
     layers: tuple[CadLayer, ...]
     layer_numbers: Mapping[Any, int]
     sketches: Mapping[Any, Any]
-    operations: Sequence[Record]
+    operations: Sequence[CadRecord]
     subdesigns: Mapping[Any, Any]
     depth: int = 0
-    stacks: dict[int, Stack] = field(default_factory=dict)
+    stacks: dict[int, CadLayers] = field(default_factory=dict)
     remarks: dict[str, None] = field(default_factory=dict)
     placed: dict[Any, CadDesign] = field(default_factory=dict)
 
@@ -307,21 +307,21 @@ class CadDesign:
             raise DesignError(f"{place} takes output {pair[1]} of operation {index + 1}: it has 0")
         return index
 
-    def layer_indices(self, operation: Record, key: str, place: str) -> list[int]:
+    def layer_indices(self, operation: CadRecord, key: str, place: str) -> list[int]:
         """Return the indices of the layers that an operation links. Raises DesignError."""
         links = operation.need(key, place, (list, tuple))
         if not all(_is_id(link) and link in self.layer_numbers for link in links):
             raise DesignError(f"{place} names a layer that is not there; save the design again")
         return [self.layer_numbers[link] for link in links]
 
-    def linked_sketch(self, operation: Record, key: str, place: str) -> list[tuple[str, Any]]:
+    def linked_sketch(self, operation: CadRecord, key: str, place: str) -> list[tuple[str, Any]]:
         """Return the shapes of the first sketch that an operation links under a key."""
         return self.sketch(_first(operation.links("sketch_links", key, place)), place)
 
     def sketch(self, identity: Any, place: str) -> list[tuple[str, Any]]:
         """Return the shapes of a sketch but for construction, each with its place."""
         sketch = self.sketches.get(identity) if _is_id(identity) else None
-        if not isinstance(sketch, Record):
+        if not isinstance(sketch, CadRecord):
             raise DesignError(f"{place} takes a sketch that is not there; save the design again")
         shapes = sketch.need("operationgeometry", f"{place}, its sketch", list)
         named = f"{place}, sketch {sketch.values.get('_basename', identity)}"
@@ -331,7 +331,7 @@ class CadDesign:
             if not _is_construction(shape)
         ]
 
-    def stack(self, index: int) -> Stack:
+    def stack(self, index: int) -> CadLayers:
         """Return what an operation makes. Raises DesignError at the first that is not read."""
         for number in sorted(self.needed(index) - self.stacks.keys()):
             operation, place = self.operations[number], self.named(number)
@@ -363,19 +363,19 @@ class CadDesign:
             raise DesignError(f"{place} takes operation {later + 1}, which is not before it")
         return parents
 
-    def parents(self, operation: Record, key: str, place: str) -> list[Stack]:
+    def parents(self, operation: CadRecord, key: str, place: str) -> list[CadLayers]:
         """Return what the operations of a link have made."""
         links = operation.links("operation_links", key, place)
         return [self.stacks[self.index_of(ref, place)] for ref in links]
 
-    def parent(self, operation: Record, place: str, key: str = "parent") -> Stack:
+    def parent(self, operation: CadRecord, place: str, key: str = "parent") -> CadLayers:
         """Return what the operation that one changes has made. Raises DesignError."""
         stacks = self.parents(operation, key, place)
         if not stacks:
             raise DesignError(f"{place} takes no operation; save the design again")
         return stacks[0]
 
-    def spread(self, flats: Mapping[int, Flat]) -> Stack:
+    def spread(self, flats: Mapping[int, Flat]) -> CadLayers:
         """Return a stack that is empty but on these layers."""
         return tuple(flats.get(index, Flat()) for index in range(len(self.layers)))
 
@@ -388,13 +388,13 @@ def _first(links: Sequence[Any]) -> Any:
     return links[0] if links else None
 
 
-def _sketched(design: CadDesign, operation: Record, place: str) -> Stack:
+def _sketched(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     shapes = design.linked_sketch(operation, "sketch", place)
     flat = _joined(_shape(shape, where) for where, shape in shapes)
     return design.spread(dict.fromkeys(design.layer_indices(operation, "layer_links", place), flat))
 
 
-def _laminates(design: CadDesign, operation: Record, place: str) -> Stack:
+def _laminates(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     function = operation.need("function", place, str)
     nothing = design.spread({})
     first = design.parents(operation, "unary", place) or [nothing]
@@ -405,11 +405,11 @@ def _laminates(design: CadDesign, operation: Record, place: str) -> Stack:
     return _by_layer(function, a, b, place)
 
 
-def _by_layer(function: str, a: Stack, b: Stack, place: str) -> Stack:
+def _by_layer(function: str, a: CadLayers, b: CadLayers, place: str) -> CadLayers:
     return tuple(_combined(function, one, two, place) for one, two in zip(a, b, strict=True))
 
 
-def _layers(design: CadDesign, operation: Record, place: str) -> Stack:
+def _layers(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     function = operation.need("function", place, str)
     stack = design.parent(operation, place)
     rows = [
@@ -428,7 +428,7 @@ def _layers(design: CadDesign, operation: Record, place: str) -> Stack:
     return design.spread(dict.fromkeys(output, flat))
 
 
-def _values(operation: Record, place: str) -> tuple[float, int]:
+def _values(operation: CadRecord, place: str) -> tuple[float, int]:
     """A distance in mm, and the chords that popupCAD lays in a quarter of a circle."""
     values = [_number(v, place) for v in operation.need("values", place, (list, tuple))]
     if len(values) != 2:
@@ -436,7 +436,7 @@ def _values(operation: Record, place: str) -> tuple[float, int]:
     return values[0], max(1, int(values[1]))
 
 
-def _widened(design: CadDesign, operation: Record, place: str) -> Stack:
+def _widened(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     distance, chords = _values(operation, place)
     sagitta = abs(distance) * (1 - math.cos(math.pi / 4 / chords))
     design.remarks[
@@ -446,7 +446,7 @@ def _widened(design: CadDesign, operation: Record, place: str) -> Stack:
     return tuple(_offset(flat, distance) for flat in design.parent(operation, place))
 
 
-def _cleaned(design: CadDesign, operation: Record, place: str) -> Stack:
+def _cleaned(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     distance, _ = _values(operation, place)
     stack = design.parent(operation, place)
     for step in (-distance, 2 * distance, -distance):
@@ -454,7 +454,7 @@ def _cleaned(design: CadDesign, operation: Record, place: str) -> Stack:
     return stack
 
 
-def _shifted(design: CadDesign, operation: Record, place: str) -> Stack:
+def _shifted(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     stack = design.parent(operation, place)
     if operation.values.get("flip"):
         stack = stack[::-1]
@@ -466,21 +466,21 @@ def _shifted(design: CadDesign, operation: Record, place: str) -> Stack:
     return _moved(design, stack, shift)
 
 
-def _moved(design: CadDesign, stack: Stack, shift: int) -> Stack:
+def _moved(design: CadDesign, stack: CadLayers, shift: int) -> CadLayers:
     """A stack moved up by so many layers, or down; what lies outside is dropped."""
     return design.spread({number + shift: flat for number, flat in enumerate(stack)})
 
 
-def _transformed(design: CadDesign, operation: Record, place: str) -> Stack:
+def _transformed(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     stack = design.parent(operation, place, "from")
     source = design.linked_sketch(operation, "sketch_from", place)
     return _placed(design, operation, place, stack, source)
 
 
-def _placed_design(design: CadDesign, operation: Record, place: str) -> Stack:
+def _placed_design(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     identity = _first(operation.links("design_links", "subdesign", place))
     part = design.subdesigns.get(identity) if _is_id(identity) else None
-    if not isinstance(part, Record) or design.depth >= DEEPEST:
+    if not isinstance(part, CadRecord) or design.depth >= DEEPEST:
         raise DesignError(f"{place} takes a design that is not there; save the design again")
     if identity not in design.placed:
         name = part.values.get("_basename", identity)
@@ -495,11 +495,11 @@ def _placed_design(design: CadDesign, operation: Record, place: str) -> Stack:
 
 def _placed(
     design: CadDesign,
-    operation: Record,
+    operation: CadRecord,
     place: str,
-    stack: Stack,
+    stack: CadLayers,
     source: Sequence[tuple[str, Any]],
-) -> Stack:
+) -> CadLayers:
     """A stack laid from the first shape of a sketch onto each shape of another one."""
     targets = design.linked_sketch(operation, "sketch_to", place)
     if not source:
@@ -507,7 +507,7 @@ def _placed(
     first = _two_points(*source[0])
     copies = []
     for where, shape in targets:
-        if isinstance(shape, Record) and shape.kind.startswith("DrawnPoint"):
+        if isinstance(shape, CadRecord) and shape.kind.startswith("DrawnPoint"):
             design.remarks[f"{where}: a point has no direction; nothing is laid there"] = None
             continue
         copies.append(_similar(operation, first, _two_points(where, shape), place, stack))
@@ -517,19 +517,19 @@ def _placed(
 
 
 def _two_points(place: str, shape: Any) -> tuple[Point, Point]:
-    points = _points(shape.need("exterior", place), place) if isinstance(shape, Record) else []
+    points = _points(shape.need("exterior", place), place) if isinstance(shape, CadRecord) else []
     if len(points) < 2:
         raise DesignError(f"{place} is no line to lay a design by; draw one")
     return points[0], points[1]
 
 
 def _similar(
-    operation: Record,
+    operation: CadRecord,
     first: tuple[Point, Point],
     second: tuple[Point, Point],
     place: str,
-    stack: Stack,
-) -> Stack:
+    stack: CadLayers,
+) -> CadLayers:
     """A stack moved, turned and scaled so that one line comes to lie on another."""
     ratio = math.dist(*second) / math.dist(*first)
     along, across = (
@@ -577,15 +577,15 @@ def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
     return union(rings) - union(holes)
 
 
-def _frozen(design: CadDesign, operation: Record, place: str) -> Stack:
+def _frozen(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
     """What was saved of an operation when it was frozen."""
     generic = operation.values.get("generic")
-    geoms = generic.values.get("geoms") if isinstance(generic, Record) else generic
+    geoms = generic.values.get("geoms") if isinstance(generic, CadRecord) else generic
     if not isinstance(geoms, dict):
         raise DesignError(f"{place} holds no layers; freeze it again")
     flats = {}
     for material, shapes in geoms.items():
-        identity = material.values.get("id") if isinstance(material, Record) else None
+        identity = material.values.get("id") if isinstance(material, CadRecord) else None
         if identity not in design.layer_numbers or not isinstance(shapes, list):
             raise DesignError(f"{place} has a layer that is not there; freeze it again")
         number = design.layer_numbers[identity]
@@ -594,7 +594,7 @@ def _frozen(design: CadDesign, operation: Record, place: str) -> Stack:
     return design.spread(flats)
 
 
-OPERATIONS: Mapping[str, Callable[[CadDesign, Record, str], Stack]] = {
+OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord, str], CadLayers]] = {
     "SimpleSketchOp": _sketched,
     "LaminateOperation2": _laminates,
     "LayerOp2": _layers,
@@ -609,14 +609,14 @@ OPERATIONS: Mapping[str, Callable[[CadDesign, Record, str], Stack]] = {
 
 
 def _design(root: Any, place: str, depth: int = 0) -> CadDesign:
-    if not isinstance(root, Record) or root.kind != "Design":
+    if not isinstance(root, CadRecord) or root.kind != "Design":
         raise DesignError(f"{place} holds no design of popupCAD; save it again")
     definition = root.values.get("_layerdef") or root.values.get("_Design__layerdef")
-    rows = definition.values.get("layers") if isinstance(definition, Record) else None
-    if not isinstance(rows, list) or not all(isinstance(row, Record) for row in rows):
+    rows = definition.values.get("layers") if isinstance(definition, CadRecord) else None
+    if not isinstance(rows, list) or not all(isinstance(row, CadRecord) for row in rows):
         raise DesignError(f"{place} has no list of layers; save it again")
     operations = root.need("operations", place, list)
-    if not all(isinstance(operation, Record) for operation in operations):
+    if not all(isinstance(operation, CadRecord) for operation in operations):
         raise DesignError(f"{place} has an operation that is no object; save it again")
     subdesigns = root.values.get("subdesigns")
     return CadDesign(
@@ -630,7 +630,7 @@ def _design(root: Any, place: str, depth: int = 0) -> CadDesign:
     )
 
 
-def _layer(row: Record) -> CadLayer:
+def _layer(row: CadRecord) -> CadLayer:
     thickness = row.values.get("thickness")
     is_number = isinstance(thickness, int | float) and not isinstance(thickness, bool)
     return CadLayer(str(row.values.get("name") or row.kind), thickness if is_number else None)
