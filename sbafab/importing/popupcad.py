@@ -488,7 +488,7 @@ def _placed_design(design: CadDesign, operation: CadRecord, place: str) -> CadLa
     part_design = design.placed[identity]
     index = part_design.index_of(operation.need("subopref", place), place)
     stack = part_design.stack(index)
-    design.remarks |= part_design.remarks
+    design.remarks.update(part_design.remarks)
     source = part_design.sketch(operation.values.get("sub_sketch_id"), place)
     return _placed(design, operation, place, stack, source)
 
