@@ -1,12 +1,8 @@
-"""Equilibrium of many states of a stack at once: springs, forces on the tip, weight, and Newton's
-steps.
+"""Equilibrium of many states of a stack at once: springs, loads, and Newton's steps.
 
 The same energy as of ``stack_loads``, with a state a column: numpy is the faster the longer its
 last axis. Without a load a state has a row a kind of balloon; under one it has a row a level,
-bottom to top, and levels act on each other through the turns of the plates between them alone:
-three numbers either way. So its tangent stiffness is eliminated from the top down in blocks of 3 x
-3 (a Riccati recursion), at a cost in proportion to the levels. Lengths mm, pressures kPa, volumes
-ul, forces mN.
+bottom to top. Lengths mm, pressures kPa, volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -25,6 +21,17 @@ from sbafab.models.balloon_map import (
     SLOPES,
     pieces,
 )
+from sbafab.models.batch_loads import (
+    HeldChain,
+    acting,
+    chain_of,
+    chain_solved,
+    contact_of,
+    crossed,
+    product,
+    solved,
+    tilt_works,
+)
 from sbafab.models.least_energy import LARGEST_MOVE
 from sbafab.models.stack_loads import RING_POINTS
 
@@ -34,6 +41,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.models.balloon_map import BalloonMap
+    from sbafab.models.batch_loads import ContactBatch, Coupling
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_loads import Load
     from sbafab.models.stack_poses import PosedStack
@@ -46,25 +54,84 @@ POSE_ERROR, LOADED_STEP = 1e-9, 1e-7
 """Error (mm, rad) at which a pose ends; the last step under a load, whose tangent stiffness leaves
 out as much as ``LoadedEnergy.turned`` does, so that the error falls linearly."""
 HALVINGS = 12
+SPRING_COLUMNS = 2048
+"""States times levels whose springs are evaluated together: more leave the cache."""
 FEW = 6
 """States under a load that are solved alone sooner than together."""
-STRAIGHT = 1e-24
-"""Square of a tilt in rad that is taken for 0."""
 BY_PRESSURE = np.zeros((3, DEGREE + 1, DEGREE + 1))
 BY_PRESSURE[0], BY_PRESSURE[1, :, :-1], BY_PRESSURE[2, :, :-2] = PIECES, SLOPES, CURVES
 """Splines' weights by pressure: of values, first and second derivatives."""
-LEAST_PIVOT = 1e-12
-"""Pivot, as a share of the largest, below which a matrix counts as indefinite."""
 
 
-class Coupling(NamedTuple):
-    """What couples the levels under a load, by each level's freedoms: the ``turn`` of all plates
-    beyond it (levels, 3, 3, n), and the moments by which the forces on these answer to their
-    ``motion`` (levels, 3, 3, n).
+class TouchingAt(NamedTuple):
+    """Levels under a load whose top may touch an outer plate: the ``residual`` (levels, 3, n)
+    against given contact ``forces`` (points, n), the rows' own second derivatives ``blocks``
+    (levels, 3, 3, n), exact and without what the plate resists; ``motions`` (levels, 3, 6, n) of
+    all plates beyond by each freedom, turns then moves, and what couples the levels; the middles of
+    the top ``tips`` (3, n) in mm; volumes (chambers, n) and ``filling`` (levels, chambers, 3, n).
     """
 
-    turn: Array
-    motion: Array
+    residual: Array
+    blocks: Array
+    coupling: Coupling
+    motions: Array
+    contact: ContactBatch
+    forces: Array
+    tips: Array
+    volumes: Array
+    filling: Array
+
+    def condensed(self, right: Array) -> Condensed:
+        """Return the solutions by right sides (levels, 3, k, n), the first of which is made the
+        equilibrium with the contacts as they are, and by units of forces on the top.
+        """
+        k, count = right.shape[2:]
+        stiff, gradient = self.contact.held(self.contact.touches, self.forces)
+        pulls = np.zeros((6, k + 6, count))
+        pulls[:, 0] = gradient
+        pulls[np.arange(6), k + np.arange(6)] = 1.0
+        whole = np.concatenate([right, np.zeros((*right.shape[:2], 6, count))], axis=2)
+        system = HeldChain(self.blocks, self.coupling, self.motions, stiff)
+        moves, sums, is_firm = system.solved(pulls, whole)
+        return Condensed(moves, sums, stiff, gradient, is_firm)
+
+
+class Condensed(NamedTuple):
+    """Solutions of levels whose top touches an outer plate: ``moves`` (levels, 3, k + 6, n) of
+    freedoms and ``sums`` (6, k + 6, n) of the top's turns and moves, by k right sides and then by
+    units of pulls on the top; made with its ``stiffness`` (6, 6, n) and ``gradient`` (6, n) by the
+    contacts, and True (n) for a positive definite tangent stiffness.
+    """
+
+    moves: Array
+    sums: Array
+    stiffness: Array
+    gradient: Array
+    is_firm: NDArray[np.bool_]
+
+    def at(self, where: NDArray[np.int_]) -> Condensed:
+        """Return some of the states."""
+        return Condensed(
+            self.moves[..., where],
+            self.sums[..., where],
+            self.stiffness[..., where],
+            self.gradient[:, where],
+            self.is_firm[where],
+        )
+
+    def with_contacts(self, stiffness: Array, gradient: Array) -> tuple[Array, Array]:
+        """Return the turns and moves of the top (6, k, n) with other contacts, and the further
+        pulls on it (6, k, n).
+        """
+        units, begin = self.sums[:, -6:], self.sums[:, :-6].copy()
+        stiffer, pulls = stiffness - self.stiffness, np.zeros_like(begin)
+        pulls[:, 0] = gradient - self.gradient
+        begin[:, 0] += product(units, pulls[:, :1])[:, 0]
+        matrix = -product(units, stiffer)
+        matrix[np.arange(6), np.arange(6)] += 1.0
+        found = np.linalg.solve(np.moveaxis(matrix, -1, 0), np.moveaxis(begin, -1, 0))
+        sums = np.ascontiguousarray(np.moveaxis(found, 0, -1))
+        return sums, pulls + product(stiffer, sums)
 
 
 class LevelsAt(NamedTuple):
@@ -130,8 +197,12 @@ class Levels:
         """Return ``BatchSprings.weights`` of each kind: (kinds, ...)."""
         return _stacked([springs.weights(pressures, orders) for springs in self.springs])
 
-    def at(self, weights: Array, freedoms: Array) -> LevelsAt:
-        """Return the rows at pressures of ``weights`` and freedoms (rows, 3, n)."""
+    def at(
+        self, weights: Array, freedoms: Array, is_exact: NDArray[np.bool_] | None = None
+    ) -> LevelsAt:
+        """Return the rows at pressures of ``weights`` and freedoms (rows, 3, n); under a load
+        second derivatives are exact only where ``is_exact`` (n).
+        """
         count = freedoms.shape[-1]
         each = self._spring_rows(weights, freedoms)
         volumes, swelling = (
@@ -145,15 +216,49 @@ class Levels:
             return LevelsAt(
                 energy, each.gradient, each.matrix, volumes, each.filling, swelling, None
             )
-        forces, works, coupling = acting(self.load, chain_of(freedoms, self.pitch), count)
+        plates = chain_of(freedoms, self.pitch)
+        acts = acting(self.load, plates, count)
+        blocks = each.matrix
+        if is_exact is not None and is_exact.any():
+            blocks[:, 1:, 1:] -= is_exact * tilt_works(freedoms, plates, acts, self.pitch)
         return LevelsAt(
-            energy + forces,
-            each.gradient - works,
-            each.matrix,
+            energy + acts.energy,
+            each.gradient - acts.works,
+            blocks,
             volumes,
             each.filling,
             swelling,
-            coupling,
+            acts.coupling,
+        )
+
+    def touching(
+        self, weights: Array, freedoms: Array, stiffness: Array, forces: Array
+    ) -> TouchingAt:
+        """Return the levels against outer plates of a stiffness (n) in mN/mm, with contact forces
+        (points, n) in mN, or by the stiffness where these are NaN.
+        """
+        assert self.load is not None
+        each = self._spring_rows(weights, freedoms)
+        plates = chain_of(freedoms, self.pitch)
+        contact, points = contact_of(self.load, plates, stiffness)
+        pushes = np.where(np.isnan(forces), contact.resists(contact.deep), forces)
+        acts = acting(self.load, plates, freedoms.shape[-1], (points, pushes))
+        blocks = each.matrix
+        blocks[:, 1:, 1:] -= tilt_works(freedoms, plates, acts, self.pitch)
+        motions = np.zeros((*acts.works.shape[:2], 6, freedoms.shape[-1]))
+        motions[:, 0, 3:] = plates.rises
+        motions[:, 1:, :3] = plates.turns
+        motions[:, 1:, 3:] = crossed(plates.middles[:, None], plates.turns)
+        return TouchingAt(
+            each.gradient - acts.works,
+            blocks,
+            acts.coupling,
+            motions,
+            contact,
+            pushes,
+            plates.tip,
+            each.volumes.sum(0),
+            each.filling,
         )
 
     def _spring_rows(self, weights: Array, freedoms: Array) -> SpringBatch:
@@ -166,16 +271,27 @@ class Levels:
             ]
             return SpringBatch(*(_stacked(list(part)) for part in zip(*each, strict=True)))
         parts: list[Array] = []
+        size = max(1, SPRING_COLUMNS // max(count, 1))
         for kind, springs in enumerate(self.springs):
-            which = np.flatnonzero(self.kinds == kind)
-            columns = np.ascontiguousarray(freedoms[which].transpose(1, 0, 2)).reshape(3, -1)
-            found = springs.at(weights[kind], columns)
-            if not parts:
-                parts = [np.empty((rows, *part.shape[:-1], count)) for part in found]
-            for whole, part in zip(parts, found, strict=True):
-                levels = part.reshape(*part.shape[:-1], len(which), count)
-                whole[which] = np.moveaxis(levels, -2, 0)
+            every = np.flatnonzero(self.kinds == kind)
+            for begin in range(0, len(every), size):
+                which = every[begin : begin + size]
+                columns = np.ascontiguousarray(freedoms[which].transpose(1, 0, 2)).reshape(3, -1)
+                found = springs.at(weights[kind], columns)
+                if not parts:
+                    parts = [np.empty((rows, *part.shape[:-1], count)) for part in found]
+                for whole, part in zip(parts, found, strict=True):
+                    levels = part.reshape(*part.shape[:-1], len(which), count)
+                    whole[which] = np.moveaxis(levels, -2, 0)
         return SpringBatch(*parts)
+
+    def fits(self, centres: Array, freedoms: Array) -> NDArray[np.bool_]:
+        """Return True (n) where no balloon, its gap by rise and tilt ``centres`` (3, chambers), is
+        higher than its map.
+        """
+        most = np.array([self.springs[kind].kind.most_height for kind in self.kinds])
+        gaps = np.einsum("ic,rin->rcn", centres, freedoms)
+        return np.asarray((gaps <= most[:, None, None]).all((0, 1)))
 
     def tips(self, freedoms: Array) -> Array:
         """Return the middles of the top plates in mm of freedoms (levels, 3, n): (n, 3)."""
@@ -237,152 +353,6 @@ def descended(levels: Levels, weights: Array, start: Array, end: Array) -> NDArr
         at = at + share * move
         before = np.where((full == 1.0) & (share == 1.0), largest, 0.0)
     return is_solved
-
-
-# Plates of many states, and the forces on them.
-
-
-class ChainBatch(NamedTuple):
-    """Plates of n states: ``places`` (levels + 1, 3, n) of their middles in mm, the base first;
-    by level the direction of its rise, ``rises`` (levels, 3, n), the middle about which its tilt
-    turns all beyond it, ``middles`` (levels, 3, n), and the rotations by a unit of either tilt,
-    ``turns`` (levels, 2, 3, n).
-    """
-
-    places: Array
-    rises: Array
-    middles: Array
-    turns: Array
-
-    @property
-    def tip(self) -> Array:
-        """Middle of the top plate in mm: (3, n)."""
-        return np.asarray(self.places[-1])
-
-
-def chain_of(freedoms: Array, pitch: float) -> ChainBatch:
-    """Return the plates of freedoms (levels, 3, n), as ``stack_loads.plate_chain`` has them."""
-    levels, _, count = freedoms.shape
-    half = freedoms[:, 1:] / 2
-    x, y = half[:, 0], half[:, 1]
-    square = np.maximum(x * x + y * y, STRAIGHT)
-    angle = np.sqrt(square)
-    sine = np.sin(angle) / angle
-    # 1 - cos is lost to rounding where it is small.
-    less = 2 * (np.sin(angle / 2) / angle) ** 2
-    mean = (1 - sine) / square
-    places, rises = np.zeros((levels + 1, 3, count)), np.empty((levels, 3, count))
-    turns = np.empty((levels, 2, 3, count))
-    # The plate's x, y and z.
-    axes = np.zeros((3, 3, count))
-    axes[[0, 1, 2], [0, 1, 2]] = 1.0
-    for level in range(levels):
-        u, v = x[level], y[level]
-        middle = _tilted(axes, u, v, sine[level], less[level])
-        rises[level] = middle[2]
-        across = mean[level] * (u * middle[0] + v * middle[1])
-        turns[level, 0] = sine[level] * middle[0] + u * across
-        turns[level, 1] = sine[level] * middle[1] + v * across
-        axes = _tilted(middle, u, v, sine[level], less[level])
-        places[level + 1] = places[level] + middle[2] * (freedoms[level, 0] + pitch)
-    return ChainBatch(places, rises, (places[1:] + places[:-1]) / 2, turns)
-
-
-def _tilted(axes: Array, x: Array, y: Array, sine: Array, less: Array) -> Array:
-    """Return axes (3, 3, n) turned by (x, y) about their own x and y (Rodrigues' formula); ``sine``
-    is the angle's by the angle, ``less`` 1 - cos by its square.
-    """
-    first, second, third = axes
-    way = less * (x * first + y * second)
-    square = x * x + y * y
-    cosine = 1 - less * square
-    return np.stack(
-        [
-            cosine * first + x * way - sine * y * third,
-            cosine * second + y * way + sine * x * third,
-            cosine * third + sine * (y * first - x * second),
-        ]
-    )
-
-
-def acting(load: Load, plates: ChainBatch, count: int) -> tuple[Array, Array, Coupling]:
-    """Return the energy (n) of a load on the plates, its work by each freedom (levels, 3, n), and
-    what couples the levels.
-    """
-    levels = len(plates.rises)
-    tip, middles = plates.tip, plates.middles
-    energy = -(load.tip @ tip)
-    forces = np.repeat(load.tip[None, :, None], levels, 0)
-    # The sum of y f over the points of the plates beyond, y from the level's middle.
-    arms = (tip - middles)[:, :, None] * load.tip[None, None, :, None]
-    if load.weight is not None:
-        beyond = np.cumsum(plates.places[:0:-1], axis=0)[::-1]
-        number = np.arange(levels, 0, -1.0)[:, None, None]
-        energy = energy - load.weight @ beyond[0]
-        forces = forces + number * load.weight[None, :, None]
-        arms = arms + (beyond - number * middles)[:, :, None] * load.weight[None, None, :, None]
-    trace = arms[:, 0, 0] + arms[:, 1, 1] + arms[:, 2, 2]
-    moments = np.stack(
-        [
-            arms[:, 1, 2] - arms[:, 2, 1],
-            arms[:, 2, 0] - arms[:, 0, 2],
-            arms[:, 0, 1] - arms[:, 1, 0],
-        ],
-        axis=1,
-    )
-    turn = np.zeros((levels, 3, 3, count))
-    turn[:, 1:] = plates.turns
-    motion = np.empty((levels, 3, 3, count))
-    motion[:, 0] = np.cross(plates.rises, forces, axis=1)
-    motion[:, 1:] = (plates.turns[:, :, None] * arms[:, None]).sum(3)
-    motion[:, 1:] -= plates.turns * trace[:, None, None]
-    works = np.empty((levels, 3, count))
-    works[:, 0] = (plates.rises * forces).sum(1)
-    works[:, 1:] = (plates.turns * moments[:, None]).sum(2)
-    return energy, works, Coupling(turn, motion)
-
-
-def chain_solved(
-    blocks: Array, coupling: Coupling, right: Array
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the solutions (levels, 3, k, n) under a load by right sides (levels, 3, k, n), and
-    True (n) where the tangent stiffness is positive definite.
-
-    Of levels i below j it has the block -turn_i motion_j^T. With r the turn of all below a level,
-    and s the moment of all above, s = P r + c: both P and c follow from the top down.
-    """
-    levels, _, k, count = right.shape
-    is_firm = np.ones(count, dtype=bool)
-    stiff, free = np.zeros((3, 3, count)), np.zeros((3, k, count))
-    answers = np.empty((levels, 3, k + 3, count))
-    for level in range(levels - 1, -1, -1):
-        turn, motion = coupling.turn[level], coupling.motion[level]
-        held = _product(turn, stiff)
-        mixed = held / 2 + motion / 2
-        across = _product(turn, mixed.transpose(1, 0, 2))
-        matrix = blocks[level] - across - across.transpose(1, 0, 2)
-        rates = held + motion
-        both = np.concatenate([right[level] + _product(turn, free), rates], axis=1)
-        answers[level], fits = solved(matrix, both)
-        # An indefinite block has no solution, and must not grow from level to level.
-        answers[level][..., np.logical_not(fits)] = 0.0
-        is_firm &= fits
-        more = _product(rates.transpose(1, 0, 2), answers[level])
-        free, stiff = free + more[:, :k], stiff + more[:, k:]
-    moves = np.empty_like(right)
-    turned = np.zeros((3, k, count))
-    for level in range(levels):
-        moves[level] = answers[level, :, :k] + _product(answers[level, :, k:], turned)
-        turned = turned + _product(coupling.turn[level].transpose(1, 0, 2), moves[level])
-    return moves, is_firm
-
-
-def _product(first: Array, second: Array) -> Array:
-    """Return the products (i, k, n) of matrices (i, j, n) and (j, k, n)."""
-    total = first[:, 0, None] * second[0]
-    for j in range(1, len(second)):
-        total += first[:, j, None] * second[j]
-    return np.asarray(total)
 
 
 # Springs, a state a column.
@@ -518,27 +488,3 @@ class BatchSprings:
             (self.tilts @ -first[1]).reshape(chambers, 3, count) if orders > 1 else none[:, None],
             sums[1] if orders > 2 else none,
         )
-
-
-def solved(matrices: Array, right: Array) -> tuple[Array, Array]:
-    """Return the solutions (size, k, n) of symmetric matrices (size, size, n) by right sides (size,
-    k, n), and True (n) where a matrix is positive definite: others have no solution.
-    """
-    size = len(matrices)
-    a, b = matrices.copy(), right.copy()
-    least = LEAST_PIVOT * np.abs(np.einsum("iin->in", matrices)).max(0)
-    is_firm = np.ones(matrices.shape[2], dtype=bool)
-    inverse = []
-    for i in range(size):
-        fits = a[i, i] > least
-        is_firm &= fits
-        inverse.append(1 / np.where(fits, a[i, i], 1.0))
-        for j in range(i + 1, size):
-            share = a[j, i] * inverse[i]
-            a[j, i + 1 :] -= share * a[i, i + 1 :]
-            b[j] -= share * b[i]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            b[i] -= a[i, j] * b[j]
-        b[i] *= inverse[i]
-    return b, is_firm

@@ -21,8 +21,8 @@ import numpy as np
 from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.derivatives import derivatives, hessian, tip_motion
 from sbafab.models.least_energy import is_positive_definite, step_limit
-from sbafab.models.stack_balance import free_equilibrium
 from sbafab.models.stack_loads import (
+    WALL_STIFFNESS,
     level_motions,
     loaded_energy,
     plate_chain,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sbafab.models.film_elements import Array
-    from sbafab.models.stack_loads import GapPlaces, Load, LoadedEnergy, Springs
+    from sbafab.models.stack_loads import GapPlaces, Load, LoadedEnergy, OuterPlate, Springs
     from sbafab.models.stack_poses import Pose, PosedStack
 
 P0 = 0.1
@@ -51,21 +51,20 @@ WHOLE_STEPS = 5
 """Steps after which one that closes or opens contacts is halved, lest they do so for ever."""
 CLOSE = 0.05
 """Step (mm, rad, asinh) from which on tangents are exact."""
-SOFT_PLATES: tuple[tuple[float, ...], ...] = (
-    (3e2, 3e3, 3e4),
-    (1e3, 1e4, 1e5),
-    (),
-    (1e1, 3e1, 1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5),
-)
-"""Stiffness in mN/mm of an outer plate without friction in the first solutions, tried in turn."""
-ROUGH_CONTACT, CLOSE_CONTACT = 0.05, 1e-4
+ROUGH_CONTACT, CLOSE_CONTACT = 0.3, 1e-4
 """Last step (mm, rad, asinh) against a soft plate, and against the plate itself."""
+SOFT_STEPS, PLATE_STEPS = 4, 16
+"""Most of Newton's steps against a soft plate, whatever these come to, and against the plate."""
+TURNED_BACK = 0.5
+"""Share of a step of pressures that the next takes back, from which on that one is halved."""
+CONTACT_RESIDUAL = 1e-3
+"""Residual in mN (or mN mm) against an outer plate that counts as none."""
 LONGEST_STEP = 1.5
 """Largest change of asinh(p / P0) in one step."""
 POSES = 40
 """Equilibria from one start."""
-PLATE_STEPS, PLATE_STARTS, DESCENT_STARTS = 40, 3, 3
-"""Newton's steps against an outer plate, the starts of these, and those of descents after them."""
+DESCENT_STARTS = 3
+"""Starts of descents against an outer plate, after Newton's method from all starts."""
 CONTACT_ROUNDS = 8
 """Rounds in which a step's contacts with an outer plate are found."""
 DAMPING = 1e-3
@@ -86,6 +85,25 @@ class TipTarget(NamedTuple):
     place: Array
     load: Load | None
     most: float
+
+
+class Way(NamedTuple):
+    """A way to solutions against an outer plate: it begins at an equilibrium (``is_posed``) or on
+    the arc of ``starts``; ``soft`` is the stiffness in mN/mm of the plate in the first solutions.
+
+    Against soft plates the top's load goes gradually from one point to the next as it rolls, and
+    rates hardly jump.
+    """
+
+    is_posed: bool
+    soft: tuple[float, ...] = ()
+
+
+POSED, ON_ARC = Way(True), Way(False)
+STICKING = (ON_ARC, Way(False, (3e2, 3e3, 3e4)), POSED)
+"""Ways against a plate that the tip sticks to, tried in turn."""
+SLIDING = (Way(False, (3e2, 3e3, 3e4)), Way(False, (1e3, 3e3, 1e4, 3e4, 1e5)), ON_ARC)
+"""Ways against a plate without friction."""
 
 
 class Linearisation(NamedTuple):
@@ -117,7 +135,10 @@ def reach(
     Raises UnreachableError with the nearest tip found.
     """
     target = TipTarget(stack, place, load, math.asinh(most_pressure / P0))
-    guess = start(target) if near is None else np.arcsinh(np.array(near.pressures) / P0)
+    if near is None:
+        (guess,) = starts(stack, place[None], target.most)
+    else:
+        guess = np.arcsinh(np.array(near.pressures) / P0)
     guess = np.clip(guess, 0.0, target.most)
     if load is not None and load.wall is not None:
         best = _against_plate(target, guess, arguments, near)
@@ -147,7 +168,7 @@ def _without_plate(
         if pose is not None:
             return pose
     best = None
-    for x in (guess, *_further_starts(target, guess)):
+    for x in (guess, *further_starts(guess, target.most)):
         pose = _by_poses(target, x, arguments, near if best is None else None)
         best = _nearer(target, best, pose)
         if best is not None and _distance(target, best) < NEAR:
@@ -164,28 +185,27 @@ def _against_plate(
     assert target.load is not None
     assert target.load.wall is not None
     best = None
-    starts = (guess, *_further_starts(target, guess))
-    ways = ((),) if target.load.wall.sticks else SOFT_PLATES
-    for x in starts[:PLATE_STARTS]:
+    begins, ways = plate_starts(guess, target.most), ways_to(target.load.wall)
+    for x in begins:
         from_near = near if x is guess else None
-        for soft in ways if from_near is None else ((), *ways):
-            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, soft))
-            if best is not None and _distance(target, best) < NEAR:
+        for way in ways if from_near is None else (POSED, *ways):
+            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, way))
+            if best is not None and _is_met(target, best):
                 return best
-        if best is not None and _distance(target, best) < MET:
-            return best
-    for x in starts[:DESCENT_STARTS]:
+    if best is not None and _distance(target, best) < MET:
+        return best
+    for x in (guess, *begins[2:])[:DESCENT_STARTS]:
         pose = _by_poses(target, x, arguments, near if x is guess else None)
         best = _nearer(target, best, pose)
-        if best is not None and _distance(target, best) < NEAR:
+        if best is not None and _is_met(target, best):
             return best
     if best is None or not MET <= _distance(target, best) < STRANDED:
         return best
     # The descents end where a contact opens or closes: from places about there.
     for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
-        for from_near, soft in ((best, ()), (None, SOFT_PLATES[0])):
-            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, soft))
-            if best is not None and _distance(target, best) < NEAR:
+        for from_near, way in ((best, POSED), (None, ways[0])):
+            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, way))
+            if best is not None and _is_met(target, best):
                 return best
     return best
 
@@ -210,20 +230,19 @@ def _written(place: Array) -> str:
     return "(" + ", ".join(f"{round(value, 3) + 0.0:g}" for value in place.tolist()) + ")"
 
 
-def start(target: TipTarget) -> Array:
-    """Return asinh(p / P0) of chambers as long as on an arc from the base to the place.
+def starts(stack: PosedStack, places: Array, most: float) -> Array:
+    """Return asinh(p / P0), up to ``most``, of chambers as long as on arcs from the base to places
+    (n, 3) in mm: (n, chambers).
 
-    The arc leaves the base at a right angle: constant curvature (Webster and Jones 2010).
+    An arc leaves the base at a right angle: constant curvature (Webster and Jones 2010).
     """
-    stack = target.stack
-    aside, up = math.hypot(*target.place[:2]), float(target.place[2])
-    bend = 2 * math.atan2(aside, up)
-    length = math.hypot(aside, up)
-    if bend > 1e-9:
-        length *= (bend / 2) / math.sin(bend / 2)
-    way = target.place[:2] / max(aside, 1e-12)
-    rises = length - stack.flat_height - bend * (stack.axes @ way)
-    return np.interp(rises, *_column_rises(stack, target.most))
+    aside, up = np.hypot(*places[:, :2].T), places[:, 2]
+    bend, length = 2 * np.arctan2(aside, up), np.hypot(aside, up)
+    turns = bend > 1e-9
+    length[turns] *= (bend[turns] / 2) / np.sin(bend[turns] / 2)
+    ways = places[:, :2] / np.maximum(aside, 1e-12)[:, None]
+    rises = (length - stack.flat_height)[:, None] - bend[:, None] * (ways @ stack.axes.T)
+    return np.asarray(np.interp(rises, *_column_rises(stack, most)))
 
 
 @lru_cache(maxsize=16)
@@ -234,20 +253,50 @@ def _column_rises(stack: PosedStack, most: float) -> tuple[Array, Array]:
     return kinds[stack.levels].sum(0), grid
 
 
-def _further_starts(target: TipTarget, guess: Array) -> Iterator[Array]:
-    """Yield starts all over the range, the nearer to the middle the earlier."""
-    chambers = len(guess)
+def further_starts(guess: Array, most: float) -> Iterator[Array]:
+    """Yield starts all over the range, the nearer to the middle the earlier: (chambers, ...)."""
     for share in (0.6, 0.85, 0.3):
-        yield np.full(chambers, share * target.most)
-    for chamber in range(chambers):
+        yield np.full(guess.shape, share * most)
+    for chamber in range(len(guess)):
         for low, high in ((0.3, 0.9), (0.9, 0.3)):
-            x = np.full(chambers, low * target.most)
-            x[chamber] = high * target.most
+            x = np.full(guess.shape, low * most)
+            x[chamber] = high * most
             yield x
+
+
+def plate_starts(guess: Array, most: float) -> tuple[Array, ...]:
+    """Return starts against an outer plate: (chambers, ...) each."""
+    return guess, np.where(guess > guess.min(0), guess, 0.0), *further_starts(guess, most)
+
+
+def ways_to(wall: OuterPlate) -> tuple[Way, ...]:
+    """Return the ways to solutions against an outer plate, the first to be tried first."""
+    return STICKING if wall.sticks else SLIDING
 
 
 def _distance(target: TipTarget, pose: Pose) -> float:
     return float(np.linalg.norm(pose.tip - target.place))
+
+
+def _is_met(target: TipTarget, pose: Pose) -> bool:
+    """Return True where a search against an outer plate ends."""
+    assert target.load is not None
+    assert target.load.wall is not None
+    missing = movable(target.load.wall, target.place - pose.tip)
+    return float(np.linalg.norm(missing)) < MET / 2 and _distance(target, pose) < MET
+
+
+def movable(wall: OuterPlate, missing: Array) -> Array:
+    """Return what pressures can make up for of distances (3, ...) in mm.
+
+    A plate that the tip sticks to gives way across its line by less than ``MET``: pressures that
+    would move the tip there would stray.
+    """
+    if not wall.sticks:
+        return missing
+    along = np.multiply.outer(wall.normal, wall.normal @ missing)
+    is_held = np.linalg.norm(missing - along, axis=0) < MET / 2
+    return np.where(is_held, along, missing)
 
 
 def bounded_step(rates: Array, missing: Array, damping: float, room: tuple[Array, Array]) -> Array:
@@ -377,58 +426,63 @@ def _by_contacts(
     x: Array,
     near: Pose | None,
     arguments: dict[str, Any],
-    soft: tuple[float, ...],
+    way: Way,
 ) -> Pose | None:
     """Return the pose by Newton's method, with the plate's contact forces as unknowns besides; None
     where it does not converge to a stable pose within the limits.
-
-    It starts at the equilibrium; with ``soft`` plates (mN/mm) that come first at that without one.
-    Against these the top's load goes gradually from one point to the next as it rolls, and rates
-    hardly jump.
     """
     load, forces = target.load, None
     assert load is not None
-    start = _free_freedoms(target.stack, x) if soft else None
-    if start is None:
+    if way.is_posed:
         pose = _equilibrium(target, x, arguments, near)
         if pose is None:
             return None
-        start = pose.freedoms
-    at = start
-    for stiffness in soft:
+        at = pose.freedoms
+    else:
+        at = target.stack.start_freedoms((P0 * np.sinh(x)).tolist())[target.stack.levels]
+    for stiffness in way.soft:
         softer = target._replace(load=load._replace(stiffness=stiffness))
-        tried = _contact_newton(softer, x, at, forces, ROUGH_CONTACT)
+        tried = _contact_newton(softer, x, at, forces, SOFT_STEPS, ROUGH_CONTACT)
         if tried is None:
             return None
-        x, at, forces = tried
-    found = _contact_newton(target, x, at, forces, CLOSE_CONTACT)
+        x, at, forces, _ = tried
+    found = _contact_newton(target, x, at, forces, PLATE_STEPS, CLOSE_CONTACT)
     if found is None:
         return None
-    x, at, _ = found
-    return _equilibrium(target, x, arguments, target.stack.pose_like(at))
-
-
-def _free_freedoms(stack: PosedStack, x: Array) -> Array | None:
-    """Return the freedoms (levels, 3) without a load; None where none are found."""
+    x, at, _, now = found
+    if now is None:
+        return None
+    if not is_positive_definite(hessian(now, at, target.stack.pitch)):
+        # A straight column that would buckle, unless a stable equilibrium is near.
+        return _equilibrium(target, x, arguments, target.stack.pose_like(at))
     pressures = (P0 * np.sinh(x)).tolist()
     try:
-        kinds = free_equilibrium(stack.springs(pressures), stack.start_freedoms(pressures))
+        springs = target.stack.springs(pressures)
+        return target.stack.pose_at(pressures, springs, at, None, now.push / 1000)
     except DesignError:
         return None
-    return np.asarray(kinds[stack.levels])
 
 
 def _contact_newton(
-    target: TipTarget, x: Array, at: Array, forces: Array | None, enough: float
-) -> tuple[Array, Array, Array] | None:
-    """Return asinh(p / P0), freedoms and contact forces after a step below ``enough``; None where
-    there is none.
+    target: TipTarget, x: Array, at: Array, forces: Array | None, most: int, enough: float
+) -> tuple[Array, Array, Array | None, LoadedEnergy | None] | None:
+    """Return asinh(p / P0), freedoms and contact forces after a step below ``enough``, or after
+    ``most`` steps; None where one is singular.
+
+    Against the plate itself such a step ends in equilibrium, whose energy comes with it.
     """
-    stack, load = target.stack, target.load
+    stack, load, before = target.stack, target.load, np.zeros_like(x)
     assert load is not None
-    for _ in range(PLATE_STEPS):
+    is_soft, is_close = load.stiffness < WALL_STIFFNESS, False
+    for number in range(most + 1):
+        if is_soft and (is_close or number == most):
+            return x, at, forces, None
         springs = stack.each(stack.springs((P0 * np.sinh(x)).tolist()))
         now = loaded_energy(springs, stack.pitch, load, at, forces)
+        if is_close and np.abs(now.gradient).max() < CONTACT_RESIDUAL:
+            return x, at, forces, now
+        if number == most:
+            break
         touch = now.touch
         assert touch is not None
         step = _contact_step(target, x, at, now, springs)
@@ -436,11 +490,14 @@ def _contact_newton(
             return None
         move, ahead = step
         share = float(step_limit(move).min())
+        if ahead @ before < -TURNED_BACK * (before @ before):
+            # To and fro, at the limits of pressures and where contacts open and close.
+            share /= 2
+        before = ahead
         forces = touch.resists(touch.deep + share * (now.deeper(touch) @ move.ravel()))
         x, at = np.clip(x + share * ahead, 0.0, target.most), at + share * move
-        if max(float(np.abs(move).max()), float(np.abs(ahead).max())) < enough:
-            return x, at, forces
-    return None
+        is_close = max(float(np.abs(move).max()), float(np.abs(ahead).max())) < enough
+    return x, at, forces, None
 
 
 def _contact_step(
@@ -451,19 +508,21 @@ def _contact_step(
     """
     touch, size = now.touch, now.gradient.size
     assert touch is not None
+    assert target.load is not None
+    wall = target.load.wall
+    assert wall is not None
     lines = now.deeper(touch)
     motion = tip_motion(now.plates, now.motions)[:3].reshape(3, size)
     away = target.place - now.plates.places[-1]
-    # A top that lies flat on the plate goes nowhere along its normal: far off, no step is for that.
-    share = LEAST_DAMPING + PLATE_DAMPING * min(float(np.linalg.norm(away)), 1.0)
+    share = plate_damping(away)
     filling = springs.slopes(at)[1].transpose(0, 2, 1) * (P0 * np.cosh(x))
     # Without what the plate resists.
     free = hessian(now, at, target.stack.pitch)
     free -= (lines.T * (touch.stiff * (touch.deep > touch.least))) @ lines
     gradient = now.gradient - touch.forces @ lines
     room = (np.maximum(-x, -LONGEST_STEP), np.minimum(target.most - x, LONGEST_STEP))
-    touches = touch.deep > touch.least
-    for _ in range(CONTACT_ROUNDS):
+    before = touches = touch.deep > touch.least
+    for number in range(CONTACT_ROUNDS):
         stiff = touch.stiff * touches
         pushes = gradient + (stiff * touch.deep) @ lines
         right = np.concatenate([-pushes[:, None], filling.reshape(size, -1)], axis=1)
@@ -473,18 +532,34 @@ def _contact_step(
             return None
         own, by_pressure = moves[:, 0], moves[:, 1:]
         rates = motion @ by_pressure
-        missing = away - motion @ own
+        missing = movable(wall, away - motion @ own)
         if np.linalg.norm(missing) < NEAR / 2:
             # Friction may let no pressure move it further: these would stray.
-            missing[:] = 0.0
-        damping = share * float((rates * rates).sum()) + 1e-12
+            missing = np.zeros(3)
+        damping = float(share * (rates * rates).sum()) + 1e-12
         ahead = bounded_step(rates, missing, damping, room)
         move = own + by_pressure @ ahead
         after = touch.deep + lines @ move > touch.least
-        if (after == touches).all():
+        if (after == touches).all() or (is_turn(number) and (after == before).all()):
             break
-        touches = after
+        before, touches = touches, after
     return move.reshape(-1, 3), ahead
+
+
+def is_turn(number: int) -> bool:
+    """Return True for a round of contacts that ends one that goes to and fro between two sets: the
+    rounds to come would end with the same.
+    """
+    return number > 0 and (CONTACT_ROUNDS - 1 - number) % 2 == 0
+
+
+def plate_damping(away: Array) -> Array:
+    """Return the damping (...) against an outer plate, so many mm (3, ...) away, as a share of the
+    sum of the squares of all rates.
+
+    A top that lies flat on the plate goes nowhere along its normal: far off, no step is for that.
+    """
+    return np.asarray(LEAST_DAMPING + PLATE_DAMPING * np.minimum((away * away).sum(0), 1.0))
 
 
 # From equilibrium to equilibrium.

@@ -80,14 +80,19 @@ class Stack(PosedStack):
         DesignError for bad input.
         """
         place = vector_of(tip, "the place of the tip in mm")
+        most = self.reach_limit(most_pressure)
+        acting = self.load(*(load.get(name, value) for name, value in NO_LOAD.items()))
+        return reach(self, place, acting, load, most, near)
+
+    def reach_limit(self, most_pressure: float | None) -> float:
+        """Return the highest pressure in kPa of ``reach``. Raises DesignError."""
         most = self.most_pressure if most_pressure is None else float(most_pressure)
         if not 0 < most <= self.most_pressure:
             raise DesignError(
                 f"most_pressure = {most:g} kPa must be above 0 and at most "
                 f"{self.most_pressure:g} kPa, to which the stack was made"
             )
-        acting = self.load(*(load.get(name, value) for name, value in NO_LOAD.items()))
-        return reach(self, place, acting, load, most, near)
+        return most
 
     def motion(
         self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any

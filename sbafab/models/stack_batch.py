@@ -1,4 +1,5 @@
-"""Many states of one stack at once: poses, and motions as chambers fill through their lines.
+"""Many states of one stack at once: poses, inverse kinematics, and motions as chambers fill through
+their lines.
 
 The same equilibria as of ``Stack.pose`` and ``Motion``, by Newton's method for all states in one
 step; states that it does not solve soon are solved one by one, and so are all against an outer
@@ -8,6 +9,7 @@ under one it has a row a level. Lengths mm, pressures kPa, volumes ul.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,15 +19,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.batch_balance import (
-    STRAIGHT,
-    Levels,
-    LevelsAt,
-    descended,
-    solved,
-    step_share,
-)
+from sbafab.models.batch_balance import Levels, LevelsAt, descended, step_share
+from sbafab.models.batch_loads import STRAIGHT, chain_of, solved
+from sbafab.models.batch_reach import BatchReach
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
+from sbafab.models.reach import P0
 from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion
 from sbafab.models.stack_poses import NO_LOAD, Pose
 
@@ -60,13 +58,15 @@ class BatchPoses:
     """N poses of a stack at ``pressures`` (N, chambers) in kPa.
 
     ``freedoms`` (N, levels, 3) are rise in mm and tilt in rad of each level; ``volumes``
-    (N, chambers) ul; ``tips`` (N, 3) the middles of the top plates in mm.
+    (N, chambers) ul; ``tips`` (N, 3) the middles of the top plates in mm; ``forces`` (N,) N on an
+    outer plate.
     """
 
     pressures: Array
     freedoms: Array
     volumes: Array
     tips: Array
+    forces: Array
 
     @property
     def heights(self) -> Array:
@@ -134,7 +134,31 @@ class StackBatch:
             alone = self.stack.pose(tuple(asked[number].tolist()))
             freedoms[:, :, number] = alone.freedoms[self.stack.first_levels]
             volumes[:, number] = alone.volumes
-        return BatchPoses(asked, self.every_level(freedoms), volumes.T, self.tips(freedoms))
+        tips, none = self.tips(freedoms), np.zeros(len(asked))
+        return BatchPoses(asked, self.every_level(freedoms), volumes.T, tips, none)
+
+    def reach(self, tips: ArrayLike, most_pressure: float | None = None, **load: Any) -> BatchPoses:
+        """Return poses whose tips stand at places (N, 3) in mm, those that ``Stack.reach`` finds
+        one by one, with pressures from 0 to ``most_pressure`` in kPa.
+
+        ``load`` are keyword arguments of ``Stack.pose`` beside pressures. Raises UnreachableError
+        and DesignError as ``Stack.reach`` does, for the first place that is not met.
+        """
+        places = _places(tips)
+        most, acting = self.stack.reach_limit(most_pressure), self.load(load)
+        found = BatchReach(self.stack, acting, math.asinh(most / P0)).reached(places)
+        freedoms, pressures, volumes, pushes = found
+        for number in np.flatnonzero(np.isnan(volumes[0])).tolist():
+            pose = self.stack.reach(places[number].tolist(), most, **load)
+            freedoms[..., number], pushes[number] = pose.freedoms, 1000 * pose.force
+            pressures[:, number], volumes[:, number] = pose.pressures, pose.volumes
+        return BatchPoses(
+            pressures.T,
+            freedoms.transpose(2, 0, 1),
+            volumes.T,
+            chain_of(freedoms, self.stack.pitch).tip.T,
+            pushes / 1000,
+        )
 
     def motion(
         self,
@@ -229,7 +253,7 @@ class StackBatch:
             np.empty((levels, 3, count)),
             np.full((count, self.stack.chambers), np.nan),
         )
-        rows = Levels.of(self.stack, acting)
+        rows, forces = Levels.of(self.stack, acting), np.zeros(count)
         if acting.wall is None:
             start = self._starts(pressures) if near is None else near.freedoms
             for part in _parts(count, LOADED_CHUNK):
@@ -238,26 +262,21 @@ class StackBatch:
                 end = freedoms[:, :, part]
                 begin = np.ascontiguousarray(start[part].transpose(1, 2, 0))
                 is_solved = descended(rows, weights[:, :1], begin, end)
-                is_solved &= self.fits(rows, end)
+                is_solved &= rows.fits(self.stack.centres, end)
                 found = rows.at(weights, end).volumes.T
                 volumes[part] = np.where(is_solved[:, None], found, np.nan)
         for number in np.flatnonzero(np.isnan(volumes[:, 0])):
             like = None if near is None else self.stack.pose_like(near.freedoms[number])
             alone = self.stack.pose(pressures[number].tolist(), near=like, **load)
             freedoms[:, :, number], volumes[number] = alone.freedoms, alone.volumes
+            forces[number] = alone.force
         tips = rows.tips(freedoms)
-        return BatchPoses(pressures, freedoms.transpose(2, 0, 1), volumes, tips)
+        return BatchPoses(pressures, freedoms.transpose(2, 0, 1), volumes, tips, forces)
 
     def _starts(self, pressures: Array) -> Array:
         """Return freedoms (N, levels, 3) to start from, as of ``Stack.pose``."""
         rises = [kind.rises(pressures.T).T @ self.stack.planes for kind in self.stack.maps]
         return np.stack(rises, axis=1)[:, self.stack.levels]
-
-    def fits(self, rows: Levels, freedoms: Array) -> NDArray[np.bool_]:
-        """Return True (n) where no balloon is higher than its map."""
-        most = np.array([self.stack.maps[kind].most_height for kind in rows.kinds])
-        gaps = np.einsum("ic,rin->rcn", self.stack.centres, freedoms)
-        return np.asarray((gaps <= most[:, None, None]).all((0, 1)))
 
     def _free_poses(self, pressures: Array, start: Array) -> tuple[Array, Array]:
         """Return freedoms (kinds, 3, n) and volumes (chambers, n), NaN where none are found."""
@@ -267,7 +286,7 @@ class StackBatch:
             one, end = self.levels.alone(kind), freedoms[kind : kind + 1]
             is_solved = descended(one, weights[:, :1], start[kind : kind + 1], end)
             volumes = one.at(weights, end).volumes
-            is_solved &= self.fits(one, end)
+            is_solved &= one.fits(self.stack.centres, end)
             total += count * np.where(is_solved, volumes, np.nan)
         total[:, np.isnan(total[0])] = np.nan
         return freedoms, total
@@ -286,7 +305,19 @@ def batch_of(pressures: Array, poses: Sequence[Pose]) -> BatchPoses:
         np.array([pose.freedoms for pose in poses]).reshape(-1, levels, 3),
         np.array([pose.volumes for pose in poses]).reshape(pressures.shape),
         np.array([pose.tip for pose in poses]).reshape(-1, 3),
+        np.array([pose.force for pose in poses]),
     )
+
+
+def _places(tips: ArrayLike) -> Array:
+    """Return places (N, 3) in mm. Raises DesignError where they are no such."""
+    try:
+        places = np.asarray(tips, dtype=float)
+    except (TypeError, ValueError):
+        places = np.zeros(0)
+    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
+        raise DesignError("places of the tip in mm must be finite numbers, a row of three a place")
+    return places
 
 
 @dataclass(eq=False)
@@ -365,7 +396,7 @@ class BatchMotion:
             each = self.batch.every_level(freedoms)
         else:
             each = freedoms.transpose(2, 0, 1)
-        return BatchPoses(self.pressures, each, volumes.T, self.tips)
+        return BatchPoses(self.pressures, each, volumes.T, self.tips, np.zeros(len(self.times)))
 
     def step(self, dt: float, pressures: ArrayLike) -> None:
         """Move on by ``dt`` s with pressures (N, chambers) in kPa at the valves. Raises
@@ -458,7 +489,7 @@ class BatchMotion:
     def _fits(self, freedoms: Array, pressures: Array) -> NDArray[np.bool_]:
         """Return True (n) where no balloon is higher than its map, nor a pressure at its end."""
         fits = (pressures < self.batch.stack.most_pressure).all(0)
-        return np.asarray(fits & self.batch.fits(self.levels, freedoms))
+        return np.asarray(fits & self.levels.fits(self.batch.stack.centres, freedoms))
 
     def _volumes(self, now: LevelsAt) -> Array:
         """Return the volumes of the chambers in ul, of a gas with its line: (chambers, n)."""

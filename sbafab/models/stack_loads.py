@@ -498,7 +498,7 @@ class LoadedEnergy(NamedTuple):
         """
         size = self.gradient.size
         half = self.motions.reshape(size, 6)[:, :3] @ self.works[..., :3].reshape(size, 3).T
-        half *= _base_side(size // 3)
+        half *= base_side(size // 3)
         return -(half + half.T)
 
     def deeper(self, touch: PlateContact) -> Array:
@@ -542,7 +542,7 @@ def loaded_energy(
 
 
 @lru_cache(maxsize=16)
-def _base_side(count: int) -> Array:
+def base_side(count: int) -> Array:
     """Return 1 where the row's level is nearer the base than the column's, 1/2 if equal."""
     level = np.repeat(np.arange(count), 3)
     return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))

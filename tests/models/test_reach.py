@@ -11,6 +11,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError, UnreachableError
 from sbafab.models.stack import Plate, Stack
+from sbafab.models.stack_batch import StackBatch
 
 MOST = 10.0
 """kPa to which chambers may be filled."""
@@ -41,10 +42,18 @@ def targets(stack: Stack, count: int, loads: dict[str, Any]) -> Iterator[Any]:
 
 
 def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
-    """Return how many targets are not met, by a pose of the stack at the pressures found."""
-    number = 0
-    for target in targets(stack, count, loads):
+    """Return how many targets are not met, by a pose of the stack at the pressures found; all
+    together they are met by the same poses.
+    """
+    number, tips = 0, np.array(list(targets(stack, count, loads)))
+    together = StackBatch(stack).reach(tips, MOST, **loads)
+    for place, target in enumerate(tips):
         reached = stack.reach(target, most_pressure=MOST, **loads)
+        assert together.pressures[place] == pytest.approx(reached.pressures, abs=1e-3)
+        assert together.freedoms[place] == pytest.approx(reached.freedoms, abs=1e-5)
+        assert together.tips[place] == pytest.approx(target, abs=CLOSE)
+        assert together.volumes[place] == pytest.approx(reached.volumes, abs=5e-3)
+        assert together.forces[place] == pytest.approx(reached.force, abs=1e-5)
         assert min(reached.pressures) >= 0
         assert max(reached.pressures) <= MOST + 1e-9
         again = stack.pose(np.clip(reached.pressures, 0, MOST).tolist(), **loads, near=reached)
@@ -56,6 +65,17 @@ def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
 @pytest.mark.parametrize("load", LOADS)
 def test_random_reachable_targets_are_met(three: Stack, load: str) -> None:
     assert missed(three, 8 if "plate" in load else 20, LOADS[load]) == 0
+
+
+@pytest.mark.parametrize("load", ["tip", "plate", "level slippery plate"])
+def test_few_of_many_targets_are_left_to_be_met_alone(
+    three: Stack, load: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tips, alone = np.array(list(targets(three, 8, LOADS[load]))), []
+    monkeypatch.setattr("sbafab.models.batch_reach.FEW", 0)
+    monkeypatch.setattr(Stack, "reach", lambda _, tip, *__, **___: alone.append(tip))
+    StackBatch(three).reach(tips, MOST, **LOADS[load])
+    assert len(alone) <= 1
 
 
 @pytest.mark.parametrize(
@@ -139,3 +159,14 @@ def test_bad_input_to_reach_is_refused(three: Stack) -> None:
         three.reach((0, 0, 10), most_pressure=120)
     with pytest.raises(DesignError, match="a plate 1 mm high is lower than the flat stack"):
         three.reach((0, 0, 10), plate=1.0)
+
+
+def test_bad_input_to_many_targets_is_refused(three: Stack) -> None:
+    batch = StackBatch(three)
+    with pytest.raises(DesignError, match="places of the tip in mm must be finite numbers"):
+        batch.reach((0, 0, 10))
+    with pytest.raises(DesignError, match="most_pressure = 120 kPa must be above 0 and at most"):
+        batch.reach([(0, 0, 10)], most_pressure=120)
+    with pytest.raises(UnreachableError, match=r"cannot reach \(0, 0, 60\) mm with 0 to 10 kPa"):
+        batch.reach([(0, 0, 10), (0, 0, 60)], most_pressure=MOST)
+    assert batch.reach(np.zeros((0, 3))).tips.shape == (0, 3)

@@ -12,6 +12,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import stack as stacks
 from sbafab.models.batch_balance import Levels
+from sbafab.models.derivatives import hessian
 from sbafab.models.least_energy import is_positive_definite
 from sbafab.models.pneumatics import AIR, WATER, Line
 from sbafab.models.stack import Plate, Stack
@@ -113,6 +114,55 @@ def test_levels_under_a_load_are_solved_together(three: Stack) -> None:
     # A pull upwards that no film withstands.
     soft = now._replace(blocks=now.blocks - 1e6 * np.eye(3)[:, :, None])
     assert not soft.solved(right)[1].any()
+
+
+@pytest.mark.parametrize("sticks", [True, False])
+def test_levels_against_a_plate_are_solved_together(three: Stack, sticks: bool) -> None:
+    """Residuals and solutions beside the dense matrix of one state at a time, the contacts as they
+    are and others; two of the states are pressed until their matrix is indefinite.
+    """
+    kinds = (three.maps[0], three.maps[0].stiffened(2.0))
+    mixed = replace(three, maps=kinds, levels=np.array([0, 1, 1, 0]))
+    plate = Plate((0.5, 0.0, 4.5), (0.1, 0.0, 1.0), sticks)
+    load = mixed.load((0.0, 0.003, -0.002), True, plate)
+    assert load is not None
+    assert load.wall is not None
+    soft = load._replace(stiffness=1e5)
+    levels, numbers = Levels.of(mixed, load), np.random.default_rng(5)
+    pressures = numbers.uniform(1.0, 9.0, (3, 4))
+    freedoms = numbers.uniform([[0.6], [-0.05], [-0.05]], [[1.0], [0.05], [0.05]], (4, 3, 4))
+    forces = numbers.uniform(0.0, 5.0, (len(load.wall.local), 4))
+    forces[:2, 2:] = 1e5
+    weights = levels.weights(pressures, 2)
+    now = levels.touching(weights, freedoms, np.full(4, soft.stiffness), forces)
+    right = numbers.normal(size=(4, 3, 2, 4))
+    right[:, :, 0] = -now.residual
+    solutions, touches = now.condensed(right), now.contact.touches
+    others = touches ^ (np.arange(len(touches))[:, None] % 5 == 1)
+    sums, pulls = solutions.with_contacts(*now.contact.held(others, forces))
+    for state in range(4):
+        springs = mixed.each(mixed.springs(pressures[:, state].tolist()))
+        one = loaded_energy(springs, mixed.pitch, soft, freedoms[..., state], forces[:, state])
+        assert now.residual[..., state].ravel() == pytest.approx(one.gradient, abs=1e-7)
+        touch = one.touch
+        assert touch is not None
+        lines = one.deeper(touch)
+        held = touch.stiff * (touch.deep > touch.least)
+        free = hessian(one, freedoms[..., state], mixed.pitch) - (lines.T * held) @ lines
+        moves = solutions.moves[..., state].reshape(12, -1)
+        for closed, motion in (
+            (touches, moves[:, :2]),
+            (others, moves[:, :2] + moves[:, 2:] @ pulls[..., state]),
+        ):
+            stiff = touch.stiff * closed[:, state]
+            sides = right[..., state].reshape(12, 2).copy()
+            sides[:, 0] -= (stiff * touch.deep - touch.forces) @ lines
+            expected = np.linalg.solve(free + (lines.T * stiff) @ lines, sides)
+            assert motion == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        assert solutions.is_firm[state] == is_positive_definite(free + (lines.T * held) @ lines)
+        ends = np.einsum("lfx,lfk->xk", now.motions[..., state], motion.reshape(4, 3, 2))
+        assert sums[..., state] == pytest.approx(ends, rel=1e-6, abs=1e-9)
+    assert solutions.is_firm.tolist() == [True, True, False, False]
 
 
 @pytest.mark.parametrize("load", ["tip", "gravity"])
