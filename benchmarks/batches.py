@@ -1,23 +1,33 @@
-"""Many states of the paper's 3-DoF actuator at once: poses, and steps of environments."""
+"""Many states of the paper's 3-DoF actuator at once: poses, places of the tip, and steps of
+environments.
+"""
 
 from __future__ import annotations
 
 import os
 import time
 from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 import sbafab
 from benchmarks.processes import by_another_process
-from benchmarks.stacks import DESIGN, MOST
+from benchmarks.stacks import DESIGN, LOADS, MOST
+from sbafab.models.stack import Plate
 from sbafab.process import prepare
 
 STATES = 1024
 STEPS, WARM = 60, 10
 """Steps that count, and those before."""
 STEP_SECONDS = 0.02
+PLACES = 1000
+PLATES: dict[str, dict[str, Any]] = {
+    "tilted plate 14 mm high": {"plate": Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0))},
+    "the same, slippery": {"plate": Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0), sticks=False)},
+}
+"""Outer plates beside the ``LOADS``."""
 
 
 def pose_seconds(is_dragged: bool) -> float:
@@ -38,6 +48,27 @@ def pose_seconds(is_dragged: bool) -> float:
             batch.poses(numbers.uniform(0.0, MOST, pressures.shape))
         pressures = moved
     return (time.process_time() - began) / STEPS / STATES
+
+
+@lru_cache
+def places(load: str) -> Any:
+    """Tips (PLACES, 3) in mm of poses at random pressures, some chambers empty or full."""
+    stack, numbers = sbafab.stack(DESIGN), np.random.default_rng(31)
+    drawn = np.clip(numbers.uniform(-1.0, MOST + 1.0, (PLACES, 3)), 0.0, MOST)
+    loads = (LOADS | PLATES)[load]
+    return np.array([stack.pose(pressures, **loads).tip for pressures in drawn.tolist()])
+
+
+def reach_seconds(load: str) -> float:
+    """Processor time of bringing the tip to one of ``PLACES``, all at once."""
+    from sbafab.models.stack_batch import StackBatch
+
+    batch, loads = StackBatch(sbafab.stack(DESIGN)), (LOADS | PLATES)[load]
+    tips = places(load)
+    batch.reach(tips[:8], MOST, **loads)
+    began = time.process_time()
+    batch.reach(tips, MOST, **loads)
+    return (time.process_time() - began) / PLACES
 
 
 def _begun(states: int) -> tuple[Any, Any]:

@@ -208,6 +208,10 @@ def poses(rounds: int) -> Section:
         taken = [batches.pose_seconds(is_dragged) for _ in range(rounds)]
         name = f"no load, {batches.STATES:,} at once, {kind}"
         rows.append(Row(name, taken, rate(taken, "equilibria")))
+    for load in ("no load", "7 mN on the tip", *batches.PLATES):
+        taken = [batches.reach_seconds(load) for _ in range(rounds)]
+        name = f"{load}, tip to {batches.PLACES:,} places at once"
+        rows.append(Row(name, taken, rate(taken, "places")))
     taken = [batches.step_seconds() for _ in range(rounds)]
     rows.append(Row(f"a step of {batches.STATES:,} environments", taken, rate(taken, "steps")))
     clock = batches.clock_rate(2)
