@@ -129,8 +129,8 @@ class Condensed(NamedTuple):
         begin[:, 0] += product(units, pulls[:, :1])[:, 0]
         matrix = -product(units, stiffer)
         matrix[np.arange(6), np.arange(6)] += 1.0
-        found = np.linalg.solve(np.moveaxis(matrix, -1, 0), np.moveaxis(begin, -1, 0))
-        sums = np.ascontiguousarray(np.moveaxis(found, 0, -1))
+        found = np.linalg.solve(matrix.transpose(2, 0, 1), begin.transpose(2, 0, 1))
+        sums = np.ascontiguousarray(found.transpose(1, 2, 0))
         return sums, pulls + product(stiffer, sums)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from sbafab.models import reach
 from sbafab.models.batch_balance import Levels, LevelsAt, TouchingAt, step_share
-from sbafab.models.batch_loads import chain_of, crossed, solved
+from sbafab.models.batch_loads import chain_of, crossed
 from sbafab.models.reach import P0
 from sbafab.models.stack_loads import WALL_POINTS
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 FEW = 6
 """Places that are met alone sooner than together."""
-TOGETHER = 384
-"""States that go on together: more are no faster."""
+CHUNK, TOGETHER = 1024, 384
+"""Places met together, and runs against a plate that go on together: more are no faster."""
 GROUP_ENDS = (1, 3, 6, 18)
 """Attempts at a place that begin together where those before have failed: up to each."""
 
@@ -190,8 +190,8 @@ class BatchReach:
         if has_plate:
             self._against_plate(places.T, guess, found)
             return found
-        for begin in range(0, count, TOGETHER):
-            part = slice(begin, begin + TOGETHER)
+        for begin in range(0, count, CHUNK):
+            part = slice(begin, begin + CHUNK)
             some = Reached(*(each[..., part] for each in found))
             self._by_freedoms(places[part].T, guess[:, part], some)
         return found
@@ -461,7 +461,7 @@ def bounded_steps(rates: Array, missing: Array, damping: Array, room: tuple[Arra
     each = np.arange(chambers)
     matrix[each, each] += damping
     gradient = (rates * missing[:, None]).sum(0)
-    step = solved(matrix, gradient[:, None])[0][:, 0]
+    step = _each_solved(matrix, gradient)
     inside = np.minimum(np.maximum(step, room[0]), room[1])
     is_free = inside == step
     live = np.flatnonzero(~is_free.all(0))
@@ -474,10 +474,16 @@ def bounded_steps(rates: Array, missing: Array, damping: Array, room: tuple[Arra
         right = np.where(free, gradient[:, live] - (some * held).sum(1), held)
         reduced = some * (free[:, None] & free[None])
         reduced[each, each] = np.where(free, reduced[each, each], 1.0)
-        tried = solved(reduced, right[:, None])[0][:, 0]
+        tried = _each_solved(reduced, right)
         within = np.minimum(np.maximum(tried, room[0][:, live]), room[1][:, live])
         still = free & (within == tried)
         step[:, live] = within
         is_free[:, live] = still
         live = live[((still != free) & free).any(0) & still.any(0)]
     return step
+
+
+def _each_solved(matrices: Array, right: Array) -> Array:
+    """Return the solutions (size, n) of matrices (size, size, n) by right sides (size, n)."""
+    found = np.linalg.solve(matrices.transpose(2, 0, 1), right.T[..., None])
+    return np.asarray(found[..., 0].T)
