@@ -1,28 +1,36 @@
-"""Runs the decks of the drawn templates in CalculiX, coarse and static, and keeps what came out:
-docs/measured/drawn_decks.json and drawn_decks_furthest.json.
+"""Runs the decks of the drawn templates in CalculiX, coarse, and keeps what came out:
+docs/measured/drawn_decks.json (static) and drawn_decks_furthest.json (with inertia).
 
 python -m docs.scripts.drawn_runs takes about ten minutes for all decks at a low pressure, and
-python -m docs.scripts.drawn_runs furthest up to 40 for how far they go on the way to a working
-pressure; names of templates after these run those alone. It needs ccx and the extra "mesh".
+python -m docs.scripts.drawn_runs furthest up to 20 of processor time for how far they go on the way
+to a working pressure; names of templates after these run those alone. It needs ccx and the extra
+"mesh", and Linux to tell processor time.
 """
 
 from __future__ import annotations
 
+import math
+import os
+import re
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 import sbafab
 from docs.scripts.measured import FOLDER, Record, keep, record
 from docs.scripts.tables import Table
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry
-from sbafab.simulators.calculix.deck import deck_settings
-from sbafab.simulators.calculix.run import DIVERGED, History, simulate
+from sbafab.process import Progress
+from sbafab.simulators.calculix.deck import JOB, RING, DeckSettings, Procedure, deck_settings
+from sbafab.simulators.calculix.results import SAME_TIME, read_frd
+from sbafab.simulators.calculix.run import DIVERGED, History, deck_mesh, simulate
 from sbafab.simulators.simulator import SimulationRequest
 
 COMMAND = "python -m docs.scripts.drawn_runs"
@@ -55,23 +63,44 @@ DECKS: Mapping[str, DeckCase] = {
 }
 """Static, so low that films hardly wrinkle, and quick."""
 
-WORKING: Mapping[str, float] = {
-    "array": 230.0,
-    "diode": 10.0,
-    "finger": 10.0,
-    "folded": 10.0,
-    "gripper": 10.0,
-    "pouch": 1.0,
-    "truss": 10.0,
+
+class Working(NamedTuple):
+    """Pressure in kPa to which a design may be taken, the seconds in which it rises to it, None
+    where no inertia is needed, how often results are written, and the minutes of processor time
+    after which a run is stopped.
+
+    Inertia carries films from one pattern of wrinkles to the next, the more the quicker the rise;
+    the table says what part of the energy is kinetic.
+    """
+
+    pressure: float
+    ramp: float | None
+    outputs: int = 16
+    minutes: float = 2.5
+
+
+WORKING: Mapping[str, Working] = {
+    "array": Working(230.0, 0.01),
+    "diode": Working(10.0, 0.005, minutes=5),
+    "finger": Working(10.0, None),
+    "folded": Working(10.0, 0.02),
+    "gripper": Working(10.0, None, 4),
+    "pouch": Working(1.0, 0.02),
+    "truss": Working(10.0, None),
 }
-"""kPa to which a design may be taken: the source's of the array, else ours. The vacuum's films meet
-before that.
-"""
-RISE = 16
-"""Results on the way there; pressures rise with the square of time."""
-MINUTES = 5.0
-"""By the clock, after which a run on the way to its working pressure is stopped."""
+"""The source's pressure of the array, else ours. The vacuum's films meet before that."""
+SLOW: Mapping[str, str] = {
+    "diode": "the film between its channel and pocket has air on both sides",
+    "folded": "its pocket wrinkles along seams and fold",
+    "gripper": "its 27,000 nodes take 10 s an iteration",
+    "pouch": "films of 0.038 mm have no stiffness while flat",
+    "truss": "its lower beam's edge wrinkles beside the inlet",
+}
+"""Why a run takes so long: where ccx's largest residuals lie."""
+FLYING = 10.0
+"""Percent of kinetic energy, from which on inertia bears more than a small part of the pressure."""
 FURTHEST = "furthest"
+ENERGY = re.compile(r"total (internal|kinetic) energy .* time +(\S+)\s+(\S+)")
 REACHED = (
     "template",
     "asked, kPa",
@@ -79,6 +108,7 @@ REACHED = (
     "thicker by, mm",
     "air, ul",
     "stress, MPa",
+    "kinetic energy, %",
     "end",
 )
 
@@ -86,27 +116,70 @@ REACHED = (
 def run_deck(name: str, folder: Path) -> History:
     """Return the history of a template's deck; its files stay in ``folder``."""
     case = DECKS[name]
-    return _run(name, case.pressure, case.outputs, folder, HOUR)
+    settings = _settings(name, case.pressure, "static", outputs=case.outputs)
+    return _run(name, settings, folder, lambda *_: None)
 
 
 def run_furthest(name: str, folder: Path) -> History | None:
-    """Return the history on the way to a working pressure, as far as ``MINUTES`` take it; None
-    without a result.
+    """Return the history on the way to a working pressure, as far as its time goes; None without
+    a result.
     """
+    pressure, ramp, outputs, minutes = WORKING[name]
+    procedure: Procedure = "static" if ramp is None else "dynamic"
+    settings = _settings(name, pressure, procedure, outputs=outputs, ramp=ramp or 1.0)
     try:
-        return _run(name, WORKING[name], RISE, folder, 60 * MINUTES)
+        return _run(name, settings, folder, stop_after(60 * minutes))
     except OutputError as error:
         print(error, flush=True)
         return None
 
 
-def _run(name: str, pressure: float, outputs: int, folder: Path, seconds: float) -> History:
+def _settings(
+    name: str, pressure: float, procedure: Procedure, outputs: int, ramp: float = 1.0
+) -> DeckSettings:
+    settings = deck_settings(sbafab.build(name), SimulationRequest(pressure), procedure)
+    return replace(settings, outputs=outputs, ramp=ramp)
+
+
+def _run(name: str, settings: DeckSettings, folder: Path, progress: Progress) -> History:
     case = DECKS[name]
-    laminate = sbafab.build(name)
-    mesh = MeshSettings(h=case.h, symmetry=case.symmetry, gaps=pressure < 0)
-    settings = deck_settings(laminate, SimulationRequest(pressure), "static")
-    settings = replace(settings, outputs=outputs)
-    return simulate(laminate, mesh, settings, folder, seconds, lambda *_: None)
+    mesh = MeshSettings(h=case.h, symmetry=case.symmetry, gaps=settings.has_vacuum)
+    return simulate(sbafab.build(name), mesh, settings, folder, HOUR, progress)
+
+
+def stop_after(seconds: float) -> Progress:
+    """Return a progress that interrupts a run after so much processor time (Linux)."""
+
+    def look(what: str, done: int, total: int) -> None:
+        ticks = 0
+        for children in Path("/proc/self/task").glob("*/children"):
+            for process in children.read_text(encoding="ascii").split():
+                stat = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+                ticks += sum(map(int, stat.rpartition(")")[2].split()[11:13]))
+        if ticks > seconds * os.sysconf("SC_CLK_TCK"):
+            raise KeyboardInterrupt
+
+    return look
+
+
+def kinetic_shares(name: str, history: History, folder: Path) -> dict[int, float]:
+    """Return the part of kinetic energy in that of each state, in percent, 0 of a static run; one
+    that was stopped may not have written its last.
+    """
+    if WORKING[name].ramp is None:
+        return dict.fromkeys(range(1, len(history.states)), 0.0)
+    text = (folder / f"{JOB}.dat").read_text(encoding="ascii")
+    energies = [(kind, float(at), float(value)) for kind, at, value in ENERGY.findall(text)]
+    shares = {}
+    for number, state in enumerate(history.states):
+        of_state = {
+            kind: value
+            for kind, at, value in energies
+            if math.isclose(at, state.time, rel_tol=SAME_TIME)
+        }
+        if len(of_state) == 2:
+            shares[number] = 100 * of_state["kinetic"] / sum(of_state.values())
+    return shares
 
 
 def row_of(name: str, history: History) -> list[str]:
@@ -125,47 +198,85 @@ def row_of(name: str, history: History) -> list[str]:
     ]
 
 
-def furthest_row(name: str, history: History | None) -> list[str]:
-    """Return the row of a run to a working pressure: the last result, and what ended it; None of a
-    run that had no result.
+def furthest_row(name: str, history: History | None, folder: Path) -> list[str]:
+    """Return the row of a run to a working pressure: the last result, and what ended it and why.
+
+    Results in which films still fly are none.
     """
-    if history is None:
-        first = WORKING[name] / RISE**2
-        return [name, f"{WORKING[name]:g}", f"less than {first:.2g}", "", "", "", "no result"]
-    _, reached, _, _, *figures = row_of(name, history)
+    pressure, _, _, minutes = WORKING[name]
+    shares = {} if history is None else kinetic_shares(name, history, folder)
+    settled = [number for number, share in shares.items() if share < FLYING]
+    if history is None or not settled:
+        flying = f"no result after {minutes:g} minutes: films still fly, as {SLOW[name]}"
+        return [name, f"{pressure:g}", "", "", "", "", "", flying]
+    last = settled[-1]
+    _, reached, _, _, *figures = row_of(name, replace(history, states=history.states[: last + 1]))
     ended = "reached"
     if history.stopped is not None:
-        ended = "no convergence" if DIVERGED in history.stopped else f"{MINUTES:g} minutes"
-    return [name, f"{WORKING[name]:g}", reached, *figures, ended]
+        ended = "no convergence" if DIVERGED in history.stopped else f"{minutes:g} minutes"
+        ended += f": {SLOW[name]}" if name in SLOW else ""
+    return [name, f"{pressure:g}", reached, *figures, f"{shares[last]:.2g}", ended]
+
+
+def array_rises(history: History, folder: Path) -> Table:
+    """Return the array's rise on the way, and how far its bonds then lie off a plane."""
+    case = DECKS["array"]
+    mesh = deck_mesh(sbafab.build("array"), MeshSettings(h=case.h, symmetry=case.symmetry))
+    bond = mesh.node_sets[RING]
+    plane = np.column_stack([np.ones(len(bond)), mesh.points[bond, :2]])
+    frames = read_frd(folder / f"{JOB}.frd", len(mesh.points), whole=history.stopped is None)
+    rows = []
+    for state, frame in zip(history.states[1:], frames, strict=False):
+        moved = frame.displacement[bond, 2]
+        off = moved - plane @ np.linalg.lstsq(plane, moved, rcond=None)[0]
+        kilopascals = max(state.pressures.values())
+        rows.append([f"{kilopascals:.4g}", f"{state.stroke:.3f}", f"{np.ptp(off):.3f}"])
+    return Table(("kPa", "thicker by, mm", "bonds off a plane, mm"), rows)
 
 
 def main(names: Sequence[str]) -> None:
     """Run the named decks, or all; rows of others stay as they were measured."""
-    is_furthest = FURTHEST in names
     chosen = [name for name in names if name != FURTHEST]
-    if is_furthest:
-        _keep_rows(f"{NAME}_{FURTHEST}", f"{COMMAND} {FURTHEST}", REACHED, WORKING, chosen)
+    if FURTHEST in names:
+        for name in chosen or WORKING:
+            _keep(f"{NAME}_{FURTHEST}", f"{COMMAND} {FURTHEST}", REACHED, furthest_tables, name)
     else:
-        _keep_rows(NAME, COMMAND, COLUMNS, DECKS, chosen)
+        for name in chosen or DECKS:
+            _keep(NAME, COMMAND, COLUMNS, low_tables, name)
 
 
-def _keep_rows(
-    name: str, command: str, columns: Sequence[str], cases: Iterable[str], chosen: Sequence[str]
+def low_tables(name: str, folder: Path) -> tuple[list[str], dict[str, Table]]:
+    """Return the row of a template at its low pressure."""
+    return row_of(name, run_deck(name, folder)), {}
+
+
+def furthest_tables(name: str, folder: Path) -> tuple[list[str], dict[str, Table]]:
+    """Return the row of a template towards its working pressure, and further tables."""
+    history = run_furthest(name, folder)
+    further = {}
+    if name == "array" and history is not None:
+        further["array"] = array_rises(history, folder)
+    return furthest_row(name, history, folder), further
+
+
+def _keep(
+    name: str,
+    command: str,
+    columns: Sequence[str],
+    run: Callable[[str, Path], tuple[list[str], dict[str, Table]]],
+    template: str,
 ) -> None:
-    rows = {}
+    """Run a template's deck, and put its row into a record."""
+    tables: dict[str, Table] = {}
     if (FOLDER / f"{name}.json").is_file():
-        rows = {row[0]: list(row) for row in record(name).tables["decks"].rows}
-    for template in chosen or cases:
-        with tempfile.TemporaryDirectory() as place:
-            if name == NAME:
-                rows[template] = row_of(template, run_deck(template, Path(place)))
-            else:
-                rows[template] = furthest_row(template, run_furthest(template, Path(place)))
-            print(*rows[template], flush=True)
-        table = Table(columns, [rows[key] for key in cases if key in rows])
-        keep(
-            name, Record(command, date.today().isoformat(), {"CalculiX": "2.20"}, {"decks": table})
-        )
+        tables |= record(name).tables
+    with tempfile.TemporaryDirectory() as place:
+        row, further = run(template, Path(place))
+    print(*row, flush=True)
+    rows = {old[0]: list(old) for old in tables["decks"].rows} if "decks" in tables else {}
+    rows[template] = row
+    tables |= {"decks": Table(columns, [rows[key] for key in DECKS if key in rows]), **further}
+    keep(name, Record(command, date.today().isoformat(), {"CalculiX": "2.20"}, tables))
 
 
 if __name__ == "__main__":

@@ -64,6 +64,7 @@ class DeckSettings:
     film: Elastic = TPE
     others: Mapping[str, Elastic] = field(default_factory=dict)
     is_free: bool = False
+    is_glued: bool = False
 
     def times(self) -> list[float]:
         """When results are written, in s, and the start."""
@@ -96,7 +97,11 @@ def deck_settings(
     films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
     film = films.pop("TPE", TPE)
     is_stack = any(interface.kind == "separator" for interface in laminate.interfaces)
-    return DeckSettings(pressures, procedure, film=film, others=films, is_free=not is_stack)
+    # A balloon has an outline that its tabs are no part of, and the paper's model has no tube.
+    is_glued = not is_stack and laminate.outline.is_empty
+    return DeckSettings(
+        pressures, procedure, film=film, others=films, is_free=not is_stack, is_glued=is_glued
+    )
 
 
 def _elastic(film: Film) -> Elastic:
@@ -139,6 +144,7 @@ def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
 
 BASE = "base"
 RING = "bond_001"
+INLET = "inlet_"
 FLAT = 1e-6
 
 
@@ -147,12 +153,12 @@ def is_lone_balloon(mesh: Mesh) -> bool:
     return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
 
 
-def supports(mesh: Mesh, is_free: bool = False) -> Iterator[str]:
+def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Iterator[str]:
     """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
     paper's model: a few nodes of the ring hold what a rigid body could do, and nothing else; so do
-    they where the deck ``is_free``.
+    they where the deck ``is_free``. Where it ``is_glued``, inlets are shut by their tubes.
     """
     is_free = is_free or is_lone_balloon(mesh)
     if is_free:
@@ -164,6 +170,32 @@ def supports(mesh: Mesh, is_free: bool = False) -> Iterator[str]:
         yield f"*NSET, NSET=held\n{BASE}\n*BOUNDARY\n{BASE}, 1, 3\n"
     for name in _planes(mesh):
         yield from _on_plane(mesh, name, is_free)
+    if is_glued:
+        yield from _glued_lips(mesh)
+
+
+def _glued_lips(mesh: Mesh) -> Iterator[str]:
+    """Both lips of a mouth move as one, as a tube is glued in between them.
+
+    The chamber is closed so: without, air that presses on a mouth that opens would push the films
+    off it.
+    """
+    bonds = [nodes for name, nodes in mesh.node_sets.items() if name.startswith("bond_")]
+    on_planes = {int(node) for name in _planes(mesh) for node in mesh.node_sets[name]}
+    for name, mouth in mesh.node_sets.items():
+        if not name.startswith(INLET):
+            continue
+        # A mouth's ends are bonded as they are; kept apart, they have a node between them.
+        lips: dict[tuple[float, float], list[int]] = {}
+        for node in np.setdiff1d(mouth, np.concatenate(bonds)).tolist():
+            x, y = np.round(mesh.points[node, :2], 6).tolist()
+            lips.setdefault((x, y), []).append(node)
+        for column in lips.values():
+            column.sort(key=lambda node: (mesh.points[node, 2], node))
+            for lower, upper in zip(column[::2], column[1::2], strict=False):
+                # A plane of symmetry holds its nodes across itself.
+                for axis in (3,) if lower in on_planes else (1, 2, 3):
+                    yield f"*EQUATION\n2\n{upper + 1}, {axis}, 1, {lower + 1}, {axis}, -1\n"
 
 
 def _planes(mesh: Mesh) -> list[str]:
@@ -272,7 +304,7 @@ def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
     yield f"*INCLUDE, INPUT={MESH_FILE}\n"
     yield from _cavity_faces(mesh)
     yield from _sections(mesh, settings)
-    yield from supports(mesh, settings.is_free)
+    yield from supports(mesh, settings.is_free, settings.is_glued)
     for name in settings.pressures:
         yield f"*AMPLITUDE, NAME=ramp_{name}\n"
         yield "".join(f"{time:.9g}, {settings.share(time):.9g}\n" for time in settings.times())
