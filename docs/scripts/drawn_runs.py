@@ -93,7 +93,6 @@ SLOW: Mapping[str, str] = {
     "diode": "the film between its channel and pocket has air on both sides",
     "folded": "its pocket wrinkles along seams and fold",
     "gripper": "its 27,000 nodes take 10 s an iteration",
-    "pouch": "films of 0.038 mm have no stiffness while flat",
     "truss": "its lower beam's edge wrinkles beside the inlet",
 }
 """Why a run takes so long: where ccx's largest residuals lie."""
@@ -207,7 +206,8 @@ def furthest_row(name: str, history: History | None, folder: Path) -> list[str]:
     shares = {} if history is None else kinetic_shares(name, history, folder)
     settled = [number for number, share in shares.items() if share < FLYING]
     if history is None or not settled:
-        flying = f"no result after {minutes:g} minutes: films still fly, as {SLOW[name]}"
+        flying = f"no result after {minutes:g} minutes: films still fly"
+        flying += f", as {SLOW[name]}" if name in SLOW else ""
         return [name, f"{pressure:g}", "", "", "", "", "", flying]
     last = settled[-1]
     _, reached, _, _, *figures = row_of(name, replace(history, states=history.states[: last + 1]))
