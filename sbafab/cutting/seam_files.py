@@ -89,6 +89,12 @@ def offset_text(offset: Point) -> str:
     return f"{offset[0]:.9g}, {offset[1]:.9g}"
 
 
+def shift_words(tool: str, offset: Point) -> str:
+    """Return that the files of a tool are shifted, and by how much."""
+    x, y = offset
+    return f"files of the {tool} are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm"
+
+
 def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]:
     """Return the chains of a seam's file and its custom properties.
 

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
+from sbafab.cutting.seam_files import shift_words
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Arc, Bounds, Edge, Point, box_round
 from sbafab.geometry.region import Region, coord, disc, union
@@ -349,12 +350,6 @@ SEAM_USE = (
 )
 
 
-def file_shift_words(tool: str, offset: Point) -> str:
-    """Return that the files of a tool are shifted, and by how much."""
-    x, y = offset
-    return f"the files of the {tool} are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm."
-
-
 def seams_pdf(
     laminate: Laminate, design_sha256: str, offsets: Mapping[str, Point] | None = None
 ) -> bytes | None:
@@ -417,7 +412,7 @@ def _seam_page(
         page.text((14, y), f"{words}{seam.below} and {seam.above}; begins at its circle", WORDS)
         y -= ROW
     for tool in shifted:
-        page.text((14, y), f"As made: {file_shift_words(tool, offsets[tool])}", WORDS)
+        page.text((14, y), f"As made: the {shift_words(tool, offsets[tool])}.", WORDS)
         y -= ROW
     lines = f"Blue: edges of {layers_in_words(layers)}. Black: the middle of the tool. Dashed: its"
     page.text((14, y), f"{lines} width.", WORDS)

@@ -107,7 +107,7 @@ def test_all_else_shows_the_seam_as_it_is_made(folders: tuple[Path, Path]) -> No
 def test_pages_say_that_files_are_shifted_and_prints_are_not(folders: tuple[Path, Path]) -> None:
     plain, beside = folders
     sentence = (
-        "The hot-tip's paths are shifted by -12.00, 3.50 mm: the tool is 12.00, -3.50 mm from"
+        "The files of the hot-tip are shifted by -12.00, 3.50 mm: the tool is 12.00, -3.50 mm from"
     )
     assert sentence in (beside / "traveller.html").read_text(encoding="utf-8").replace("&#39;", "'")
     assert "are shifted by" not in (plain / "traveller.html").read_text(encoding="utf-8")

@@ -93,6 +93,17 @@ def widened(number: int, parent: int, distance: float, kind: str = "BufferOperat
     )
 
 
+def turned(flip: bool, rotate: bool) -> list[str]:
+    """Return operations that move two layers up by one, turned over or round."""
+    flags = {"flip": str(flip).lower(), "rotate": str(rotate).lower()}
+    return [
+        drawn(1, 2, (11,)),
+        drawn(2, 4, (13,)),
+        combined(3, "union", [1, 2], []),
+        operation(4, "ShiftFlip3", shift=1, **flags, operation_links=links(parent=[3])),
+    ]
+
+
 def design(operations: list[str], sketches: dict[int, str], subdesigns: str = "{}") -> str:
     layers = ", ".join(
         f"{OBJECT}filetypes.material2.Material2 "
@@ -209,35 +220,11 @@ CASES: dict[str, tuple[list[str], tuple[shapely.Geometry, ...]]] = {
         (wide(wide(wide(FRAME, -1.0), 2.0), -1.0),) * 3,
     ),
     "flipped and moved up": (
-        [
-            drawn(1, 2, (11,)),
-            drawn(2, 4, (13,)),
-            combined(3, "union", [1, 2], []),
-            operation(
-                4,
-                "ShiftFlip3",
-                shift=1,
-                flip="true",
-                rotate="false",
-                operation_links=links(parent=[3]),
-            ),
-        ],
+        turned(flip=True, rotate=False),
         (NOTHING, FRAME, NOTHING),
     ),
     "turned round": (
-        [
-            drawn(1, 2, (11,)),
-            drawn(2, 4, (13,)),
-            combined(3, "union", [1, 2], []),
-            operation(
-                4,
-                "ShiftFlip3",
-                shift=1,
-                flip="false",
-                rotate="true",
-                operation_links=links(parent=[3]),
-            ),
-        ],
+        turned(flip=False, rotate=True),
         (FRAME, ROUND, NOTHING),
     ),
     "layers of one": (

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sbafab.cutting.seam_files import seam_path
+from sbafab.cutting.seam_files import seam_path, shift_words
 from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, chain_data, coord, path_data, union
 from sbafab.laminate.films import ink
@@ -106,7 +106,7 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
     if offset is not None:
         x, y = offset
         yield Action(
-            f"The {seam.tool}'s paths are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm: the tool is "
+            f"The {shift_words(seam.tool, offset)}: the tool is "
             f"{x:.2f}, {y:.2f} mm from its machine's head. Set that head, not the tool, on the "
             "cross of the file."
         )
