@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from sbafab.process import prepare
+
 # Workers share the processors already: more threads are slower, and may change the order of sums.
 # numpy reads these when it is first imported, here and in the processes that tests start.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
@@ -42,7 +44,8 @@ worker begins one when the others are done."""
 def pytest_collection() -> Iterator[None]:
     """Keep what is collected, which lives as long as the session, from the garbage collector.
 
-    Every full collection among the tests would walk through it again.
+    Every full collection among the tests would walk through it again. Then collections are as rare
+    as in a process that runs a command.
     """
     gc.disable()
     try:
@@ -51,6 +54,7 @@ def pytest_collection() -> Iterator[None]:
         gc.collect()
         gc.freeze()
         gc.enable()
+        prepare()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import re
 import textwrap
-from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -51,16 +51,22 @@ class Section(BaseModel):
         return schema
 
 
-def _descriptions(record: type[Section]) -> Iterator[tuple[str, str]]:
-    """The keys of a record, those that it inherits aside, and their docstrings."""
+@functools.cache
+def _descriptions(record: type[Section]) -> tuple[tuple[str, str], ...]:
+    """The keys of a record, those that it inherits aside, and their docstrings.
+
+    Python parses the whole module to find a class, and many records inherit the same.
+    """
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
     assert isinstance(body, ast.ClassDef)
+    descriptions = []
     for key, description in pairwise(body.body):
         if isinstance(key, ast.AnnAssign) and isinstance(key.target, ast.Name):
             match description:
                 case ast.Expr(value=ast.Constant(value=str(text))):
                     if key.target.id in record.model_fields:
-                        yield key.target.id, inspect.cleandoc(text)
+                        descriptions.append((key.target.id, inspect.cleandoc(text)))
+    return tuple(descriptions)
 
 
 def writable(value: object) -> object:
