@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from sbafab.models.stack_loads import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from typing import Any
 
     from numpy.typing import NDArray
@@ -88,8 +89,9 @@ class TipTarget(NamedTuple):
 
 
 class Way(NamedTuple):
-    """A way to solutions against an outer plate: it begins at an equilibrium (``is_posed``) or on
-    the arc of ``starts``; ``soft`` is the stiffness in mN/mm of the plate in the first solutions.
+    """A way to solutions against an outer plate: it begins at an equilibrium (``is_posed``), on the
+    arc that pressures of ``starts`` give or on the one that ends at the place (``is_aimed``);
+    ``soft`` is the stiffness in mN/mm of the plate in the first solutions.
 
     Against soft plates the top's load goes gradually from one point to the next as it rolls, and
     rates hardly jump.
@@ -97,6 +99,7 @@ class Way(NamedTuple):
 
     is_posed: bool
     soft: tuple[float, ...] = ()
+    is_aimed: bool = False
 
 
 POSED, ON_ARC = Way(True), Way(False)
@@ -104,6 +107,9 @@ STICKING = (ON_ARC, Way(False, (3e2, 3e3, 3e4)), POSED)
 """Ways against a plate that the tip sticks to, tried in turn."""
 SLIDING = (Way(False, (3e2, 3e3, 3e4)), Way(False, (1e3, 3e3, 1e4, 3e4, 1e5)), ON_ARC)
 """Ways against a plate without friction."""
+AIMED = tuple(Way(False, soft, is_aimed=True) for soft in ((3e2, 3e3, 3e4), (1e5,), ()))
+"""Ways that are tried after all others: where a stack folds below a plate it has several stable
+equilibria at the same pressures, and only a start near one leads to it."""
 
 
 class Linearisation(NamedTuple):
@@ -184,30 +190,32 @@ def _against_plate(
     """
     assert target.load is not None
     assert target.load.wall is not None
-    best = None
     begins, ways = plate_starts(guess, target.most), ways_to(target.load.wall)
-    for x in begins:
-        from_near = near if x is guess else None
-        for way in ways if from_near is None else (POSED, *ways):
-            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, way))
-            if best is not None and _is_met(target, best):
-                return best
-    if best is not None and _distance(target, best) < MET:
-        return best
-    for x in (guess, *begins[2:])[:DESCENT_STARTS]:
-        pose = _by_poses(target, x, arguments, near if x is guess else None)
-        best = _nearer(target, best, pose)
-        if best is not None and _is_met(target, best):
-            return best
+    by_ways = (
+        _by_contacts(target, x, near if x is guess else None, arguments, way)
+        for x in begins
+        for way in (ways if near is None or x is not guess else (POSED, *ways))
+    )
+    aimed = (_by_contacts(target, x, None, arguments, way) for x, way in product(begins[:2], AIMED))
+    descents = (
+        _by_poses(target, x, arguments, near if x is guess else None)
+        for x in (guess, *begins[2:])[:DESCENT_STARTS]
+    )
+    best = _nearest(target, None, by_ways)
+    if best is None or _distance(target, best) >= MET:
+        best = _nearest(target, best, aimed)
+    if best is None or _distance(target, best) >= MET:
+        best = _nearest(target, best, descents)
     if best is None or not MET <= _distance(target, best) < STRANDED:
         return best
     # The descents end where a contact opens or closes: from places about there.
-    for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
-        for from_near, way in ((best, POSED), (None, ways[0])):
-            best = _nearer(target, best, _by_contacts(target, x, from_near, arguments, way))
-            if best is not None and _is_met(target, best):
-                return best
-    return best
+    stranded = best
+    about = (
+        _by_contacts(target, x, from_near, arguments, way)
+        for x in _around(target, np.arcsinh(np.array(stranded.pressures) / P0))
+        for from_near, way in ((stranded, POSED), (None, ways[0]))
+    )
+    return _nearest(target, best, about)
 
 
 def _around(target: TipTarget, x: Array) -> Iterator[Array]:
@@ -217,6 +225,17 @@ def _around(target: TipTarget, x: Array) -> Iterator[Array]:
             yield np.clip(x + change, 0.0, target.most)
             if not size:
                 break
+
+
+def _nearest(target: TipTarget, best: Pose | None, poses: Iterable[Pose | None]) -> Pose | None:
+    """Return the pose nearest to the place of ``best`` and ``poses``, whose search ends where one
+    is met.
+    """
+    for pose in poses:
+        best = _nearer(target, best, pose)
+        if best is not None and _is_met(target, best):
+            break
+    return best
 
 
 def _nearer(target: TipTarget, first: Pose | None, second: Pose | None) -> Pose | None:
@@ -236,13 +255,28 @@ def starts(stack: PosedStack, places: Array, most: float) -> Array:
 
     An arc leaves the base at a right angle: constant curvature (Webster and Jones 2010).
     """
+    bend, length, ways = _arcs(places)
+    rises = (length - stack.flat_height)[:, None] - bend[:, None] * (ways @ stack.axes.T)
+    return np.asarray(np.interp(rises, *_column_rises(stack, most)))
+
+
+def _arcs(places: Array) -> tuple[Array, Array, Array]:
+    """Return bend in rad (n,), length in mm (n,) and direction (n, 2) of the arcs to places (n, 3)
+    that leave the base at a right angle.
+    """
     aside, up = np.hypot(*places[:, :2].T), places[:, 2]
     bend, length = 2 * np.arctan2(aside, up), np.hypot(aside, up)
     turns = bend > 1e-9
     length[turns] *= (bend[turns] / 2) / np.sin(bend[turns] / 2)
-    ways = places[:, :2] / np.maximum(aside, 1e-12)[:, None]
-    rises = (length - stack.flat_height)[:, None] - bend[:, None] * (ways @ stack.axes.T)
-    return np.asarray(np.interp(rises, *_column_rises(stack, most)))
+    return bend, length, places[:, :2] / np.maximum(aside, 1e-12)[:, None]
+
+
+def _arc_freedoms(target: TipTarget) -> Array:
+    """Return rise and tilt of each level (levels, 3) on the arc to the place, all alike."""
+    (bend,), (length,), (way,) = _arcs(target.place[None])
+    levels = len(target.stack.levels)
+    level = (length / levels - target.stack.pitch, -bend * way[1] / levels, bend * way[0] / levels)
+    return np.tile(level, (levels, 1))
 
 
 @lru_cache(maxsize=16)
@@ -438,6 +472,8 @@ def _by_contacts(
         if pose is None:
             return None
         at = pose.freedoms
+    elif way.is_aimed:
+        at = _arc_freedoms(target)
     else:
         at = target.stack.start_freedoms((P0 * np.sinh(x)).tolist())[target.stack.levels]
     for stiffness in way.soft:

@@ -41,13 +41,16 @@ def targets(stack: Stack, count: int, loads: dict[str, Any]) -> Iterator[Any]:
         yield stack.pose(drawn.tolist(), **loads).tip
 
 
-def missed(stack: Stack, count: int, loads: dict[str, Any]) -> int:
+def missed(stack: Stack, count: int, loads: dict[str, Any], every: int = 1) -> int:
     """Return how many targets are not met, by a pose of the stack at the pressures found; all
-    together they are met by the same poses.
+    together they are met by the same poses. Of ``every`` so many, one is also searched alone.
     """
     number, tips = 0, np.array(list(targets(stack, count, loads)))
     together = StackBatch(stack).reach(tips, MOST, **loads)
+    assert together.tips == pytest.approx(tips, abs=CLOSE)
     for place, target in enumerate(tips):
+        if place % every:
+            continue
         reached = stack.reach(target, most_pressure=MOST, **loads)
         assert together.pressures[place] == pytest.approx(reached.pressures, abs=1e-3)
         assert together.freedoms[place] == pytest.approx(reached.freedoms, abs=1e-5)
@@ -98,6 +101,19 @@ def test_a_target_behind_a_contact_that_closes_is_met(three: Stack, pressures: A
     assert np.linalg.norm(reached.tip - target.tip) < CLOSE
 
 
+@pytest.mark.parametrize("pressures", [(0.0, 9.8746, 10.0), (0.0, 9.8731, 9.9548)])
+def test_a_folded_stack_is_met_among_its_equilibria(three: Stack, pressures: Any) -> None:
+    """Two full chambers fold below a level plate to either side; at the same pressures the stack
+    also stands upright.
+    """
+    load = LOADS["level slippery plate"]
+    target = three.pose(pressures, **load)
+    assert target.force > 0.2
+    reached = three.reach(target.tip, most_pressure=MOST, **load)
+    assert np.linalg.norm(reached.tip - target.tip) < CLOSE
+    assert reached.stable
+
+
 def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
     """Where a point of the top meets the plate in the last step, and where all push hard."""
     load = LOADS["plate"]
@@ -113,7 +129,7 @@ def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("load", LOADS)
 def test_many_random_reachable_targets_are_met(three: Stack, load: str) -> None:
-    assert missed(three, 1000, LOADS[load]) == 0
+    assert missed(three, 1000, LOADS[load], every=5) == 0
 
 
 @pytest.mark.parametrize("count", [2, 4])
