@@ -63,7 +63,7 @@ MORE: list[tuple[str, tuple[str, ...], DxfProfile]] = [
 CASES = [*CLEAN, *(pytest.param(*case, marks=pytest.mark.long) for case in MORE)]
 
 
-@pytest.mark.parametrize(("template", "changes", "profile"), few(CASES, 6, names=3))
+@pytest.mark.parametrize(("template", "changes", "profile"), few(CASES, 5, names=3))
 def test_what_was_written_checks_as_designed(
     template: str,
     changes: tuple[str, ...],

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.quick import few
+
 if TYPE_CHECKING:
     from conftest import Ended, Output, Runs
 
@@ -35,11 +37,14 @@ def assert_refused(ended: Ended, *says: str) -> None:
 
 @pytest.mark.parametrize(
     "suffix",
-    [
-        *("001_TPE_base.dxf", "press.json", "press.csv", "solid.stl", "solid.3mf", "solid.glb"),
-        *("cavity_chamber1.stl", "layers.svg", "stack.svg", "solid.png", "checks.json"),
-        *("design.toml", "manifest.json"),
-    ],
+    few(
+        [
+            *("001_TPE_base.dxf", "press.json", "press.csv", "solid.stl", "solid.3mf", "solid.glb"),
+            *("cavity_chamber1.stl", "layers.svg", "stack.svg", "solid.png", "checks.json"),
+            *("design.toml", "manifest.json"),
+        ],
+        5,
+    ),
 )
 def test_a_full_disk_whatever_is_being_written(suffix: str, runs: Runs, output: Output) -> None:
     ended = runs.run(output.arguments("0.75"), output.folder, FULL.format(suffix=suffix))

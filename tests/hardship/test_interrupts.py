@@ -92,7 +92,7 @@ with ending.exit_plainly():
     watched = Watched()
     del watched
     import time
-    time.sleep(5)
+    time.sleep(0.2)
 """
 CONVERTED = """
 import os

@@ -25,7 +25,8 @@ from sbafab.studio.editing import edited
 from tests.quick import few
 from tests.studio.browsing import served
 
-PARALLEL = 200
+PARALLEL = 96
+"""Requests at once, more than a studio takes."""
 SMALL = edited(api.template("1dof-5mm"), [("stack.balloons", "1"), ("rules.yield_builds", "100")])
 SLOW = edited(
     api.template("3dof-15mm"),
