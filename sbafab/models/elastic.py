@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -304,32 +304,29 @@ def chamber_count(number: int) -> str:
 
 
 def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
-    model = calibrated(BEND, request.factors)
-    for pressure in request.pressures_kpa:
-        for chambers in range(1, stack.chambers):
-            name = f"bend at {pressure:g} kPa in {chamber_count(chambers)}, the others empty"
-            try:
-                pose = stack.pose(_pressures(stack, chambers, pressure))
-            except DesignError as error:
-                yield LeftOut(name, str(error)), None
-                continue
-            yield Figure("bending", name, pose.bend, "deg", model), pose
-            for figure in _clearances(name.replace("bend at ", "", 1), request, stack, pose):
-                yield figure, pose
-            aside = float(np.hypot(*pose.tip[:2]))
-            name = name.replace("bend", "lateral tip displacement", 1)
-            yield Figure("bending", name, aside, "mm", model), pose
+    model, bent = calibrated(BEND, request.factors), {}
+    for pressure, chambers in product(request.pressures_kpa, range(1, stack.chambers)):
+        where = f"{pressure:g} kPa in {chamber_count(chambers)}, the others empty"
+        try:
+            bent[where] = stack.pose(_pressures(stack, chambers, pressure))
+        except DesignError as error:
+            yield LeftOut(f"bend at {where}", str(error)), None
+    rooms = chamber_clearances(stack, tuple(bent.values()))
+    for (where, pose), room in zip(bent.items(), rooms.tolist(), strict=True):
+        yield Figure("bending", f"bend at {where}", pose.bend, "deg", model), pose
+        for figure in _clearances(where, request, rim_gap(stack, pose), room):
+            yield figure, pose
+        aside = float(np.hypot(*pose.tip[:2]))
+        yield Figure("bending", f"lateral tip displacement at {where}", aside, "mm", model), pose
 
 
 def _clearances(
-    where: str, request: PredictionRequest, stack: Stack, pose: Pose
+    where: str, request: PredictionRequest, rims: float, chambers: float
 ) -> Iterator[Figure]:
-    """Yield the clearances of a bent stack: between rims, and between chambers."""
+    """Yield the clearances of a bent stack in mm: between ``rims``, and between ``chambers``."""
     model = calibrated(CONTACT, request.factors)
-    room = rim_gap(stack, pose)
-    yield Figure("bending", f"room between rims on the inner side, {where}", room, "mm", model)
-    room = chamber_gap(stack, pose)
-    yield Figure("bending", f"clearance between chambers, {where}", room, "mm", model)
+    yield Figure("bending", f"room between rims on the inner side, {where}", rims, "mm", model)
+    yield Figure("bending", f"clearance between chambers, {where}", chambers, "mm", model)
 
 
 def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
@@ -531,33 +528,35 @@ def rim_gap(stack: Stack, pose: Pose) -> float:
     return max(float(gaps.min()), 0.0)
 
 
-def chamber_gap(stack: Stack, pose: Pose) -> float:
-    """Return the smallest clearance in mm between the films of balloons side by side.
+def chamber_clearances(stack: Stack, poses: Sequence[Pose]) -> Array:
+    """Return the smallest clearance in mm between the films of balloons side by side, by pose.
 
     Below 0 they would pass through each other. Both stand in the frame of their level, and those of
     other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError for
     a balloon without an equilibrium.
     """
-    widest = _radii(stack, pose)
-    nearest = []
+    widest = _radii(stack, poses)
+    nearest = np.full(len(poses), math.inf)
     for first, second in combinations(range(stack.chambers), 2):
         apart = float(np.hypot(*(stack.axes[first] - stack.axes[second])))
-        nearest.append(apart - float((widest[:, first] + widest[:, second]).max()))
-    thick = max(first.balloon.thickness for first in stack.maps)
-    return min(nearest) - thick
+        together = (widest[..., first] + widest[..., second]).max(-1)
+        nearest = np.minimum(nearest, apart - together)
+    return nearest - max(kind.balloon.thickness for kind in stack.maps)
 
 
-def _radii(stack: Stack, pose: Pose) -> Array:
-    """Return the largest radius of each balloon's middle surface: (levels, chambers)."""
-    radii = np.empty_like(pose.gaps)
-    pressures = np.broadcast_to(np.array(pose.pressures), pose.gaps.shape)
-    for kind, balloon in enumerate(stack.maps):
+def _radii(stack: Stack, poses: Sequence[Pose]) -> Array:
+    """Return the largest radius of each balloon's middle surface: (poses, levels, chambers)."""
+    gaps = np.array([pose.gaps for pose in poses])
+    radii = np.empty_like(gaps)
+    pressures = np.array([np.broadcast_to(pose.pressures, pose.gaps.shape) for pose in poses])
+    for kind, balloon in enumerate(stack.maps if poses else ()):
         rows = stack.levels == kind
-        states = np.stack([pressures[rows], np.maximum(pose.gaps[rows], LEAST_GAP).round(4)], -1)
+        heights = np.maximum(gaps[:, rows], LEAST_GAP).round(4)
+        states = np.stack([pressures[:, rows], heights], -1)
         unique, back = np.unique(states.reshape(-1, 2), axis=0, return_inverse=True)
         shapes = inflate(balloon.balloon, unique[:, 0], unique[:, 1], tied=True)
         within = shapes.r[:, balloon.balloon.neck_edge : balloon.balloon.edge + 1].max(-1)
-        radii[rows] = within[back].reshape(states.shape[:2])
+        radii[:, rows] = within[back].reshape(heights.shape)
     return radii
 
 
