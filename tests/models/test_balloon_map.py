@@ -56,7 +56,7 @@ PULLED = 1.3
 """The height to which balloons are pulled here, as a share of where they stand freely."""
 
 
-@pytest.fixture(scope="module", params=few(SIZES, 3))
+@pytest.fixture(scope="module", params=few(SIZES, 2))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

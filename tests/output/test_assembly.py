@@ -18,6 +18,7 @@ from sbafab.cutting.dxf_read import read_profile
 from sbafab.output.manifest import file_hashes
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Run, RunRequest, generate
+from tests.quick import few
 from tests.site.formats import hold
 
 SMALL = [f"parts.{name}.set.stack.balloons=2" for name in ("left", "right", "head")]
@@ -51,6 +52,7 @@ def test_a_folder_for_each_design_and_one_page_for_all(brace: Run) -> None:
     assert (brace.folder / "preview" / "assembled.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_a_design_used_three_times_is_drawn_once_and_cut_three_times(
     standing: Run,
 ) -> None:
@@ -129,6 +131,7 @@ def test_the_page_makes_every_design_and_joins_every_part(brace: Run) -> None:
     assert "3M 1587" in page
 
 
+@pytest.mark.long
 def test_three_copies_share_a_lamination(standing: Run) -> None:
     page = (standing.folder / "traveller.html").read_text(encoding="utf-8")
     assert "3dof-15mm, 3 copies: 1 lamination, all at once" in page
@@ -183,8 +186,9 @@ def test_lowered_limits_of_parts_and_checks_are_said(tmp_path: Path) -> None:
     assert any(said[1] in f.message for f in check_folder(run.folder) if f.verdict == "fail")
 
 
-def test_the_folder_is_found_as_it_was_built(standing: Run) -> None:
-    findings = check_folder(standing.folder)
+@pytest.mark.parametrize("name", few(("brace", "standing"), 1))
+def test_the_folder_is_found_as_it_was_built(name: str, request: pytest.FixtureRequest) -> None:
+    findings = check_folder(request.getfixturevalue(name).folder)
     assert [f.message for f in findings if f.verdict == "fail"] == []
     assert {"collision", "seat", "tube-match", "bond-width", "manifest-claims"} <= {
         f.rule for f in findings
