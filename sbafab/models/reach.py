@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from itertools import product
+from itertools import permutations, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ from sbafab.models.stack_loads import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
     from typing import Any
 
     from numpy.typing import NDArray
@@ -108,8 +108,8 @@ STICKING = (ON_ARC, Way(False, (3e2, 3e3, 3e4)), POSED)
 SLIDING = (Way(False, (3e2, 3e3, 3e4)), Way(False, (1e3, 3e3, 1e4, 3e4, 1e5)), ON_ARC)
 """Ways against a plate without friction."""
 AIMED = tuple(Way(False, soft, is_aimed=True) for soft in ((3e2, 3e3, 3e4), (1e5,), ()))
-"""Ways that are tried after all others: where a stack folds below a plate it has several stable
-equilibria at the same pressures, and only a start near one leads to it."""
+"""Ways that are tried after those from two starts: where a stack folds below a plate it has several
+stable equilibria at the same pressures, and only a start near one leads to it."""
 
 
 class Linearisation(NamedTuple):
@@ -191,40 +191,51 @@ def _against_plate(
     assert target.load is not None
     assert target.load.wall is not None
     begins, ways = plate_starts(guess, target.most), ways_to(target.load.wall)
-    by_ways = (
-        _by_contacts(target, x, near if x is guess else None, arguments, way)
-        for x in begins
-        for way in (ways if near is None or x is not guess else (POSED, *ways))
+    first, second, *others = begins
+
+    def by_contacts(tries: Iterable[tuple[Array, Way]]) -> Iterator[Pose | None]:
+        for x, way in tries:
+            yield _by_contacts(target, x, near if x is guess else None, arguments, way)
+
+    def about(best: Pose | None) -> Iterator[Pose | None]:
+        """Descents end where a contact opens or closes: poses from places about there."""
+        if best is not None and _distance(target, best) < STRANDED:
+            for x in _around(target, np.arcsinh(np.array(best.pressures) / P0)):
+                for from_near, way in ((best, POSED), (None, ways[0])):
+                    yield _by_contacts(target, x, from_near, arguments, way)
+
+    def descents(starts: Sequence[Array]) -> Iterator[Pose | None]:
+        for x in starts:
+            yield _by_poses(target, x, arguments, near if x is guess else None)
+
+    stages: tuple[Callable[[Pose | None], Iterable[Pose | None]], ...] = (
+        lambda _: by_contacts(product([first], ways if near is None else (POSED, *ways))),
+        lambda _: by_contacts(product([second], ways)),
+        lambda _: by_contacts(product([first, second], AIMED)),
+        lambda _: descents([first]),
+        about,
+        lambda _: by_contacts(product(others, ways)),
+        lambda _: descents(others[: DESCENT_STARTS - 1]),
+        about,
     )
-    aimed = (_by_contacts(target, x, None, arguments, way) for x, way in product(begins[:2], AIMED))
-    descents = (
-        _by_poses(target, x, arguments, near if x is guess else None)
-        for x in (guess, *begins[2:])[:DESCENT_STARTS]
-    )
-    best = _nearest(target, None, by_ways)
-    if best is None or _distance(target, best) >= MET:
-        best = _nearest(target, best, aimed)
-    if best is None or _distance(target, best) >= MET:
-        best = _nearest(target, best, descents)
-    if best is None or not MET <= _distance(target, best) < STRANDED:
-        return best
-    # The descents end where a contact opens or closes: from places about there.
-    stranded = best
-    about = (
-        _by_contacts(target, x, from_near, arguments, way)
-        for x in _around(target, np.arcsinh(np.array(stranded.pressures) / P0))
-        for from_near, way in ((stranded, POSED), (None, ways[0]))
-    )
-    return _nearest(target, best, about)
+    best = None
+    for stage in stages:
+        best = _nearest(target, best, stage(best))
+        if best is not None and _distance(target, best) < MET:
+            break
+    return best
 
 
 def _around(target: TipTarget, x: Array) -> Iterator[Array]:
-    """Yield places about one, a chamber's pressure changed in each."""
-    for size in (0.0, 0.05, 0.2, 0.6):
-        for change in size * np.concatenate([np.eye(len(x)), -np.eye(len(x))]):
-            yield np.clip(x + change, 0.0, target.most)
-            if not size:
-                break
+    """Yield places about one: itself, with a chamber's pressure changed, and with one raised as
+    another is lowered, as it is along the edge of a contact.
+    """
+    yield x
+    each = np.eye(len(x))
+    singles = [size * sign * one for size in (0.05, 0.2, 0.6) for sign in (1, -1) for one in each]
+    pairs = [0.15 * (first - second) for first, second in permutations(each, 2)]
+    for change in (*singles, *pairs):
+        yield np.clip(x + change, 0.0, target.most)
 
 
 def _nearest(target: TipTarget, best: Pose | None, poses: Iterable[Pose | None]) -> Pose | None:
