@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
     from sbafab.models.stack_loads import OuterPlate, PlateContact, Springs
 
-SOFT_PLATES = (1e3, 1e5)
-"""Stiffness in mN/mm of an outer plate in the first solutions."""
+SOFT_PLATES = ((1e3, 1e5), (1e3, 1e4, 1e5), (1e4, 1e5))
+"""Stiffness in mN/mm of an outer plate in the first solutions; ways, tried in turn."""
 MOST_STEPS = 300
 RESIDUAL = 1e-7
 """Residual in mN (or mN mm) that counts as none."""
@@ -128,17 +128,31 @@ def loaded_equilibrium(
 def _by_softer_plates(
     springs: Springs, pitch: float, load: Load, wall: OuterPlate, start: Array
 ) -> tuple[Array, float, bool] | None:
-    """Return the loaded equilibrium against a plate by way of softer plates."""
+    """Return the loaded equilibrium against a plate by way of softer plates; None where no way
+    leads to one.
+    """
+    for way in SOFT_PLATES:
+        at = _below_soft_plates(springs, pitch, load, start, way)
+        if at is not None:
+            balance = _contact_descent(springs, pitch, load, wall, at)
+            balance = balance or _energy_descent(springs, pitch, load, at, MOST_STEPS)
+            if balance is not None:
+                return balance
+    return None
+
+
+def _below_soft_plates(
+    springs: Springs, pitch: float, load: Load, start: Array, way: tuple[float, ...]
+) -> Array | None:
+    """Return freedoms near equilibrium against the last of ever stiffer plates, None of none."""
     at = start
-    for stiffness in SOFT_PLATES:
-        soft = _energy_descent(
-            springs, pitch, load._replace(stiffness=stiffness), at, MOST_STEPS, ROUGH_STEP
-        )
+    for stiffness in way:
+        softer = load._replace(stiffness=stiffness)
+        soft = _energy_descent(springs, pitch, softer, at, MOST_STEPS, ROUGH_STEP)
         if soft is None:
             return None
         at, _, _ = soft
-    balance = _contact_descent(springs, pitch, load, wall, at)
-    return balance or _energy_descent(springs, pitch, load, at, MOST_STEPS)
+    return at
 
 
 def _energy_descent(

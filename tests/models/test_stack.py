@@ -281,6 +281,27 @@ def test_wide_pockets_are_mapped_as_far_as_they_hold() -> None:
     assert wide.pose((1,)).gaps[0, 0] == pytest.approx(free.height[0], rel=0.03)
 
 
+@pytest.mark.parametrize(
+    "pressures",
+    [
+        (0.0, 4.611635825942266, 9.716094550133137),
+        (0.07981506407668437, 8.901665773081637, 3.9615232622065015),
+        (1.5280409290013814, 2.374658840610223, 9.791022967388143),
+    ],
+)
+def test_a_stack_that_slips_far_under_a_plate_has_a_pose(pressures: Any) -> None:
+    """Of 21,000 random ones these three were refused."""
+    stack = sbafab.stack("3dof-15mm")
+    plate = Plate((0.5, 0.0, 14.0), (0.1, 0.0, 1.0), sticks=False)
+    pose = stack.pose(pressures, plate=plate)
+    assert pose.stable
+    load = stack.load((0.0, 0.0, 0.0), False, plate)
+    assert load is not None
+    springs = stack.each(stack.springs(pressures))
+    now = loaded_energy(springs, stack.pitch, load, pose.freedoms)
+    assert np.abs(now.gradient).max() < 1e-3 * now.push
+
+
 def test_a_pushed_column_buckles_the_sooner_the_longer_and_the_freer_it_is() -> None:
     """Flat, none does; at 25 % six balloons do where the tip may slide, ten where it may not."""
     from sbafab.models.figures import Factors
