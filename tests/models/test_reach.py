@@ -114,6 +114,14 @@ def test_a_folded_stack_is_met_among_its_equilibria(three: Stack, pressures: Any
     assert reached.stable
 
 
+def test_a_place_along_the_edge_of_a_contact_is_met(three: Stack) -> None:
+    """There one chamber gives what another takes, and descents by one at a time end."""
+    load = LOADS["level slippery plate"]
+    target = three.pose((9.15068128, 6.05458329, 2.70451692), **load)
+    reached = three.reach(target.tip, most_pressure=MOST, **load)
+    assert np.linalg.norm(reached.tip - target.tip) < CLOSE
+
+
 def test_a_pose_reached_under_a_plate_is_in_equilibrium(three: Stack) -> None:
     """Where a point of the top meets the plate in the last step, and where all push hard."""
     load = LOADS["plate"]
