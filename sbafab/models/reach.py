@@ -108,8 +108,9 @@ STICKING = (ON_ARC, Way(False, (3e2, 3e3, 3e4)), POSED)
 SLIDING = (Way(False, (3e2, 3e3, 3e4)), Way(False, (1e3, 3e3, 1e4, 3e4, 1e5)), ON_ARC)
 """Ways against a plate without friction."""
 AIMED = tuple(Way(False, soft, is_aimed=True) for soft in ((3e2, 3e3, 3e4), (1e5,), ()))
-"""Ways that are tried after those from two starts: where a stack folds below a plate it has several
-stable equilibria at the same pressures, and only a start near one leads to it."""
+"""Ways after those from two starts: a stack that folds below a plate has several stable equilibria
+at the same pressures, and only a start near one leads to it.
+"""
 
 
 class Linearisation(NamedTuple):

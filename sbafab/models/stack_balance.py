@@ -144,7 +144,9 @@ def _by_softer_plates(
 def _below_soft_plates(
     springs: Springs, pitch: float, load: Load, start: Array, way: tuple[float, ...]
 ) -> Array | None:
-    """Return freedoms near equilibrium against the last of ever stiffer plates, None of none."""
+    """Return freedoms near equilibrium against the last of ever stiffer plates; None where one has
+    no equilibrium.
+    """
     at = start
     for stiffness in way:
         softer = load._replace(stiffness=stiffness)
