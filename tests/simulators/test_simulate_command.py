@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 from hashlib import sha256
 from pathlib import Path
 
@@ -55,6 +56,23 @@ def test_pressures_that_cannot_be(wish: SimulationRequest, words: str) -> None:
         chamber_pressures(CHAMBERS, wish, 6.0)
 
 
+@pytest.fixture
+def no_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine without any simulator."""
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.usefixtures("no_programs")
+def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
+    given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", name]
+    result = CliRunner().invoke(app, [*given, "-o", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "install" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -72,9 +90,19 @@ def test_pressures_that_cannot_be(wish: SimulationRequest, words: str) -> None:
         (["--with", "mujoco", "--export", "--seconds", "1"], "simulated time = 1 s"),
         (["--with", "calculix", "--minutes", "nan"], "must be a finite number"),
         (["--with", "ansys"], "calculix"),
+        (["--with", "calculix", "--pressure", "2000"], "pressure of chamber1 = 2000 kPa"),
+        (["--with", "calculix", "--symmetry", "sector"], "symmetry sector is not this laminate's"),
+        (["--with", "sofa", "--scene", "beam"], "scene beam needs three chambers or more"),
+        (["--with", "sofa", "--pressure", "0"], "0 kPa in every chamber"),
+        (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
+        (["--with", "mujoco", "--chamber", "left=3"], "names chamber left, which is not there"),
+        (["--with", "mujoco", "--seconds", "1"], "simulated time = 1 s"),
+        (["--with", "mujoco", "--h", "3"], "--h is for calculix"),
     ],
 )
+@pytest.mark.usefixtures("no_programs")
 def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
+    """Arguments are judged before programs are looked for: the one at fault is named anywhere."""
     result = CliRunner().invoke(app, ["simulate", "1dof-5mm", "-o", str(tmp_path), *options])
     assert result.exit_code == 2, result.output
     assert words in result.stderr

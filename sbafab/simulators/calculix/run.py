@@ -139,7 +139,6 @@ def simulate(
     ``timeout`` is in seconds. A run that diverges or takes too long keeps what it has reached.
     Raises OutputError where ccx is not installed or reaches nothing.
     """
-    find_ccx()
     progress("mesh", 0, 1)
     mesh = deck_mesh(laminate, mesh_settings)
     write_deck(mesh, settings, folder)

@@ -80,7 +80,6 @@ def simulate(
     be made of the laminate, OutputError where mujoco is missing or its run cannot be believed.
     """
     refuse_time(seconds, LEAST_TIME)
-    find_mujoco()
     write_model(laminate, folder, pressures, sectors)
     return run_model(folder, seconds, progress, limit)
 

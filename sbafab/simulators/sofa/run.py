@@ -111,9 +111,9 @@ def simulate(
     """
     name, dt = SCENES[job.scene]
     refuse_time(job.seconds, TIP_PERIOD)
-    program = find_program()
     if folder / name not in write_scenes(laminate, folder, pressures, job.volumes):
         raise DesignError(_no_such_scene(laminate, job.scene))
+    program = find_program()
     requested = job.volumes if job.scene == "volume" else pressures
     names = tuple(chamber.name for chamber in laminate.chambers)
     limit = limits(laminate, checked(names, requested, PRESSURE, "pressure", "kPa").values())
