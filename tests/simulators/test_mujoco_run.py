@@ -152,7 +152,6 @@ def test_without_mujoco_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(OutputError, match=r'pip install "sbafab\[mujoco\]"'):
         simulate(sbafab.build(*BALLOON), tmp_path)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_mujoco_that_stretches_too_much_is_refused(

@@ -141,6 +141,7 @@ def simulate(
     """
     progress("mesh", 0, 1)
     mesh = deck_mesh(laminate, mesh_settings)
+    find_ccx()
     write_deck(mesh, settings, folder)
     ending = run_ccx(folder, JOB, settings.ramp, timeout, progress)
     progress("results", 0, 1)
