@@ -1,4 +1,4 @@
-"""Starting programs that are stopped by signals, whoever started the tests.
+"""Starting programs that are stopped by signals or lack permissions, whoever started the tests.
 
 Under ``nohup`` and as a background job of a shell, SIGINT or SIGHUP is ignored, and every process
 started from there inherits that. A program that a test stops by a signal begins with ANSWERING.
@@ -18,6 +18,14 @@ for name in ("SIGTERM", "SIGHUP"):
         signal.signal(getattr(signal, name), signal.SIG_DFL)
 """
 """Python source that sets the usual answers to SIGINT, SIGTERM and SIGHUP."""
+WITHOUT_PRIVILEGES = """
+import ctypes, os
+if os.getuid() == 0:
+    none = (ctypes.c_uint32 * 6)()
+    refused = ctypes.CDLL(None).capset((ctypes.c_uint32 * 2)(0x20080522, 0), none)
+    assert not refused, "root keeps its capabilities, to which nothing is read-only"
+"""
+"""Root without capabilities owns its files and obeys their modes, as any user does."""
 NAMES = ("SIGINT", "SIGHUP")
 
 

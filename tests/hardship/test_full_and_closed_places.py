@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.hardship.starting import WITHOUT_PRIVILEGES
 from tests.quick import few
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ def hook(event, values):
         resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))
 sys.addaudithook(hook)
 """
-NOBODY = "import os\nif os.getuid() == 0:\n    os.setgid(65534); os.setuid(65534)\n"
-"""To root nothing is read-only."""
 
 
 def assert_refused(ended: Ended, *says: str) -> None:
@@ -74,18 +73,15 @@ def test_a_small_full_file_system(kilobytes: int, runs: Runs, output: Output) ->
 
 
 def test_a_read_only_parent(runs: Runs, output: Output) -> None:
-    output.run_folder.chmod(0o777)
     output.folder.chmod(0o555)
-    ended = runs.run(output.arguments("0.75"), output.folder, NOBODY)
+    ended = runs.run(output.arguments("0.75"), output.folder, WITHOUT_PRIVILEGES)
     assert_refused(ended, "cannot be written", "ermission denied")
     assert output.held() == "0.8"
 
 
 def test_a_read_only_output(runs: Runs, output: Output) -> None:
-    for path in (output.folder, output.folder / ".1dof-5mm.lock"):
-        path.chmod(0o777)
     output.run_folder.chmod(0o555)
-    ended = runs.run(output.arguments("0.75"), output.folder, NOBODY)
+    ended = runs.run(output.arguments("0.75"), output.folder, WITHOUT_PRIVILEGES)
     assert_refused(ended, "is read-only; choose another folder")
     assert output.held() == "0.8"
     assert output.leftovers() == set()

@@ -14,6 +14,7 @@ from sbafab.errors import GeometryError, SbafabError
 from sbafab.geometry.edges import Line
 from sbafab.geometry.region import wound
 from sbafab.output import checked
+from tests.hardship.starting import WITHOUT_PRIVILEGES
 
 pytestmark = pytest.mark.long
 
@@ -98,8 +99,7 @@ def test_hard_design_files(name: str, runs: Runs, output: Output) -> None:
     make, says = FILES[name]
     path = output.folder.parent / "1dof-5mm.toml"
     make(path)
-    nobody = "import os\nif os.getuid() == 0: os.setuid(65534)\n"
-    before = SMALL + (nobody if name == "unreadable" else "")
+    before = SMALL + (WITHOUT_PRIVILEGES if name == "unreadable" else "")
     ended = runs.run(["generate", str(path), "-o", str(output.folder)], output.folder, before)
     assert_refused(ended, says)
     assert output.held() == "0.8"

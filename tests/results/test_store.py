@@ -10,7 +10,6 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -18,6 +17,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.results.records import Build, LabResult, checked
 from sbafab.results.report import standing
 from sbafab.results.store import Lab
+from tests.hardship.starting import WITHOUT_PRIVILEGES
 
 Make = Callable[..., Build]
 SHA = "c0ffee" + 58 * "0"
@@ -296,14 +296,12 @@ def test_a_locked_file_is_one_sentence_and_readers_need_not_wait(
         assert len(lab.contents()[0]) == 1
 
 
-READ_ONLY = """
-import os, sys
+READ_ONLY = f"""{WITHOUT_PRIVILEGES}
+import sys
 from pathlib import Path
 from sbafab.errors import OutputError
 from sbafab.results.records import LabResult
 from sbafab.results.store import Lab
-if os.getuid() == 0:
-    os.setgid(65534); os.setuid(65534)
 lab = Lab(Path(sys.argv[1]))
 print(len(lab.contents()[0]))
 for path in (lab.path, lab.path.parent / "new.sqlite"):
@@ -314,18 +312,15 @@ for path in (lab.path, lab.path.parent / "new.sqlite"):
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "setuid"), reason="takes users with rights of their own")
-def test_a_file_that_may_only_be_read_still_reports(make_build: Make) -> None:
-    # Not in pytest's folder, which no other user may enter; to root nothing is read-only.
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        lab = Lab(folder / "lab.sqlite")
-        lab.add(SHA, make_build(), [LabResult("A1", "pass")])
-        lab.path.chmod(0o444)
-        folder.chmod(0o555)
-        arguments = [sys.executable, "-c", READ_ONLY, str(lab.path), SHA]
-        ran = subprocess.run(arguments, capture_output=True, text=True, check=True)
-        folder.chmod(0o700)
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no modes on this system")
+def test_a_file_that_may_only_be_read_still_reports(make_build: Make, tmp_path: Path) -> None:
+    lab = Lab(tmp_path / "lab.sqlite")
+    lab.add(SHA, make_build(), [LabResult("A1", "pass")])
+    lab.path.chmod(0o444)
+    tmp_path.chmod(0o555)
+    arguments = [sys.executable, "-c", READ_ONLY, str(lab.path), SHA]
+    ran = subprocess.run(arguments, capture_output=True, text=True, check=True)
+    tmp_path.chmod(0o700)
     count, old, new = ran.stdout.splitlines()
     assert count == "1"
     assert "may only be read; nothing was recorded" in old
