@@ -69,6 +69,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: item.path.parent.name not in SLOW_ROOMS)
 
 
+SKIPPED = "SBAFAB_SKIPPED"
+"""Variable with the path of a file to write, a line a test that was skipped: ``.ci/run`` runs these
+again where the programs are that they lacked."""
 READERS = ("klayout", "meerk40t", "pyogrio")
 """Packages of the extra ``interop`` without which ``tests/interop`` is not collected."""
 INSTALL = 'python -m pip install -e ".[dev,interop]"'
@@ -85,9 +88,13 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name what was skipped, and for want of what, at the end."""
     if hasattr(terminalreporter.config, "workerinput"):
         return
+    skipped = terminalreporter.stats.get("skipped", [])
+    if SKIPPED in os.environ:
+        names = sorted({report.nodeid for report in skipped})
+        Path(os.environ[SKIPPED]).write_text("".join(f"{name}\n" for name in names))
     reasons = Counter(
         report.longrepr[2].removeprefix("Skipped: ") if isinstance(report.longrepr, tuple) else ""
-        for report in terminalreporter.stats.get("skipped", [])
+        for report in skipped
     )
     missing = _missing_readers()
     if missing:
