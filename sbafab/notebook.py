@@ -1,9 +1,15 @@
-"""HTML tables for notebooks."""
+"""Tables for notebooks: in HTML, and of pandas."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import TYPE_CHECKING, Any
+
+from sbafab.errors import DesignError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def table_html(head: Sequence[str], rows: Iterable[Sequence[object]], caption: str = "") -> str:
@@ -20,3 +26,15 @@ def _cell(value: object) -> str:
     if isinstance(value, float):
         return f'<td style="text-align:right">{value:.4g}</td>'
     return f'<td style="text-align:left">{escape(str(value))}</td>'
+
+
+def data_frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
+    """Return rows as a pandas DataFrame. Raises DesignError without pandas."""
+    try:
+        from pandas import DataFrame
+    except ImportError:
+        raise DesignError(
+            "frame() needs pandas, which is not installed; install it with pip install pandas, or "
+            "use .rows, a list of dicts"
+        ) from None
+    return DataFrame(rows)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, get_args
 
+from sbafab.errors import DesignError
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point, box_round
 from sbafab.geometry.region import Region, coord, divided, path_data, union
@@ -353,7 +354,9 @@ class Laminate:
         return box_round([layers[0].profile.bounds for layers in self.patterns.values()])
 
     def layer(self, index: int) -> Layer:
-        """The layer with this index, counted from 1 at the bottom."""
+        """Return the layer with this index, counted from 1 at the bottom. Raises DesignError."""
+        if not 1 <= index <= len(self.layers):
+            raise DesignError(f"there is no layer {index}; give 1 to {len(self.layers)}")
         return self.layers[index - 1]
 
     def first_cut(self, layer: Layer) -> Region:

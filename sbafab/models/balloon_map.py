@@ -194,12 +194,7 @@ class BalloonMap:
         """
         below = np.asarray(pressure, dtype=float)
         p = np.maximum(below, 0.0) if sucked else below
-        if not (p.min() >= 0 and p.max() <= self.most_pressure):
-            worst = p.max() if p.min() >= 0 else p.min()
-            raise DesignError(
-                f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
-                f"{self.most_pressure:g} kPa"
-            )
+        refuse_outside(p, self.most_pressure)
         x, rate = self.scaled(p)
         first = x.astype(np.int_)
         powers = np.empty((*p.shape, 2, DEGREE + 1))
@@ -283,6 +278,20 @@ class BalloonMap:
         x = np.linspace(0, math.asinh(self.most_pressure / self.scale_pressure), RISE_POINTS)
         pressures = np.minimum(self.scale_pressure * np.sinh(x), self.most_pressure)
         return x, self.free_height(pressures)
+
+
+def refuse_outside(pressures: Array, most_pressure: float) -> None:
+    """Raise DesignError for pressures in kPa below 0 or above the most, which itself is inside.
+
+    It stays inside where asinh and sinh, or a film's modulus, round it up.
+    """
+    if pressures.min() >= 0 and pressures.max() <= most_pressure * (1 + 1e-12):
+        return
+    worst = pressures.max() if pressures.min() >= 0 else pressures.min()
+    raise DesignError(
+        f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
+        f"{most_pressure:g} kPa"
+    )
 
 
 @lru_cache(maxsize=64)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from sbafab.errors import DesignError
 from sbafab.models import paper, printed
 from sbafab.models.paper import EQ_4, Counterpart, is_calibrated
-from sbafab.notebook import table_html
+from sbafab.notebook import data_frame, table_html
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -171,7 +171,7 @@ class Relation:
         """Return ``rows`` as a pandas DataFrame whose ``attrs`` hold the title and the labels of
         the axes. Raises DesignError without pandas.
         """
-        frame = _frame(self.rows)
+        frame = data_frame(self.rows)
         frame.attrs.update(title=self.title, x=self.x_label, y=self.y_label)
         return frame
 
@@ -311,7 +311,7 @@ class Prediction:
 
     def frame(self) -> DataFrame:
         """Return ``rows`` as a pandas DataFrame. Raises DesignError without pandas."""
-        return _frame(self.rows)
+        return data_frame(self.rows)
 
     def __repr__(self) -> str:
         omitted = f", {len(self.left_out)} left out" if self.left_out else ""
@@ -369,17 +369,6 @@ def _unknown(kind: str, name: str, names: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, list(dict.fromkeys(names)), 3)
     hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
     return f"no {kind} is named {name!r}{hint}"
-
-
-def _frame(rows: Sequence[dict[str, Any]]) -> DataFrame:
-    try:
-        from pandas import DataFrame
-    except ImportError:
-        raise DesignError(
-            "frame() needs pandas, which is not installed; install it with pip install pandas, or "
-            "use .rows, a list of dicts"
-        ) from None
-    return DataFrame(rows)
 
 
 def _rounded(value: float) -> float:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.models.balloon_map import refuse_outside
 from sbafab.models.batch_balance import Levels, LevelsAt, descended, step_share
 from sbafab.models.batch_loads import STRAIGHT, chain_of, solved
 from sbafab.models.batch_reach import BatchReach
@@ -105,13 +106,8 @@ class StackBatch:
         pressures. Raises DesignError as ``Stack.pose`` does, for the first state that has no pose.
         """
         asked = self.table(pressures)
-        most = self.stack.most_pressure
-        if asked.size and not (asked.min() >= 0 and asked.max() <= most):
-            worst = asked.max() if asked.min() >= 0 else asked.min()
-            raise DesignError(
-                f"a pressure of {float(worst):g} kPa is outside the balloon's map; give 0 to "
-                f"{self.stack.most_pressure:g} kPa"
-            )
+        if asked.size:
+            refuse_outside(asked, self.stack.most_pressure)
         if near is not None and len(near.freedoms) != len(asked):
             raise DesignError(
                 f"near has {len(near.freedoms)} poses for {len(asked)} states; give one a state"

@@ -304,8 +304,8 @@ class PosedStack:
 
     @cached_property
     def most_pressure(self) -> float:
-        """Highest pressure of all maps, kPa."""
-        return min(kind.most_pressure for kind in self.maps)
+        """Highest pressure of all maps in kPa, without the noise of scaling by the modulus."""
+        return round(min(kind.most_pressure for kind in self.maps), 9)
 
     @cached_property
     def _top(self) -> Array:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from sbafab.notebook import table_html
+from sbafab.notebook import data_frame, table_html
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Verdict = Literal["pass", "fail", "waived", "warn"]
 
@@ -107,18 +110,26 @@ def _gravity(finding: Finding) -> int:
 
 
 class Findings(tuple[Finding, ...]):
-    """Findings of the deck in its order: a tuple that displays as a table."""
+    """Findings of the deck in its order: a tuple that displays as a table, and is true if ok."""
 
     __slots__ = ()
 
     @property
+    def ok(self) -> bool:
+        """True if no rule failed that the design does not waive: it may be cut."""
+        return not self.failed
+
+    def __bool__(self) -> bool:
+        return self.ok
+
+    @property
     def failed(self) -> tuple[Finding, ...]:
-        """Failures that are not waived; without any the design may be cut."""
+        """Failures that are not waived."""
         return tuple(finding for finding in self if finding.verdict == "fail")
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """A flat row a finding, for example for ``pandas.DataFrame(findings.rows)``."""
+        """A flat row a finding."""
         return [
             {
                 "rule": f.rule,
@@ -134,6 +145,10 @@ class Findings(tuple[Finding, ...]):
             }
             for f in self
         ]
+
+    def frame(self) -> DataFrame:
+        """Return ``rows`` as a pandas DataFrame. Raises DesignError without pandas."""
+        return data_frame(self.rows)
 
     def __repr__(self) -> str:
         return f"Findings({counted(self)})"

@@ -131,9 +131,9 @@ class Run:
         return self.plan.designs[0].conforming if self.plan is not None else None
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def findings(self) -> Findings:
         """The findings of the rules; of several designs, each with its design's name."""
-        return self.job.findings
+        return Findings(self.job.findings)
 
     @property
     def failed(self) -> bool:
@@ -147,7 +147,7 @@ class Run:
         files = [(str(self.folder / name),) for name in self.manifest.get("files", ())]
         table = table_html(("files written",), files)
         pictures = "".join(checked.laminate._repr_html_() for checked in self.checked)
-        return pictures + Findings(self.findings)._repr_html_() + table
+        return pictures + self.findings._repr_html_() + table
 
 
 def generate(request: RunRequest, progress: Progress | None = None) -> Run:

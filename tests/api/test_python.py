@@ -6,9 +6,10 @@ import json
 import math
 import warnings
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
-import pandas as pd
+import numpy as np
 import pytest
 import shapely
 
@@ -27,6 +28,18 @@ def test_texts_dicts_and_keywords_say_the_same() -> None:
     by_name = sbafab.load("1dof-5mm", stack={"balloons": 3}, chamber={"diameter": (5, 6, 7)})
     assert by_text == by_dict == by_name
     assert by_text.with_("stack.balloons=3") == by_text
+
+
+@pytest.mark.parametrize("number", [np.int64, np.uint8, np.float32, np.float64])
+def test_numbers_of_numpy_are_numbers(number: type[np.number[Any]]) -> None:
+    plain = sbafab.load("1dof-5mm", {"stack.balloons": 3, "chamber.diameter": [5, 6, 7]})
+    few = sbafab.load("1dof-5mm", {"stack.balloons": np.int64(3)})
+    sizes = {"chamber.diameter": np.array([5, 6, 7], number)}
+    assert few.with_(sizes) == few.with_(chamber={"diameter": [number(d) for d in (5, 6, 7)]})
+    assert few.with_(sizes) == plain
+    assert sbafab.resolved(few.with_(sizes)) == sbafab.resolved(plain)
+    with pytest.raises(DesignError, match=r"stack.balloons = 2.5 must be a whole number"):
+        few.with_({"stack.balloons": np.float64(2.5)})
 
 
 def test_with_keeps_the_rest_and_checks_like_a_design_file() -> None:
@@ -103,13 +116,16 @@ def test_a_volume_mesh_is_a_grid_of_pyvista(tmp_path: Path) -> None:
 
 def test_findings_and_figures_are_rows() -> None:
     findings = sbafab.check("1dof-5mm", SMALL)
-    table = pd.DataFrame(findings.rows)
+    table = findings.frame()
     assert list(table["rule"]) == [finding.rule for finding in findings]
     assert table.set_index("rule").loc["bond-width", "measured"] == 0.75
-    assert findings.failed == ()
+    assert (findings.failed, findings.ok, bool(findings)) == ((), True, True)
     bad = sbafab.check("1dof-5mm", SMALL, bond={"width": 0.7})
     assert "bond-width" in {finding.rule for finding in bad.failed}
-    figures = pd.DataFrame(sbafab.predict("1dof-5mm").rows)
+    assert (bad.ok, bool(bad)) == (False, False)
+    waived = sbafab.check("1dof-5mm", SMALL, bond={"width": 0.7}, rules={"waive": ["bond-width"]})
+    assert waived.failed == tuple(f for f in bad.failed if f.rule != "bond-width")
+    figures = sbafab.predict("1dof-5mm").frame()
     assert {"name", "value", "unit", "model"} <= set(figures.columns)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.laminate import LOOSE, Laminate, Pin, interface_regions
 
@@ -17,6 +18,14 @@ AXIS = (0.0, 0.0)
 @pytest.fixture(scope="module")
 def laminate() -> Laminate:
     return build(load_design("1dof-5mm", ["stack.balloons=3"]))
+
+
+def test_layers_are_counted_from_1_and_no_further_than_the_last(laminate: Laminate) -> None:
+    count = len(laminate.layers)
+    assert [laminate.layer(index).index for index in (1, count)] == [1, count]
+    for index in (0, -1, count + 1):
+        with pytest.raises(DesignError, match=f"no layer {index}; give 1 to {count}"):
+            laminate.layer(index)
 
 
 def annulus(outer: float, inner: float) -> float:

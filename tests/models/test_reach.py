@@ -168,6 +168,21 @@ def test_a_place_too_high_is_refused_with_the_highest_one(three: Stack) -> None:
     assert "cannot reach (0, 0, 60) mm with 0 to 10 kPa" in str(refused.value)
 
 
+@pytest.mark.parametrize("most", [110.0, 37.3, 90.1])
+def test_the_end_of_the_range_is_inside_it(most: float) -> None:
+    """Asinh and sinh, or the calibration's modulus, round these by a digit up or down."""
+    stack = sbafab.stack("3dof-15mm", most_pressure=most)
+    assert stack.most_pressure == most
+    full = stack.pose((most,) * 3)
+    assert StackBatch(stack).poses([(most,) * 3]).tips == pytest.approx(full.tip[None], abs=CLOSE)
+    assert stack.reach(full.tip).pressures == pytest.approx((most,) * 3, rel=1e-3)
+    for reach in (stack.reach, lambda place: StackBatch(stack).reach([place])):
+        with pytest.raises(UnreachableError, match=f"with 0 to {most:g} kPa; the nearest place"):
+            reach((50, 0, 12))
+    with pytest.raises(DesignError, match=f"give 0 to {most:g} kPa"):
+        stack.pose((most + 1e-6, 0, 0))
+
+
 def test_one_chamber_reaches_places_on_its_axis_alone() -> None:
     """The nearest place to one beside the axis is its foot on the axis."""
     one = sbafab.stack("1dof-5mm")
