@@ -172,19 +172,22 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
     A component is a port by its id on every layer, with the layer's name where it is on several.
     Connections join the components at their ends, on their layer; a VIA joins its layers. What lies
-    on no such layer is not joined there.
+    on no such layer is not joined there. A component without a size, such as a NODE where channels
+    meet, joins them and is no port itself.
     """
     labels = dict(parchmint_labels(document))
+    titles, components = _titles(document), document.get("components", ())
+    spots_of = [_spots(row, titles) for row in components]
+    known = {spot for spots in spots_of for spot in spots}
     near: dict[Spot, Spot] = {}
-    for row in document.get("components", ()):
+    for row, spots in zip(components, spots_of, strict=True):
         if str(row.get("entity", "")).upper() == VIA:
-            _join(near, [spot for layer in row["layers"] if (spot := (layer, row["id"])) in labels])
+            _join(near, spots)
     for row in document["connections"]:
-        ends = [row["source"], *row["sinks"]]
-        spots = [(row.get("layer", ""), end["component"]) for end in ends]
-        for spot in spots if not document.get("components") else ():
+        spots = [(row.get("layer", ""), end["component"]) for end in (row["source"], *row["sinks"])]
+        for spot in spots if not components else ():
             labels.setdefault(spot, _free_name(spot[1], labels.values()))
-        _join(near, [spot for spot in spots if spot in labels])
+        _join(near, [spot for spot in spots if spot in known or not components])
     groups: dict[Spot, list[str]] = {}
     for spot, label in labels.items():
         groups.setdefault(_root(near, spot), []).append(label)
@@ -192,19 +195,28 @@ def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def parchmint_labels(document: Mapping[str, Any]) -> dict[Spot, str]:
-    """Return the name of the port that every component is on each of its layers."""
-    titles = {
-        row["id"]: row.get("name") or row["id"]
-        for row in document.get("layers", ())
-        if str(row.get("type", "")).upper() != NO_MASK
-    }
+    """Return the name of the port that every component with a size is on each of its layers."""
+    titles = _titles(document)
     labels: dict[Spot, str] = {}
     for row in document.get("components", ()):
-        spots = [(layer, row["id"]) for layer in row["layers"] if layer in titles]
+        spots = _spots(row, titles)
         for spot in spots if row.get("x-span", 1) or row.get("y-span", 1) else ():
             text = f"{row['id']}-{titles[spot[0]]}" if len(spots) > 1 else row["id"]
             labels[spot] = _free_name(text, labels.values())
     return labels
+
+
+def _titles(document: Mapping[str, Any]) -> dict[str, str]:
+    """The names of the layers with channels, by id."""
+    return {
+        row["id"]: row.get("name") or row["id"]
+        for row in document.get("layers", ())
+        if str(row.get("type", "")).upper() != NO_MASK
+    }
+
+
+def _spots(component: Mapping[str, Any], titles: Mapping[str, str]) -> list[Spot]:
+    return [(layer, component["id"]) for layer in component["layers"] if layer in titles]
 
 
 Spot = tuple[str, str]

@@ -183,6 +183,37 @@ def test_a_channel_that_ends_before_its_component_is_an_open(tmp_path: Path) -> 
     assert {fault.kind for fault in connectivity(laminate, Limits()).faults} >= {"open"}
 
 
+@pytest.mark.parametrize("scale", [0.5, 1, 2])
+@pytest.mark.parametrize("gap", [0, 4000])
+def test_a_node_without_a_size_joins_its_channels(gap: int, scale: float, tmp_path: Path) -> None:
+    """Three channels meet in two nodes; the last may begin a gap away from its node."""
+    ends = {"in": (0, 0), "up": (10000, -9000), "out": (30000, 0)}
+    corners = {name: [round((v - 1500) * scale) for v in p] for name, p in ends.items()}
+    ports = [component(n, "PORT", corners[n], round(3000 * scale), "f") for n in ends]
+    nodes = [
+        component(name, "NODE", [round(x * scale), 0], 0, "f")
+        for name, x in (("j", 10000), ("k", 18000))
+    ]
+    routes: dict[str, tuple[list[str], list[list[float]]]] = {
+        "a": (["in", "j"], [[0, 0], [10000, 0]]),
+        "b": (["up", "j"], [[10000, -9000], [10000, 0]]),
+        "c": (["j", "k"], [[10000, 0], [18000, 0]]),
+        "d": (["k", "out"], [[18000 + gap, 0], [30000, 0]]),
+    }
+    document = circuit() | {
+        "layers": [{"id": "f", "name": "flow", "type": "FLOW", "group": "0"}],
+        "components": [*ports, *nodes],
+        "connections": [
+            channel(name, "f", joined, [[round(v * scale) for v in p] for p in points])
+            for name, (joined, points) in routes.items()
+        ],
+    }
+    laminate = written(document, tmp_path).laminate
+    assert [set(net.ports) for net in laminate.nets] == [{"in", "up", "out"}]
+    kinds = [fault.kind for fault in connectivity(laminate, Limits()).faults]
+    assert [kind for kind in kinds if kind != "dead-end"] == (["open"] if gap else [])
+
+
 def test_a_single_point_that_two_channels_share_is_named_in_the_file(
     importing: Importing, tmp_path: Path
 ) -> None:
