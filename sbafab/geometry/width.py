@@ -511,11 +511,11 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
         into, out = corners[i], corners[(i + 1) % len(runs)]
         # A round end that turns further is wider than between its flanks.
         if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
-            yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp - ROUNDED))
+            yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp) - ROUNDED)
         start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
         stop = i + 1 if abs(out) < SMOOTH and after.is_fillet(run) else i
         if (start < i or into > SMOOTH) and (stop > i or out > SMOOTH):
-            yield from _between_flanks(runs, corners, start, stop, TAPER)
+            yield from _between_flanks(runs, corners, start, stop, TAPER - ROUNDED)
 
 
 def _between_flanks(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from sbafab.errors import GeometryError
 from sbafab.geometry.offset import beam_path, widths
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import Width, least_gap, least_width, place_of
+from sbafab.geometry.width import TAPER, Width, least_gap, least_width, place_of
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at, holds
@@ -18,8 +18,8 @@ from sbafab.rules.rule import Explanation, Rule
 
 NAME = "film-limits"
 
-SHARP = 15.0
-"""Degrees: a point sharper than this is a sliver; blunter ones are cut as drawn."""
+SHARP = TAPER
+"""Degrees: between flanks at less a point is finer than any bottom; blunter ones are corners."""
 
 ROUNDING = 1e-6
 """mm: more than what widths are rounded by."""
@@ -49,7 +49,8 @@ def check(measures: Measures) -> list[Finding]:
         f"({layer.name}), {at(width.middle)}"
     )
     if not good:
-        message += f"; the laser needs {limit:g}: widen it or leave it out"
+        remedy = "widen it" if width.value else "end it blunt and as wide as that"
+        message += f"; the laser needs {limit:g}: {remedy}, or leave it out"
     place = Place(None, (layer.index,), *width.middle)
     return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
 

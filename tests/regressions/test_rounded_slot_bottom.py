@@ -1,4 +1,4 @@
-"""A slot that tapers to a rounded bottom is as narrow as its flanks are where the bottom begins."""
+"""A slot is as narrow as its flanks are where its bottom begins: round, flat or a point."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from sbafab.geometry.edges import Point, unit
 from sbafab.geometry.offset import fillet
 from sbafab.geometry.region import Region, disc, polygon, rectangle
 from sbafab.geometry.width import least_gap, least_width
+from sbafab.rules.film_limits import SHARP
 
-SHARP = 15.0
-"""Degrees, as film-limits has it."""
 PLATE = rectangle((-3.0, -4.0), (5.0, 4.0))
 
 
@@ -31,18 +30,35 @@ def wedge(radius: float, taper: float) -> Region:
 def trough(bottom: float, taper: float) -> Region:
     """A slot that opens to the right by ``taper`` degrees from a flat bottom at x = 0."""
     half = bottom / 2 + 9.0 * math.tan(math.radians(taper / 2))
-    return polygon([(0.0, -bottom / 2), (9.0, -half), (9.0, half), (0.0, bottom / 2)])
+    foot = [(0.0, bottom / 2), (0.0, -bottom / 2)] if bottom else [(0.0, 0.0)]
+    return polygon([*foot, (9.0, -half), (9.0, half)])
 
 
-@pytest.mark.parametrize("taper", [2.0, 10.0, 14.5])
+@pytest.mark.parametrize("turn", [0.0, 37.0])
+@pytest.mark.parametrize("taper", [4.0, 14.0, 16.0, 22.0, 29.5, 30.5, 45.0, 90.0])
+def test_a_point_is_narrower_than_any_flat_bottom_between_the_same_flanks(
+    taper: float, turn: float
+) -> None:
+    pointed, flat = (
+        least_gap((PLATE - trough(bottom, taper)).turned(turn), SHARP) for bottom in (0.0, 0.139)
+    )
+    if taper > SHARP:
+        assert (pointed, flat) == (None, None)
+    else:
+        assert pointed is not None
+        assert flat is not None
+        assert (pointed.value, flat.value) == (0.0, pytest.approx(0.139, abs=1e-6))
+
+
+@pytest.mark.parametrize("taper", [2.0, 10.0, 24.5])
 def test_a_round_bottom_is_as_wide_as_between_its_tangent_points(taper: float) -> None:
     gap = least_gap(PLATE - wedge(0.3, taper), SHARP)
     assert gap is not None
     assert gap.value == pytest.approx(0.6 * math.cos(math.radians(taper / 2)), abs=1e-6)
 
 
-def test_a_rounded_corner_blunter_than_a_sliver_is_no_slot() -> None:
-    assert least_gap(PLATE - wedge(0.3, 20.0), SHARP) is None
+def test_a_rounded_corner_blunter_than_that_is_no_slot() -> None:
+    assert least_gap(PLATE - wedge(0.3, 35.0), SHARP) is None
 
 
 @pytest.mark.parametrize("radius", [0.1, 0.2, 0.4])
@@ -69,6 +85,6 @@ def test_a_drop_is_as_wide_as_its_round_end() -> None:
     tangent = (math.sin(lean), math.cos(lean))
     tip = (1.0 / math.sin(lean), 0.0)
     drop = disc((0.0, 0.0), 1.0) | polygon([(tangent[0], -tangent[1]), tip, tangent])
-    width = least_width(drop, SHARP)
+    width = least_width(drop, 15.0)
     assert width is not None
     assert width.value == pytest.approx(2.0, abs=1e-6)
