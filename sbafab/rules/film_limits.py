@@ -50,7 +50,7 @@ def check(measures: Measures) -> list[Finding]:
     )
     if not good:
         remedy = "widen it" if width.value else "end it blunt and as wide as that"
-        message += f"; the laser needs {limit:g}: {remedy}, or leave it out"
+        message += f"; the laser needs {limit:g}: {remedy} or leave it out"
     place = Place(None, (layer.index,), *width.middle)
     return [Finding(NAME, "pass" if good else "fail", limit, width.value, "mm", place, message)]
 

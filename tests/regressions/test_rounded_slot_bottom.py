@@ -47,7 +47,8 @@ def test_a_point_is_narrower_than_any_flat_bottom_between_the_same_flanks(
     else:
         assert pointed is not None
         assert flat is not None
-        assert (pointed.value, flat.value) == (0.0, pytest.approx(0.139, abs=1e-6))
+        assert pointed.value == 0.0
+        assert flat.value == pytest.approx(0.139, abs=1e-6)
 
 
 @pytest.mark.parametrize("taper", [2.0, 10.0, 24.5])
