@@ -598,17 +598,15 @@ def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
 def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
     """Return what a tool of a ``width``, mm, covers along a chain of edges, with exact arcs.
 
-    A closed chain is covered by half the width on both sides. An open one ends round, or square;
-    where it bends the tool turns on the spot, so corners are round outside.
+    The chain may be closed, and may cross, touch or retrace itself. An open one ends round, or
+    square; where it bends the tool turns on the spot, so corners are round outside.
     """
     half = width / 2
-    if math.dist(path[0].start, path[-1].end) < EPSILON:
-        loop = Contour(tuple(path))
-        inside = Region((loop if loop.area > 0 else loop.reversed(),))
-        return grow(inside, half) - shrink(inside, half)
+    is_closed = math.dist(path[0].start, path[-1].end) < EPSILON
     joints = [edge.start for edge in path[1:]]
-    ends = [path[0].start, path[-1].end] if has_round_ends else []
-    discs = [Region((circle(p, half),)) for p in (*joints, *ends)]
+    if is_closed or has_round_ends:
+        joints += [path[0].start, path[-1].end]
+    discs = [Region((circle(p, half),)) for p in dict.fromkeys(joints)]
     return union([*(_band(edge, half) for edge in path), *discs])
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from random import Random
 
 import pytest
 
-from sbafab.geometry.edges import Arc, Point
-from sbafab.geometry.offset import beam_path, fillet, grow, shrink
+from sbafab.geometry.edges import Arc, Edge, Line, Point, edge_from_bulge
+from sbafab.geometry.offset import beam_path, fillet, grow, shrink, swept
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 
 CONVEX = [
@@ -269,3 +270,37 @@ def test_a_lens_of_two_flat_arcs_grows_round_both_tips() -> None:
         half = math.acos(1 - height / 20)
         expected = 2 * cap_area(20, height) + 80 * half * 0.05 + math.pi * 0.05**2
         assert grow(lens, 0.05).area == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_tool_covers_what_lies_within_half_its_width_of_its_path(seed: int) -> None:
+    """Paths that cross, touch and retrace themselves, open and closed, against plain distances."""
+    random = Random(seed)
+    corners = [(random.randint(-9, 9) / 1.5, random.uniform(-6, 6)) for _ in range(6)]
+    if seed % 4 == 0:
+        corners += corners[-2:0:-1]
+    if seed % 2 == 0:
+        corners.append(corners[0])
+    bulges = [random.choice((0.0, 0.0, random.uniform(-1, 1))) for _ in corners]
+    path = [
+        edge_from_bulge(start, end, bulge)
+        for start, end, bulge in zip(corners, corners[1:], bulges, strict=False)
+    ]
+    half = random.uniform(0.2, 2)
+    covered = swept(path, 2 * half, True)
+    for _ in range(300):
+        p = random.uniform(-9, 9), random.uniform(-9, 9)
+        away = min(math.dist(p, edge.nearest(p)) for edge in path)
+        assert covered.contains(p) == (away < half) or abs(away - half) < 1e-6
+
+
+def test_a_figure_of_eight_is_covered_on_both_loops() -> None:
+    """Two triangles that meet in a point, each as a closed path of its own covers it."""
+    left, right = [(0.0, 0.0), (-9.0, 5.0), (-9.0, -5.0)], [(0.0, 0.0), (9.0, 5.0), (9.0, -5.0)]
+
+    def closed(corners: list[Point]) -> list[Edge]:
+        return [Line(a, b) for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)]
+
+    both = swept(closed([*left, *right]), 1.5, True)
+    assert both == swept(closed(left), 1.5, True) | swept(closed(right), 1.5, True)
+    assert len(both.holes) == 2
