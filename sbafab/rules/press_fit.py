@@ -89,8 +89,7 @@ def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list
     names = " and ".join(film.said for film in films)
     remedy = "try the bond on a sample, state the minutes and name the film in press.minutes_for"
     message = f"{remedy}: nobody stated press minutes for {names}, and the schedule leaves them out"
-    count = float(len(films))
-    return [Finding(NAME, "warn", 0.0, count, "films", Place(), message, remedy=remedy)]
+    return [Finding(NAME, "warn", None, None, "", Place(), message, remedy=remedy)]
 
 
 def _extent(box: tuple[float, float, float, float]) -> float:

@@ -32,7 +32,6 @@ BOND = "the bond beside the strip"
 MOUTH = "the mouth"
 UNLIKE = 0.05
 """mm by which a strip may be wider or narrower than its inlet states; ours."""
-REMEDY = "widen inlet.width"
 ROOM = 1e-9
 """mm by which what is straight, parallel or at the mouth may be off for rounding."""
 
@@ -112,7 +111,8 @@ RULE = Rule(
     Explanation(
         "the inlet strip, cut at its narrowest, opens to the tube and its own film",
         "A flat channel opens to half the perimeter of what goes in; less, and the tube tears it.",
-        "Leave inlet.width out, so that it follows the tube, or use a thinner tube.",
+        "Leave inlet.width out, so that it follows the tube, draw strips of drawn layers wider, or "
+        "use a thinner tube.",
         ("inlet.width", "inlet.tube_outer_diameter", "laser.unknown_kerf"),
     ),
 )
@@ -202,7 +202,8 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         if mouth:
             width = sum([edge.length for edge in mouth], 0.0)
             cut = max(0.0, width - _lost(interface, limits))
-            opening = _Fit(inlet, interface, MOUTH, cut, needed, inlet.mouth, REMEDY, width)
+            remedy = _wider(needed + _lost(interface, limits))
+            opening = _Fit(inlet, interface, MOUTH, cut, needed, inlet.mouth, remedy, width)
             return [opening, *_along_run(inlet, interface, needed, limits)]
     message = "open a mask strip to the tab's end"
     gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
@@ -234,8 +235,13 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     bonds = [outward_reach(edge, rims) for edge in sides]
     fits = []
     for reaches, feature, limit, remedy in (
-        (widths, "the strip", needed, REMEDY),
-        (bonds, BOND, limits.bond_width, "raise bond.width, which makes the tab wider"),
+        (widths, "the strip", needed, _wider(needed + _lost(interface, limits))),
+        (
+            bonds,
+            BOND,
+            limits.bond_width,
+            "make the tab wider, by bond.width or in the shape of a drawn layer",
+        ),
     ):
         least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
         if least is not None:
@@ -298,6 +304,12 @@ def _needed(inlet: Inlet, interface: Interface) -> float:
     """Width that opens to the tube with the strip beside it."""
     strip = max((mask.film.thickness for mask in interface.masks), default=0.0)
     return math.pi / 2 * (inlet.tube_diameter + strip)
+
+
+def _wider(width: float) -> str:
+    """Return the remedy for a strip narrower than ``width`` mm as drawn."""
+    least = math.ceil(round(width * 1000, 6)) / 1000
+    return f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"
 
 
 def _lost(interface: Interface, limits: Limits) -> float:

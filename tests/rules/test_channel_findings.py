@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from sbafab.actuators import build, load_design
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Laminate
@@ -23,6 +24,8 @@ ONE = ("1dof-5mm", "stack.balloons=3")
 LOBED = ("3dof-15mm", "stack.balloons=3")
 TUBE = math.pi / 2 * (0.8 + 0.025)
 """A tube of 0.8 and the strip of 0.025 beside it, opened flat."""
+WIDER = "make it 1.596 mm wide, by inlet.width or in the shape of a drawn layer"
+"""That, 0.1 for the cutting error of each edge, and 0.1 for a kerf that nobody measured."""
 NOWHERE = Place()
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -162,7 +165,7 @@ def test_tube_fit_of_a_strip_with_a_narrow_place(good: Good, spoil: Spoil) -> No
     found = only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS)))
     assert (found.verdict, found.where.interface) == ("fail", 1)
     assert found.message.startswith("the strip of chamber1 is drawn 1.450 mm wide, x ")
-    assert found.message.endswith("; a tube of 0.8 beside its strip needs 1.296: widen inlet.width")
+    assert found.message.endswith(f"; a tube of 0.8 beside its strip needs 1.296: {WIDER}")
 
 
 def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
@@ -178,9 +181,26 @@ def test_tube_fit_of_a_narrow_mouth(good: Good, spoil: Spoil) -> None:
             Place(1, (1, 2, 3), 8.25, 0.0),
             "the mouth of chamber1 is drawn 1.400 mm wide, x 8.250, y 0.000, and cut 1.100 at "
             "worst (0.1 on each edge, kerf up to 0.1); a tube of 0.8 beside its strip needs 1.296: "
-            "widen inlet.width",
+            f"{WIDER}",
         ),
     )
+
+
+def test_a_strip_as_wide_as_the_remedy_says_passes(good: Good, spoil: Spoil) -> None:
+    for width, verdict in ((1.590, "fail"), (1.596, "pass")):
+        mask = (disc(AXIS, 2.5) | strip(AXIS, (8.75, 0.0), width)) - disc(AXIS, 0.5)
+        (found, *_) = tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS))
+        assert found.verdict == verdict
+
+
+def test_drawn_layers_are_told_to_draw_their_strip_wider() -> None:
+    laminate = build(load_design("pouch", ("inlet.tube_outer_diameter=2",)))
+    (found, *_) = tube_fit.check(Measures(laminate, LIMITS))
+    assert found.verdict == "fail"
+    # No mask's film is thicker than 0.025 mm.
+    needed = math.pi / 2 * (2 + 0.025) + 0.3
+    assert f"make it {math.ceil(needed * 1000) / 1000:.3f} mm wide" in found.message
+    assert "in the shape of a drawn layer" in found.message
 
 
 def test_tube_fit_of_a_closed_mouth(good: Good, spoil: Spoil) -> None:
@@ -206,7 +226,8 @@ def test_tube_fit_of_a_narrow_bond(good: Good, spoil: Spoil) -> None:
     found = only(tube_fit.check(Measures(spoil(good(*ONE), 2, mask), LIMITS)))
     assert found.message.startswith("the bond beside the strip of chamber1 is 0.650 mm wide, x ")
     assert found.message.endswith(
-        "; to hold the tube it needs 0.750: raise bond.width, which makes the tab wider"
+        "; to hold the tube it needs 0.750: make the tab wider, by bond.width or in the shape of a "
+        "drawn layer"
     )
 
 

@@ -84,6 +84,14 @@ def test_more_balloons_than_were_ever_built(good: Good) -> None:
     )
 
 
+def test_minutes_that_nobody_stated_have_no_limit(good: Good) -> None:
+    """A share of films "<= 0 films" would be no limit that a reader can keep."""
+    _, warning = press_fit.check(Measures(good(*ONE), Limits(minutes_for=())))
+    assert (warning.rule, warning.verdict) == ("press-fit", "warn")
+    assert (warning.limit, warning.measured, warning.unit) == (None, None, "")
+    assert "nobody stated press minutes for" in warning.message
+
+
 def test_holes_on_their_axes(good: Good) -> None:
     found = only(registration_nominal.check(Measures(good(*ONE), LIMITS)))
     assert (found.verdict, found.limit, found.unit) == ("pass", 0.001, "mm")
