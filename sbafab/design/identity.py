@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from sbafab.design.files import (
@@ -23,7 +23,7 @@ from sbafab.design.sections import (
     Press,
     Registration,
 )
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE, Film
 
 LATER: Mapping[str, Sequence[str]] = {
     "order": ("success_rate", "certainty", "shift_hours"),
@@ -192,6 +192,16 @@ def tube_name(design: Design) -> str:
     if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
         return OTHER_TUBE
     return design.inlet.tube
+
+
+def adhesive_for(design: Design, films: Iterable[Film]) -> str | None:
+    """Return the adhesive that bonds tubes to these films; None if it is the kit's, which does not
+    list them. One that the kit lacks is the designer's choice.
+    """
+    adhesive = kit_of(design).adhesives.get(design.inlet.adhesive)
+    if adhesive is None or all(film.product in adhesive.bonds for film in films):
+        return design.inlet.adhesive
+    return None
 
 
 def cure_hours(design: Design) -> float | None:

@@ -76,6 +76,8 @@ OF_A_DESIGN = (
 """Keys in them that are no lab's to say."""
 TEXTS = ("product", "use", "warning", "plate_material", "release_film", "fitting", "machine")
 """Keys that are no numbers, whatever they say."""
+BONDS = "bonds"
+"""The films that an adhesive bonds, which need a source as numbers do."""
 Product = Annotated[str, Field(min_length=1, max_length=120)]
 
 
@@ -93,6 +95,9 @@ class Adhesive(Section):
 
     use: str = Field(default="", max_length=400)
     """How it is used."""
+    bonds: Annotated[tuple[Product, ...], Field(max_length=50, strict=False)] = ()
+    """Products of the films that it bonds. Where tubes are glued to any other, the traveller leaves
+    a blank."""
     cure_hours: float | None = Field(default=None, gt=0, le=1000)
     """Hours until it holds, on the traveller and in a batch's plan."""
 
@@ -205,7 +210,9 @@ def load_kit(kit: object, folder: Path) -> Kit:
 def _without_sources(
     table: Mapping[str, Any], prefix: str, sources: dict[str, str], path: Path
 ) -> dict[str, Any]:
-    """The tables with plain values. Raises DesignError for a number whose source is not given."""
+    """The tables with plain values. Raises DesignError for a number, or the films that an adhesive
+    bonds, without a source.
+    """
     plain: dict[str, Any] = {}
     for key, value in table.items():
         where = f"{prefix}{key}"
@@ -213,16 +220,16 @@ def _without_sources(
             source = value.get(SOURCE)
             if set(value) != {VALUE, SOURCE} or not isinstance(source, str) or not source.strip():
                 raise DesignError(
-                    f'{path}: {where} must be {{ value = ..., source = "where the number is '
-                    'from" } and nothing else'
+                    f'{path}: {where} must be {{ value = ..., source = "where it is from" }} and '
+                    "nothing else"
                 )
             plain[key], sources[where] = value[VALUE], source
         elif isinstance(value, dict):
             plain[key] = _without_sources(value, f"{where}.", sources, path)
-        elif prefix and key not in TEXTS and _is_number(value):
+        elif prefix and (key == BONDS or (key not in TEXTS and _is_number(value))):
             raise DesignError(
                 f"{path}: {where} = {shown(value)} has no source; write {where} = {{ value = "
-                f'{shown(value)}, source = "where the number is from" }}'
+                f'{shown(value)}, source = "where it is from" }}'
             )
         else:
             plain[key] = value

@@ -112,6 +112,8 @@ NOTHING = Region()
 PLAINLY_PRESSED = GapJoints()
 LOOSE = 0.2
 """Tolerance in mm of place and diameter within which a hole belongs to a pin."""
+IN_MOUTH = 0.1
+"""mm inward of its mouth at which a channel is looked for."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -323,6 +325,27 @@ class Laminate:
     def tube_count(self) -> int:
         """Number of tubes: one for each inlet and each hole."""
         return len(self.inlets) + len(self.tube_holes)
+
+    def mouth_gap(self, inlet: Inlet) -> Interface | None:
+        """Return the interface whose void begins at an inlet's mouth, or None."""
+        (x, y), (u, v) = inlet.mouth, inlet.direction
+        inside = x - IN_MOUTH * u, y - IN_MOUTH * v
+        return next((gap for gap in self.interfaces if gap.unbonded.contains(inside)), None)
+
+    @property
+    def glued_films(self) -> tuple[Film, ...]:
+        """The structural films that tubes are glued to: at mouths, and round holes."""
+        outer = self.tpe_layers[0], self.tpe_layers[-1]
+        layers = [
+            layer
+            for port in self.tube_holes
+            for layer in outer
+            if layer.index in (port.below, port.above)
+        ]
+        for inlet in self.inlets:
+            gap = self.mouth_gap(inlet)
+            layers += self.tpe_layers if gap is None else (gap.below, gap.above)
+        return tuple(dict.fromkeys(layer.film for layer in layers))
 
     @cached_attribute
     def tpe_layers(self) -> tuple[Layer, ...]:

@@ -69,6 +69,24 @@ def test_the_papers_actuator_is_not_on_other_pages(sheet_files: Any) -> None:
     assert "the channel runs straight for 9 mm" in words_of(page(sheet_files, "array"))
 
 
+def test_tubes_are_glued_with_what_bonds_their_film(sheet_files: Any) -> None:
+    """The paper sealed Stretchlon 200; nobody stated that its vinyl adhesive bonds polyethylene."""
+    vinyl, blank = "Loctite Vinyl", "________ (nobody stated an adhesive for"
+    assert vinyl in words_of(page(sheet_files, "1dof-5mm"))
+    assert blank not in words_of(page(sheet_files, "1dof-5mm"))
+    tpu = page(sheet_files, "1dof-5mm", "films.tpe.product=TPU", "films.tpe.thickness=0.05")
+    # The finger's mouth is between two films of polyethylene; its slotted sheet has no tab.
+    for name in ("folded", "gripper", "finger"):
+        words = words_of(page(sheet_files, name))
+        assert vinyl not in words
+        assert f"small drop of {blank} LDPE film, 100 um:" in words
+        assert f"Adhesive{blank} LDPE film, 100 um:" in words
+    assert f"small drop of {blank} TPU" in words_of(tpu)
+    # What a designer names that the kit lacks is the designer's to know.
+    named = words_of(page(sheet_files, "folded", "inlet.adhesive=Hot melt of EVA"))
+    assert "small drop of Hot melt of EVA; keep it out" in named
+
+
 def test_a_flash_bond_that_bonds_nothing_is_said_to_be_needless(sheet_files: Any) -> None:
     first, second = [words_of(step) for step in page(sheet_files, "array").findall(".//article")]
     assert "No bond: one film and masks" in first

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.design.identity import cure_hours, kit_of, tube_name
+from sbafab.design.identity import adhesive_for, cure_hours, kit_of, tube_name
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.formulas import burst_pressure
@@ -15,7 +15,7 @@ from sbafab.pressing.cycles import serial
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.traveller.shapes import STATION, mouth_gap, straight_run
+from sbafab.reports.traveller.shapes import STATION, straight_run
 
 MOST_COPIES = 36
 """Copies up to which each has a box."""
@@ -40,6 +40,16 @@ def tubing(work: Work) -> list[Action]:
     return [*_in_inlets(work), *_on_holes(work)]
 
 
+def adhesive_words(work: Work) -> str:
+    """Return the adhesive of the tubes; a blank, and what it must bond, if none is stated."""
+    films = work.laminate.glued_films
+    adhesive = adhesive_for(work.design, films)
+    if adhesive is not None:
+        return adhesive
+    names = joined_words(list(dict.fromkeys(film.product for film in films)))
+    return f"{units.BLANK} (nobody stated an adhesive for {names}: try one on scrap, with the tube)"
+
+
 def _on_holes(work: Work) -> list[Action]:
     """Return the gluing of tubes on holes of an outer film; empty without one."""
     holes = work.laminate.tube_holes
@@ -58,7 +68,7 @@ def _on_holes(work: Work) -> list[Action]:
         Action("Wipe the film round the hole with isopropanol and let it dry.", (), names),
         Action(
             f"Stand the tube, or a flange with the tube in it, on the hole, its bore over the "
-            f"opening, and seal its foot all round with {work.design.inlet.adhesive}, at least "
+            f"opening, and seal its foot all round with {adhesive_words(work)}, at least "
             f"{units.millimetres(work.design.rules.bond_width)} wide on the film; keep it out of "
             "the hole.",
             (),
@@ -105,8 +115,8 @@ def _in_inlets(work: Work) -> list[Action]:
         Action(f"Push the tube in{beside}, {deep}.", (), names),
         *end,
         Action(
-            f"Seal the mouth all round with a small drop of {work.design.inlet.adhesive}; keep it "
-            "out of the tube.",
+            f"Seal the mouth all round with a small drop of {adhesive_words(work)}; keep it out of "
+            "the tube.",
             (),
             names,
         ),
@@ -123,7 +133,7 @@ def _tab_films(work: Work) -> str:
         return ""
     pairs: dict[tuple[int, int], list[str]] = {}
     for inlet in laminate.inlets:
-        gap = mouth_gap(laminate, inlet)
+        gap = laminate.mouth_gap(inlet)
         if gap is not None:
             pairs.setdefault((gap.below.index, gap.above.index), []).append(inlet.chamber)
     words = [

@@ -23,7 +23,7 @@ from sbafab.laminate.laminate import Layer
 from sbafab.pressing.cycles import batch_times
 from sbafab.pressing.work_plan import shop_of, work_plan
 from sbafab.reports.drawing import layer_numbers
-from sbafab.reports.traveller import base_plate, units
+from sbafab.reports.traveller import acceptance, base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import flat_shape, thumbnail
 from sbafab.reports.tray_plan import tray_sheets
@@ -79,7 +79,7 @@ def bill(work: Work) -> list[Item]:
             Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"), number)
         )
         drops = units.count(number, "small drop")
-        items.append(Item("Adhesive", work.design.inlet.adhesive, drops, number))
+        items.append(Item("Adhesive", acceptance.adhesive_words(work), drops, number))
     wrap = work.design.form.wrap
     if wrap is not None:
         diameter = units.millimetres(wrap.tube_diameter)

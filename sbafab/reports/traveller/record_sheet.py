@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from sbafab.design.identity import adhesive_for
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule, SeamStep, Step
@@ -68,7 +69,7 @@ def record_tables(
     """Return the tables of a design's record page: materials, press steps, tests."""
     films = list(dict.fromkeys(layer.film.material for layer in laminate.layers))
     items = [*films, *([ADHESIVE] if laminate.tube_count else [])]
-    glue = design.inlet.adhesive
+    glue = adhesive_for(design, laminate.glued_films) or ""
     unsorted: list[Step | SeamStep] = [*schedule.steps, *schedule.seams]
     steps = sorted(unsorted, key=lambda step: step.step)
     tables = (

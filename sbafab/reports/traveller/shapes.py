@@ -14,7 +14,7 @@ from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region, coord, path_data
 from sbafab.laminate.assembly import AssemblyStep, distinct_layers
 from sbafab.laminate.films import Film, Ink, ink
-from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
+from sbafab.laminate.laminate import Inlet, Laminate, Layer
 from sbafab.markup import escape, quoteattr
 from sbafab.reports import drawing as draw
 
@@ -255,13 +255,6 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
     )
 
 
-def mouth_gap(laminate: Laminate, inlet: Inlet) -> Interface | None:
-    """Return the gap whose void begins at an inlet's mouth; None where there is none."""
-    (x, y), (u, v) = inlet.mouth, inlet.direction
-    inside = x - STATION * u, y - STATION * v
-    return next((gap for gap in laminate.interfaces if gap.unbonded.contains(inside)), None)
-
-
 def straight_run(laminate: Laminate, inlet: Inlet) -> float:
     """Return how far an inlet's channel runs straight and evenly wide inward from its mouth, mm;
     0 where no channel begins there.
@@ -272,7 +265,7 @@ def straight_run(laminate: Laminate, inlet: Inlet) -> float:
         return x - depth * u - left * v, y - depth * v + left * u
 
     half, aside = inlet.width / 2 - STATION / 2, inlet.width / 2 + STATION / 2
-    gap = mouth_gap(laminate, inlet)
+    gap = laminate.mouth_gap(inlet)
     void = None if gap is None else gap.unbonded
     depth = 0.0
     while void is not None:
