@@ -29,6 +29,14 @@ class UnreachableError(DesignError):
     """A place that the tip of a stack cannot reach: the nearest tip found, and its distance."""
 
 
+class BeyondError(DesignError):
+    """A state that a film does not stand; ``excess`` is by what share it is beyond."""
+
+    def __init__(self, sentence: str, excess: float) -> None:
+        super().__init__(sentence)
+        self.excess = excess
+
+
 class TooLargeError(DesignError):
     """A part that is larger than its film; the exit code is that of a failed rule."""
 

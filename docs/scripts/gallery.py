@@ -24,7 +24,7 @@ FIGURES = (
     ("outline diameter", "across", 1),
     ("deflated height", "flat", 2),
     ("free stroke at 10 kPa", "stroke at 10 kPa", 1),
-    ("full stroke", "full stroke", 1),
+    ("reference stroke", "reference stroke", 1),
     ("blocked force at 10 kPa, flat", "blocked force at 10 kPa", 2),
     ("blocked force at 10 kPa, flat, at most", "blocked force at 10 kPa at most", 2),
     ("bend at 10 kPa in one chamber, the others empty", "bend at 10 kPa in one chamber", 0),
@@ -35,7 +35,7 @@ FIGURES = (
 
 NUMBERS = (
     ("outline diameter", "inflated diameter"),
-    ("free stroke at 10 kPa", "full stroke", "deflated height"),
+    ("free stroke at 10 kPa", "reference stroke", "deflated height"),
     (
         "bend at 10 kPa in one chamber, the others empty",
         "blocked force at 10 kPa, flat",

@@ -283,10 +283,10 @@ def _shares(of: ModelledActuator, shares: tuple[float, ...]) -> dict[str, tuple[
         f"full stroke at {pressure:g} kPa": _free_stroke(of.stack, pressure)
         for pressure in OPEN_PRESSURES
     }
-    if of.actuator.knows_full:
+    if of.actuator.has_reference:
         full["full height as in Sec. 4.6"] = elastic.stroke_at(of.actuator, 1.0)
         longer = paper.LONGEST_STROKE.value / paper.FULL_HEIGHT.value
-        full["full stroke as in Sec. 4.2"] = longer * of.actuator.full_height
+        full["full stroke as in Sec. 4.2"] = longer * of.actuator.reference_height
     return {
         phrase: tuple(
             0.0 if share == 0 else None if stroke is None else share * stroke for share in shares

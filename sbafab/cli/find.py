@@ -268,7 +268,6 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
         "best": trial_json(result.best),
         "intervals": {label: list(ends) for label, ends in result.intervals.items()},
         "requirements": [_requirement_json(result, row) for row in result.problem.requirements],
-        "full_stroke": result.full_stroke,
         "measured": {name: row.as_dict() for name, row in result.measured.items()},
         "missed": result.missed,
         "binds": [{"key": b.key, "value": b.value, "breaks": b.breaks} for b in result.binds],
@@ -351,10 +350,6 @@ def _print_quantities(result: FoundDesign) -> None:
         hint = "" if is_sure else "; --sure 0.9 asks that each requirement holds so"
         note = f"in parentheses the 90 % interval of what would be measured{hint}"
         print_wrapped(note, indent="  ")
-    strokes = [quantity for quantity in result.problem.quantities if quantity.name == "stroke"]
-    is_full = any(quantity.is_full_stroke for quantity in strokes)
-    if strokes and not is_full and result.full_stroke is not None:
-        print_line(f"  full stroke {result.full_stroke:.4g} mm, scaled from the paper's")
 
 
 def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:

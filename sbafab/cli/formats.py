@@ -725,7 +725,6 @@ def _find() -> dict[str, Any]:
             "additionalProperties": ends,
         },
         requirements=array(requirement),
-        full_stroke={**number("null"), "description": "mm, of the best, as predict has it"},
         measured={
             "type": "object",
             "description": "what the paper measured, by quantity, where the model is off by more "

@@ -57,7 +57,12 @@ def _measurement_options(command: Command) -> Command:
         click.option(
             "--proof", type=PRESSURE.read, metavar="P", help="Pressure held in the proof test, kPa."
         ),
-        click.option("--stroke", type=LENGTH.read, metavar="MM", help="Full stroke."),
+        click.option(
+            "--stroke",
+            type=LENGTH.read,
+            metavar="MM",
+            help="Stroke when full, as the paper measured it.",
+        ),
         click.option("--force", type=float, metavar="N", help="Blocked force at 100 kPa, flat."),
         click.option("--height", type=LENGTH.read, metavar="MM", help="Pressed height, deflated."),
         click.option("--mass", type=float, metavar="G", help="Mass without tubes."),

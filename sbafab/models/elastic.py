@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from sbafab.errors import DesignError
+from sbafab.errors import BeyondError, DesignError
 from sbafab.models import paper
 from sbafab.models.balloon import Balloon, Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
@@ -30,7 +30,7 @@ from sbafab.models.figures import (
 )
 from sbafab.models.kinematics import Actuator
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
-from sbafab.models.rippled import free_shapes
+from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
 if TYPE_CHECKING:
@@ -128,21 +128,38 @@ class Rise(NamedTuple):
 
 def free_rise(kinds: Counter[Balloon], pressure: float, shapes: Inflated | None = None) -> Rise:
     """Return the rise of so many balloons of each kind at a pressure in kPa; ``shapes`` are theirs
-    where they are known. Raises DesignError where a film would be stretched too far.
+    where they are known. Raises BeyondError where a film would be stretched too far.
     """
     stroke = volume = energy = 0.0
     for kind, count in kinds.items():
         shape = shapes[kind] if shapes else free_shapes(kind, pressure)
-        longer = float(stretch(kind, shape)[0])
-        if longer > MOST_STRETCH:
-            raise DesignError(
-                f"the film would be {100 * longer:.0f} % longer, and one modulus is unlikely to "
-                f"hold beyond {100 * MOST_STRETCH:g} %; ask for less pressure"
-            )
+        refuse_stretched(float(stretch(kind, shape)[0]))
         stroke += count * float(shape.height[0])
         volume += count * float(shape.volume[0])
         energy += count * float(shape.energy[0])
     return Rise(stroke, volume, energy)
+
+
+def held_stretch(kinds: Sequence[Balloon], pressures: ArrayLike, strokes: ArrayLike) -> Array:
+    """Return the largest strain of the films of a chamber's balloons at pressures (n,) in kPa and
+    strokes of all (n,) in mm, each balloon at the same height over radius.
+    """
+    high = np.asarray(strokes, dtype=float) / sum(balloon.pocket for balloon in kinds)
+    each = [
+        stretch(kind, compressed_shapes(kind, pressures, np.maximum(high * kind.pocket, 1e-3)))
+        for kind in dict.fromkeys(kinds)
+    ]
+    return np.asarray(np.max(each, axis=0))
+
+
+def refuse_stretched(longer: float) -> None:
+    """Raise BeyondError for a film that is stretched too far."""
+    if longer > MOST_STRETCH:
+        raise BeyondError(
+            f"the film would be {100 * longer:.0f} % longer, and one modulus is unlikely to hold "
+            f"beyond {100 * MOST_STRETCH:g} %; ask for less pressure",
+            longer / MOST_STRETCH - 1,
+        )
 
 
 # The elastic stack: forces, bending, time, stiffness.
@@ -231,12 +248,17 @@ PosedItem = tuple[Figure | LeftOut, Pose | None]
 
 
 def stack_figures(
-    actuator: Actuator, request: PredictionRequest, stack: Stack, checks_maps: bool = False
+    actuator: Actuator,
+    request: PredictionRequest,
+    stack: Stack,
+    checks_films: bool = True,
+    checks_maps: bool = False,
 ) -> Iterator[Figure | LeftOut]:
-    """Yield forces, bending, times and stiffness of the stack; with ``checks_maps`` those whose
-    balloons stand where a map does not hold say so.
+    """Yield forces, bending, times and stiffness of the stack; with ``checks_films`` those by films
+    that would be stretched too far are left out, with ``checks_maps`` those whose balloons stand
+    where a map does not hold say so.
     """
-    rows = list(_posed_figures(actuator, request, stack))
+    rows = list(_posed_figures(actuator, request, stack, checks_films))
     poses = list({id(pose): pose for _, pose in rows if pose and checks_maps}.values())
     outside = {id(pose) for pose, holds in zip(poses, stack.hold(poses), strict=True) if not holds}
     for item, pose in rows:
@@ -248,9 +270,9 @@ def stack_figures(
 
 
 def _posed_figures(
-    actuator: Actuator, request: PredictionRequest, stack: Stack
+    actuator: Actuator, request: PredictionRequest, stack: Stack, checks_films: bool
 ) -> Iterator[PosedItem]:
-    yield from _forces(actuator, request, stack)
+    yield from _forces(actuator, request, stack, checks_films)
     if actuator.form.is_parallel:
         yield from _bends(request, stack)
         yield from _bent_forces(request, stack)
@@ -259,17 +281,25 @@ def _posed_figures(
 
 
 def stroke_at(actuator: Actuator, share: float) -> float:
-    """Return the stroke in mm at a share of the way from the flat to the paper's full height."""
-    return max(share * (actuator.full_height - actuator.thickness), 0.0)
+    """Return the stroke in mm at a share of the way from the flat to the reference height."""
+    return max(share * (actuator.reference_height - actuator.thickness), 0.0)
 
 
-def _forces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
+def _forces(
+    actuator: Actuator, request: PredictionRequest, stack: Stack, checks_films: bool
+) -> Iterator[PosedItem]:
+    kinds = balloons_of(actuator.design, actuator.laminate, request.factors, actuator.form)
+    shares = paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]
+    strokes = [stroke_at(actuator, share) for share in shares]
     for pressure in request.pressures_kpa:
-        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
-            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+        longer = np.zeros(len(strokes))
+        if checks_films:
+            longer = held_stretch(kinds, [pressure] * len(strokes), strokes)
+        for share, stroke, strain in zip(shares, strokes, longer.tolist(), strict=True):
+            at = "flat" if share == 0 else f"at {100 * share:g} % of the reference stroke"
             name = f"blocked force at {pressure:g} kPa, {at}"
-            stroke = stroke_at(actuator, share)
             try:
+                refuse_stretched(strain)
                 value = float(blocked_force(stack, pressure, stroke))
             except DesignError as error:
                 yield LeftOut(f"{name}, elastic stack", str(error)), None
@@ -452,8 +482,8 @@ def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionReque
 
 def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:
     """Return curves of force against stroke, one a pressure."""
-    most = actuator.full_height - actuator.thickness
-    if not actuator.knows_full:
+    most = actuator.reference_height - actuator.thickness
+    if not actuator.has_reference:
         most = min(k.largest_stroke for k in actuator.kinematics)
     strokes = np.linspace(0, most, SAMPLES)
     model = calibrated(FORCE, request.factors)

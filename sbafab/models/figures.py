@@ -383,8 +383,8 @@ def _rounded(value: float) -> float:
 
 
 LEFT_OUT = "left out"
-STROKES = ("full stroke", "free stroke at ", "reached diameter", "free contraction")
-CALIBRATED_STROKES = ("free stroke at ", "full stroke", "reached diameter", "free contraction")
+STROKES = ("reference stroke", "free stroke at ", "reached diameter", "free contraction")
+CALIBRATED_STROKES = ("free stroke at ", "reference stroke", "reached diameter", "free contraction")
 BENDS = ("bend at ", "bend with one chamber", "free bend")
 PULLS = ("pull", "moment", "load")
 """Beginnings of the names of drawn mechanisms' forces."""
@@ -394,8 +394,11 @@ INTERVAL_NOTE = (
     "in parentheses the 90 % interval: from the calibration's uncertainty, and from what the model "
     "missed of the measured curves"
 )
-FULL_NOTE = (
-    "as the paper measured on one actuator of d = 5, in proportion to d; its error is not known"
+SCALED = "the paper's height, scaled"
+"""Model of the reference stroke of round pockets."""
+SCALED_NOTE = (
+    "what the paper measured of one actuator of d = 5, in proportion to d, at a pressure that it "
+    "does not give: what shares of the stroke are of, not the most that it rises"
 )
 
 
@@ -469,8 +472,8 @@ def _note(figure: Figure) -> str:
         return figure.aside
     if figure.interval is not None:
         return INTERVAL_NOTE
-    if figure.model.name.startswith("the paper's full height"):
-        return FULL_NOTE
+    if figure.model.name == SCALED:
+        return SCALED_NOTE
     if figure.model.name.startswith(EQ_4):
         low, high = eq_4_ratios()
         return (

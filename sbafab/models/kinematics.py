@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sbafab.design.records import Design, Discs, Form, Slots
+from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
@@ -144,8 +145,8 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
     )
 
 
-def full_stroke(radii: Sequence[float]) -> float:
-    """Return a stack's full stroke in mm by the paper: 17.5 for 15 of radius 2.5 (Sec. 4.6)."""
+def scaled_stroke(radii: Sequence[float]) -> float:
+    """Return the paper's stroke in mm in proportion to radii: 17.5 for 15 of 2.5 (Sec. 4.6)."""
     return FULL_SHARE * sum(radii)
 
 
@@ -180,9 +181,10 @@ class Actuator:
 
     Stacks work side by side, each of ``balloons``; ``radii`` (mm, bottom to top) are those of round
     pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
-    drawn outlines. ``full_stroke`` mm counts as full actuation, ``full_height`` mm is its height
-    then; ``thickness`` mm the flat laminate's, the press factor included. ``press_factor`` is 1 for
-    sheets that stay solid and are not the paper's film, on which it was measured.
+    drawn outlines. ``reference_stroke`` mm is what shares of a stroke are of, ``reference_height``
+    mm the height then: what the paper measured, scaled, or of oblong pockets that at the largest
+    volume; ``thickness`` mm the flat laminate's, the press factor included. ``press_factor`` is 1
+    for sheets that stay solid and are not the paper's film, on which it was measured.
     """
 
     design: Design
@@ -191,14 +193,15 @@ class Actuator:
     balloons: int
     radii: tuple[float, ...]
     kinematics: tuple[Kinematics, ...]
-    full_stroke: float
-    full_height: float
+    reference_stroke: float
+    reference_height: float
     thickness: float
     press_factor: float
 
     def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a chamber's length at a stroke: from the flat thickness to the full height."""
-        return self.thickness + stroke * (self.full_height - self.thickness) / self.full_stroke
+        """Return a chamber's length at a stroke, from flat to the reference height."""
+        rise = self.reference_height - self.thickness
+        return self.thickness + stroke * rise / self.reference_stroke
 
     @property
     def axes(self) -> list[Point]:
@@ -215,9 +218,18 @@ class Actuator:
         return _has_the_papers_film(self.laminate)
 
     @property
-    def knows_full(self) -> bool:
-        """True if full stroke and full height are known: of round pockets they were measured."""
+    def has_reference(self) -> bool:
+        """True if the reference stroke is known: of round pockets it was measured, of one film."""
         return not self.radii or self.has_the_papers_film
+
+    @property
+    def known_stroke(self) -> float:
+        """The reference stroke. Raises DesignError where it is not known."""
+        if not self.kinematics:
+            raise DesignError(NO_OUTLINE)
+        if not self.has_reference:
+            raise DesignError(f"reference stroke: {NOT_MEASURED}")
+        return self.reference_stroke
 
     def is_like_paper(self, stacks: int, radius: float) -> bool:
         """Return True if the paper measured so many stacks of such balloons on common plates: its
@@ -242,19 +254,19 @@ def actuator(
     balloons, form = design.stack.balloons, form or design.form
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
-    full = full_height = 0.0
+    stroke = height = 0.0
     flows = isinstance(form.pockets, Slots | Discs) or _has_the_papers_film(laminate)
     press_factor = calibration.press_factor if flows else 1.0
     thickness = laminate.thickness * press_factor
     if isinstance(form.pockets, Slots):
         kinematics = slot_stack(form.pockets.width, form.pockets.run, balloons)
-        full = kinematics[0].largest_stroke
-        full_height = thickness + full
+        stroke = kinematics[0].largest_stroke
+        height = thickness + stroke
     elif isinstance(form.pockets, Discs):
         radii = tuple(d / 2 for d in form.pockets.diameters)
         kinematics = round_stack(radii)
         # The paper divides its whole height by its balloons (Sec. 4.6: 1.2 mm each).
-        full = full_height = full_stroke(radii)
+        stroke = height = scaled_stroke(radii)
     return Actuator(
         design,
         form,
@@ -262,8 +274,8 @@ def actuator(
         balloons,
         radii,
         kinematics,
-        full,
-        full_height,
+        stroke,
+        height,
         thickness,
         press_factor,
     )

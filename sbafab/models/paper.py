@@ -188,7 +188,7 @@ def _forces() -> Iterator[Counterpart]:
         for share, measured, value, calibrated_value in rows:
             if value is None:
                 continue
-            at = f"at {100 * share:g} % of full stroke" if share else "flat"
+            at = f"at {100 * share:g} % of the reference stroke" if share else "flat"
             yield Counterpart(
                 rf"blocked force( of one SBA)? at \S+ kPa, {at}",
                 model,
@@ -243,9 +243,9 @@ def _further_counterparts() -> Iterator[Counterpart]:
         "stroke at the largest volume", "Eqs. 1-3", FULL_HEIGHT, full,
         THREE_DOF, 39.82, "", three, "stroke at the largest volume",
     )  # fmt: skip
-    flat = "bend with one chamber at full stroke, the others flat"
+    flat = "bend with one chamber at the reference stroke, the others flat"
     yield Counterpart(
-        "bend with .* at full stroke, the others flat|maximum lateral tip displacement",
+        "bend with .* at the reference stroke, the others flat|maximum lateral tip displacement",
         "constant curvature", LARGEST_BEND, bend, THREE_DOF, 140.5, "", three, flat, True,
         148.0,
     )  # fmt: skip
@@ -272,7 +272,7 @@ def _further_counterparts() -> Iterator[Counterpart]:
         0.01439, "", three, TIME_WITH_AIR,
     )  # fmt: skip
     yield Counterpart(
-        r"time to full stroke at \d{4,}\S* ml/min", "", AIR_TIME,
+        r"time to the reference stroke at \d{4,}\S* ml/min", "", AIR_TIME,
         air, THREE_DOF, 0.01439, "", three, TIME_WITH_AIR,
     )  # fmt: skip
     yield Counterpart(

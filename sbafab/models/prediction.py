@@ -28,6 +28,7 @@ from sbafab.models.drawn_pockets import (
 from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
     REACHED,
+    SCALED,
     STACK,
     WIDEST,
     Factors,
@@ -76,14 +77,14 @@ def check_request(actuator: Actuator, request: PredictionRequest) -> None:
         widest.stroke(request.volumes_ul)
 
 
-def full_model(actuator: Actuator) -> Model:
-    """Return the model of the full stroke."""
+def reference_model(actuator: Actuator) -> Model:
+    """Return the model of the reference stroke."""
     if actuator.radii:
         return Model(
-            "the paper's full height",
+            SCALED,
             "Sec. 4.6: 17.5 mm for 15 balloons of d = 5, in proportion to d",
-            "measured, not predicted: one actuator of d = 5; as in the paper, all of the height "
-            "counts as stroke",
+            "measured, not predicted: one actuator of d = 5, at a pressure that is not given; as "
+            "in the paper, all of the height counts as stroke",
         )
     return Model(
         "the largest volume", actuator.kinematics[0].model.name, actuator.kinematics[0].model.trust
@@ -92,15 +93,17 @@ def full_model(actuator: Actuator) -> Model:
 
 def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
-    if actuator.knows_full:
-        full = full_model(actuator)
-        yield Figure("stroke", "full stroke", actuator.full_stroke, "mm", full)
-        yield Figure("stroke", "full height", actuator.full_height, "mm", full)
+    if actuator.has_reference:
+        model = reference_model(actuator)
+        yield Figure("stroke", "reference stroke", actuator.reference_stroke, "mm", model)
+        yield Figure("stroke", "reference height", actuator.reference_height, "mm", model)
         for k in actuator.kinematics:
-            at_full = float(k.volume(actuator.full_stroke))
-            yield Figure("stroke", "volume a balloon at full stroke", at_full, "ul", k.model)
+            at_full = float(k.volume(actuator.reference_stroke))
+            yield Figure(
+                "stroke", "volume a balloon at the reference stroke", at_full, "ul", k.model
+            )
     else:
-        yield LeftOut("full stroke, full height, and what is predicted at them", NOT_MEASURED)
+        yield LeftOut("reference stroke and height, and what is predicted at them", NOT_MEASURED)
     for k in actuator.kinematics:
         yield Figure("stroke", "largest volume a balloon", k.largest_volume, "ul", k.model)
         yield Figure("stroke", "stroke at the largest volume", k.largest_stroke, "mm", k.model)
@@ -124,12 +127,14 @@ def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
 
 
 def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
-    """Yield the blocked force at each pressure, flat and at the paper's shares of full stroke."""
+    """Yield the blocked force at each pressure, flat and at the paper's shares of the
+    reference stroke.
+    """
     for pressure in request.pressures_kpa:
-        for share in paper.HEIGHTS if actuator.knows_full else paper.HEIGHTS[:1]:
-            at = "flat" if share == 0 else f"at {100 * share:g} % of full stroke"
+        for share in paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]:
+            at = "flat" if share == 0 else f"at {100 * share:g} % of the reference stroke"
             for k in actuator.kinematics:
-                value = _force(actuator, k, pressure, share * actuator.full_stroke, request)
+                value = _force(actuator, k, pressure, share * actuator.reference_stroke, request)
                 name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
                 yield Figure("force", name, float(value), "N", _force_model(actuator, k, request))
 
@@ -161,15 +166,18 @@ def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) 
 
 
 def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Iterator[Figure]:
-    """Yield time, work, speed and power density, all of it at the volume of the full stroke: where
-    that is not known only times to the volumes of the request, and without a mass no power density.
+    """Yield time, work, speed and power density, all of it at the volume of the reference stroke:
+    where that is not known only times to the volumes of the request, and without a mass no power
+    density.
     """
     first = actuator.kinematics[0]
     whole = None
-    if actuator.knows_full:
-        chamber = actuator.balloons * float(first.volume(actuator.full_stroke))
+    if actuator.has_reference:
+        chamber = actuator.balloons * float(first.volume(actuator.reference_stroke))
         whole = chamber * actuator.form.stacks
-        yield Figure("actuation", "volume of all chambers at full stroke", whole, "ul", first.model)
+        yield Figure(
+            "actuation", "volume of all chambers at the reference stroke", whole, "ul", first.model
+        )
     flow = Model(
         f"{first.model.name} over flow",
         "Sec. 4.5, 7",
@@ -178,7 +186,7 @@ def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) 
     )
     if whole is not None:
         time = float(seconds(whole, request.flow_ml_min))
-        name = f"time to full stroke at {request.flow_ml_min:g} ml/min"
+        name = f"time to the reference stroke at {request.flow_ml_min:g} ml/min"
         yield Figure("actuation", name, time, "s", flow)
     for volume in request.volumes_ul:
         content = volume * actuator.balloons * actuator.form.stacks
@@ -214,7 +222,7 @@ def _power_density(
         "largest force times mean speed, as in the paper; the two never occur together. No lag of "
         "valve and pump: the paper's 0.067 s of air make it a fifth of this",
     ).times("contact factor", request.factors.contact_factor)
-    watts = pushes * push * actuator.full_stroke / 1000 / time
+    watts = pushes * push * actuator.reference_stroke / 1000 / time
     return Figure(
         "actuation",
         f"power density, blocked force flat at {highest:g} kPa and "
@@ -253,9 +261,9 @@ def stroke_relation(actuator: Actuator) -> Relation:
 
 
 def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
-    """Return force against stroke, to full stroke, at every pressure of the request."""
+    """Return force against stroke, to the reference stroke, at every pressure of the request."""
     most = min(k.largest_stroke for k in actuator.kinematics)
-    stroke = np.linspace(0, actuator.full_stroke if actuator.knows_full else most, SAMPLES)
+    stroke = np.linspace(0, actuator.reference_stroke if actuator.has_reference else most, SAMPLES)
     lines = []
     for pressure in request.pressures_kpa:
         for k in actuator.kinematics:
@@ -271,7 +279,7 @@ def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
     points = []
     if measured is not None:
         name, values_at = measured
-        places = [share * actuator.full_stroke for share in paper.HEIGHTS]
+        places = [share * actuator.reference_stroke for share in paper.HEIGHTS]
         label = f"paper: {name}, {paper.FORCE_KPA:g} kPa"
         y, errors = [m.value for m in values_at], [m.error for m in values_at]
         points.append(Points(label, places, y, errors))
@@ -298,8 +306,8 @@ CURVATURE = Model(
 
 
 class Path(NamedTuple):
-    """Motion of 1, 2 ... neighbouring chambers from flat to full stroke: stroke (mm), angle (rad),
-    lateral displacement and height of the tip (mm).
+    """Motion of 1, 2 ... neighbouring chambers from flat to the reference stroke: stroke (mm),
+    angle (rad), lateral displacement and height of the tip (mm).
     """
 
     chambers: int
@@ -315,8 +323,8 @@ def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
     A path ends where the top has turned by half a turn.
     """
     axes = actuator.axes
-    stroke = np.linspace(0, actuator.full_stroke, SAMPLES)
-    rest = actuator.full_height if others_full else actuator.thickness
+    stroke = np.linspace(0, actuator.reference_stroke, SAMPLES)
+    rest = actuator.reference_height if others_full else actuator.thickness
     all_paths = []
     for chambers in range(1, len(axes)):
         lengths = np.full((SAMPLES, len(axes)), rest)
@@ -332,12 +340,14 @@ def paths(actuator: Actuator, others_full: bool = False) -> list[Path]:
 
 def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
-    if not actuator.knows_full:
-        yield LeftOut("bend and tip displacement at full stroke, constant curvature", NOT_MEASURED)
+    if not actuator.has_reference:
+        yield LeftOut(
+            "bend and tip displacement at the reference stroke, constant curvature", NOT_MEASURED
+        )
         return
     all_paths = paths(actuator)
     for path in all_paths:
-        name = f"bend with {chamber_count(path.chambers)} at full stroke, the others flat"
+        name = f"bend with {chamber_count(path.chambers)} at the reference stroke, the others flat"
         if len(path.stroke) < SAMPLES:
             reason = "more than half a turn: the tip would come down through the base"
             yield LeftOut(name, reason)
@@ -402,10 +412,10 @@ def bending_relation(actuator: Actuator, request: PredictionRequest) -> Relation
 
 def workspace_relation(actuator: Actuator) -> Relation:
     """Return the paths of the tip in the plane in which neighbouring chambers bend; no lines of
-    constant curvature where the full stroke is not known.
+    constant curvature where the reference stroke is not known.
     """
     lines = []
-    rests = (("flat", False), ("full", True)) if actuator.knows_full else ()
+    rests = (("flat", False), ("full", True)) if actuator.has_reference else ()
     for rest, others_full in rests:
         for path in paths(actuator, others_full):
             label = f"{chamber_count(path.chambers)}, the others {rest}"
@@ -485,7 +495,7 @@ def predict(
     subject = actuator_of(design, flat, wish.factors, discs and discs.form(design, discs.equal))
     check_request(subject, wish)
     together = None if quick else elastic.elastic_stack(subject, wish)
-    items = _figures(subject, wish, together, checks_maps)
+    items = _figures(subject, wish, together, checks_maps=checks_maps)
     if uncertainty is not None:
         items = uncertainty.bounded(items, partial(_moved_figures, subject, wish, together))
     relations = () if quick else tuple(_relations(subject, wish, _stack(together)))
@@ -532,7 +542,7 @@ def _moved_figures(
     if isinstance(together, Stack):
         other = elastic.moved_stack(together, request.factors, factors)
         other = other or elastic.elastic_stack(subject, moved)
-    return _figures(subject, moved, other)
+    return _figures(subject, moved, other, checks_films=False)
 
 
 def _stack(together: Stack | LeftOut | None) -> Stack | None:
@@ -543,6 +553,7 @@ def _figures(
     actuator: Actuator,
     request: PredictionRequest,
     together: Stack | LeftOut | None,
+    checks_films: bool = True,
     checks_maps: bool = False,
 ) -> list[Figure | LeftOut]:
     """Return all figures, and the ones left out, in the order of their groups."""
@@ -550,7 +561,7 @@ def _figures(
     if isinstance(together, LeftOut):
         items.append(together)
     elif together is not None:
-        items += elastic.stack_figures(actuator, request, together, checks_maps)
+        items += elastic.stack_figures(actuator, request, together, checks_films, checks_maps)
     return sorted(items, key=_group_order)
 
 
@@ -609,7 +620,7 @@ def _relations(
             )
         yield pushed
     if actuator.form.is_parallel:
-        if actuator.knows_full:
+        if actuator.has_reference:
             yield bending_relation(actuator, request)
         if together is not None:
             yield elastic.bend_relation(request, together)
@@ -694,7 +705,7 @@ def _stiffness(actuator: Actuator) -> Iterator[Figure | LeftOut]:
         "order of magnitude: E is the paper's of its own actuators, not predicted, and its I is "
         "not given",
     )
-    value = tip_stiffness(measured.value, least, actuator.full_height)
+    value = tip_stiffness(measured.value, least, actuator.reference_height)
     yield Figure("stiffness", name, value, "N/mm", model)
 
 

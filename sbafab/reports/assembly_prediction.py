@@ -432,7 +432,10 @@ def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
     figures = {
         "height, flat": ("deflated height", FLAT_HEIGHT_OF_FILMS),
         "height, inflated": (f"free height {at}", BALLOON),
-        "push at 75 % of its stroke": (f"blocked force {at}, at 75 % of full stroke", ELASTIC),
+        "push at 75 % of its stroke": (
+            f"blocked force {at}, at 75 % of the reference stroke",
+            ELASTIC,
+        ),
         "bend by one chamber": (f"bend {at} in one chamber, the others empty", ELASTIC),
         "maximum lateral tip displacement": (
             f"lateral tip displacement {at} in one chamber, the others empty",

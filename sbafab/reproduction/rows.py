@@ -208,7 +208,7 @@ def strokes() -> Iterator[Row]:
         paper.FULL_HEIGHT,
         paper.BALLOONS * most.height,
         "Eqs. 1-3, one half each at its largest volume",
-        "as above; `predict` takes the paper's 17.5 itself as the full height, and says so",
+        "as above; `predict` takes the paper's 17.5 itself as the reference height, and says so",
     )
     yield Row(
         "volume at which the SOFA model starts, a balloon (about)",
@@ -346,7 +346,10 @@ def forces(single: Prediction, three: Prediction) -> Iterator[Row]:
 
 
 def heights() -> list[str]:
-    return ["flat", *(f"at {100 * share:g} % of full stroke" for share in paper.HEIGHTS[1:])]
+    return [
+        "flat",
+        *(f"at {100 * share:g} % of the reference stroke" for share in paper.HEIGHTS[1:]),
+    ]
 
 
 def force(prediction: Prediction, at: str, model: str) -> float:
@@ -363,7 +366,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "time to 10 kPa, water, 35 ml/min",
         paper.WATER_TIME,
-        three.value(f"time to full stroke at {paper.WATER_FLOW:g} ml/min"),
+        three.value(f"time to the reference stroke at {paper.WATER_FLOW:g} ml/min"),
         "Eq. 4 over flow, three chambers of 15 balloons at 17.5 mm",
         "agrees by chance: the stroke is the paper's, and no pressure belongs to it; to 10 kPa in "
         f"the chambers films take in half as much again; {AVERAGED}",
@@ -393,7 +396,11 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "time to 10 kPa, air, 2.5 l/min",
         paper.AIR_TIME,
-        float(seconds(three.value("volume of all chambers at full stroke"), paper.AIR_FLOW, 10)),
+        float(
+            seconds(
+                three.value("volume of all chambers at the reference stroke"), paper.AIR_FLOW, 10
+            )
+        ),
         "Eq. 4 over flow, squeezed to 10 kPa",
         "likely valves, tubing and the rise of the pump, which are not in the model; " + AVERAGED,
     )
@@ -420,7 +427,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "largest bend",
         paper.LARGEST_BEND,
-        three.value("bend with one chamber at full stroke, the others flat"),
+        three.value("bend with one chamber at the reference stroke, the others flat"),
         "constant curvature",
         "upper bound: one chamber is taken to be 17.5 long beside two flat ones",
     )

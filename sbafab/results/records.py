@@ -40,7 +40,13 @@ class Measurand(NamedTuple):
 
 NUMBERS = (
     Measurand("burst_kpa", "kPa", 10_000, "burst", "Pressure at which it burst."),
-    Measurand("stroke_mm", "mm", 10_000, "stroke", "Full stroke, as `predict` says it."),
+    Measurand(
+        "stroke_mm",
+        "mm",
+        10_000,
+        "stroke",
+        "Stroke when full, beside the reference stroke.",
+    ),
     Measurand("force_n", "N", 10_000, "force", "Blocked force at 100 kPa, flat."),
     Measurand("height_mm", "mm", 10_000, "height", "Height after pressing, deflated."),
     Measurand("mass_g", "g", 100_000, "mass", "Mass without tubes."),
@@ -181,7 +187,7 @@ def check_number(quantity: Measurand, value: float, place: str, least: str) -> N
 
 
 FIGURES = {
-    "stroke_mm": ("full stroke", ""),
+    "stroke_mm": ("reference stroke", ""),
     "force_n": ("blocked force at 100 kPa, flat", ""),
     "height_mm": ("deflated height", ""),
     "mass_g": ("mass", ""),

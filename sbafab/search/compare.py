@@ -38,7 +38,7 @@ PRESSURES = (10.0,)
 FOLDER, PAGE = "compare", "compare.html"
 TEMPLATE = "compare.html.j2"
 MAIN = re.compile(
-    r"(outline|overall|reached) diameter|deflated height|mass|free stroke at .*|full stroke"
+    r"(outline|overall|reached) diameter|deflated height|mass|free stroke at .*|reference stroke"
     r"|bend at .* in one chamber, .*|blocked force at .*, flat|time to .* at the pump, water .*"
     r"|lateral tip stiffness .*, chambers shut"
 )

@@ -152,16 +152,6 @@ class FoundDesign:
                 intervals[quantity.label] = interval
         return intervals
 
-    @property
-    def full_stroke(self) -> float | None:
-        """The full stroke of the best design in mm, as ``predict`` has it; None for drawn ones."""
-        if self.best.laminate is None:
-            return None
-        try:
-            return self._subject.full_stroke
-        except DesignError:
-            return None
-
     @cached_property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
@@ -216,7 +206,7 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
         quantity = requirement.quantity
         is_exact = quantity.key is not None or quantity.name in AS_DRAWN
         if not is_exact and group_of(quantity, design.form) is None:
-            instead = "; ask for stroke@10kPa" if quantity.is_full_stroke else ""
+            instead = "; ask for stroke@10kPa" if quantity.name == "reference_stroke" else ""
             raise DesignError(
                 f"sure = {sure:g}: no calibrated model gives {quantity.label} of {design.name}, so "
                 f"that its probability is not known{instead or '; leave sure out'}"

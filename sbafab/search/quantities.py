@@ -1,9 +1,8 @@
 """Quantities of requirements: sizes, mass, yield, stroke, bend, force, stiffness, time, and a
 design's keys.
 
-Each is the figure that ``predict`` has, from the same function: a stroke without a pressure is its
-full stroke, one at a pressure its free stroke; bends, forces, stiffness and times are those of the
-elastic stack.
+Each is the figure that ``predict`` has, from the same function: a stroke is its free stroke at a
+pressure; bends, forces, stiffness and times are those of the elastic stack.
 """
 
 from __future__ import annotations
@@ -11,12 +10,11 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.records import Design, Form, Slots, keys_of
@@ -24,20 +22,22 @@ from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, millimetres
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
-from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import SHARE
 from sbafab.models.elastic import (
     blocked_force,
     chamber_count,
+    free_rise,
+    held_stretch,
     moved_stack,
+    refuse_stretched,
     shut_stiffness,
     time_to_fill,
 )
 from sbafab.models.figures import Factors
 from sbafab.models.formulas import force, sizes
 from sbafab.models.intervals import DELAYS, GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
-from sbafab.models.kinematics import NO_OUTLINE, Actuator, actuator
+from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import (
@@ -50,7 +50,6 @@ from sbafab.models.paper import (
 )
 from sbafab.models.paper import STACK as ELASTIC_STACK
 from sbafab.models.pneumatics import seconds
-from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import Stack, stack
 
 
@@ -79,8 +78,8 @@ QUANTITIES = (
     QuantityName("lumen", "mm", "diameter of the lumen"),
     QuantityName("mass", "g", "of the films"),
     QuantityName("yield", "", "share of builds that hold, 0.95 or 95%"),
-    QuantityName("stroke", "mm", "full stroke: the paper's, in proportion"),
     QuantityName("stroke@P", "mm", "free stroke at P kPa, elastic balloon"),
+    QuantityName("reference_stroke", "mm", "what the paper measured, scaled"),
     QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P"),
     QuantityName("force@H@P", "N", "blocked at the stroke H mm, at P kPa"),
     QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
@@ -93,7 +92,7 @@ QUANTITIES = (
     QuantityName("slip@P", "N", "that makes jammed sheets slip"),
     QuantityName("push@P", "N", "of a drawn pouch on a plate, at most"),
 )
-"""In the order of the help; names that stand twice take a pressure or none."""
+"""In the order of the help."""
 
 
 def quantity_lines() -> str:
@@ -106,8 +105,6 @@ def quantity_lines() -> str:
     return "\n".join([*rows, f"{'KEY':{width}}  {'':4}  any key of the design, chamber.diameter"])
 
 
-SHARES = np.linspace(0.1, 1.0, 10)
-"""Of the pressure asked for: tried until the film would be longer than MOST_STRETCH."""
 USUAL_KPA = 10.0
 _PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
@@ -151,11 +148,6 @@ class RequestedQuantity:
     stroke: float | None = None
     chambers: int = 1
     flow: float | None = None
-
-    @property
-    def is_full_stroke(self) -> bool:
-        """True for the stroke without a pressure."""
-        return self.name == "stroke" and self.kpa is None
 
     @property
     def label(self) -> str:
@@ -229,8 +221,6 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
         raise DesignError(
             f"{shown(text)}: a force needs a stroke, and only a force takes one; {HOW}"
         )
-    if pressure is None and name == "stroke":
-        return RequestedQuantity(name, AT_PRESSURE[name])
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
@@ -350,20 +340,20 @@ class Subject:
 
     def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
-        if quantity.name == "yield":
-            return share_of_good()
         if quantity.name in ASKED:
             mechanism, kpa = self.design.form.mechanism, quantity.kpa or USUAL_KPA
             return mechanism_value(mechanism, self.laminate, quantity.name, kpa)
         if quantity.name in AT_PRESSURE:
             return self._moved(quantity)
-        if quantity.name == "time":
-            time, _ = time_to_fill(self._stack, quantity.flow or WATER_FLOW, FULL_KPA)
-            return time + self.factors.water_delay
-        if quantity.name == "mass":
-            return film_mass(self.laminate)
-        if quantity.name == "height":
-            return self._actuator.thickness
+        by_name: Mapping[str, Callable[[], float]] = {
+            "yield": share_of_good,
+            "mass": lambda: film_mass(self.laminate),
+            "height": lambda: self._actuator.thickness,
+            "reference_stroke": lambda: self._actuator.known_stroke,
+            "time": lambda: self._time(quantity.flow or WATER_FLOW),
+        }
+        if quantity.name in by_name:
+            return by_name[quantity.name]()
         value: Any = self._sizes.get(quantity.name)
         if quantity.name == "lumen":
             value = self.design.form.lumen
@@ -373,11 +363,13 @@ class Subject:
             return float(value)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
 
+    def _time(self, flow_ml_min: float) -> float:
+        time, _ = time_to_fill(self._stack, flow_ml_min, FULL_KPA)
+        return time + self.factors.water_delay
+
     def _moved(self, quantity: RequestedQuantity) -> float:
         """Return a stroke, bend, lateral stiffness or force."""
-        kpa = quantity.kpa
-        if kpa is None:
-            return self.full_stroke
+        kpa = USUAL_KPA if quantity.kpa is None else quantity.kpa
         if quantity.name == "stroke":
             return self._stroke(kpa)
         if quantity.name == "bend":
@@ -438,16 +430,9 @@ class Subject:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
 
-    @property
-    def full_stroke(self) -> float:
-        """Full stroke as in ``predict``, mm. Raises DesignError where no model has one."""
-        if not self._actuator.kinematics:
-            raise DesignError(NO_OUTLINE)
-        return self._actuator.full_stroke
-
     def _stroke(self, kpa: float) -> float:
         if isinstance(self.design.form.pockets, Slots):
-            return self.full_stroke
+            return self._actuator.known_stroke
         kinds = balloons_of(self.design, self.laminate, self.factors)
         return sum(kinds.count(kind) * free_height(kind, kpa) for kind in dict.fromkeys(kinds))
 
@@ -477,7 +462,7 @@ class Subject:
             # How far it is from getting there, in the force of so much of it.
             least = min(kind.pocket for kind in kinds)
             return -kpa / 1000 * math.pi * least**2 * max(stroke / max(free, 1e-6) - 1, 0.0)
-        _refuse_stretched(kinds, kpa, stroke)
+        refuse_stretched(float(held_stretch(kinds, [kpa], [stroke])[0]))
         return form.pushing * push
 
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
@@ -505,9 +490,9 @@ class Subject:
         if quantity.name in names:
             return names[quantity.name], ELASTIC_STACK
         # Of the three heights at which forces were measured the nearest.
-        share = (quantity.stroke or 0.0) / self.full_stroke
+        share = (quantity.stroke or 0.0) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))
-        where = f"at {100 * near:g} % of full stroke" if near else "flat"
+        where = f"at {100 * near:g} % of the reference stroke" if near else "flat"
         return f"blocked force {at}, {where}", ELASTIC_STACK
 
 
@@ -518,35 +503,15 @@ def group_of(quantity: RequestedQuantity, form: Form) -> str | None:
     if quantity.name in ASKED:
         return None
     is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
-    if not is_moved or quantity.is_full_stroke or isinstance(form.pockets, Slots):
+    if not is_moved or isinstance(form.pockets, Slots):
         return None
     return GROUP_BY_UNIT.get(quantity.unit, "motion")
 
 
 @lru_cache(maxsize=4096)
 def free_height(kind: Balloon, kpa: float) -> float:
-    """By how many mm a balloon rises: at the pressure, or at the most that its film stands.
-
-    The latter is less than it would rise by.
-    """
-    shape = free_shapes(kind, [kpa])
-    if float(stretch(kind, shape)[0]) <= MOST_STRETCH:
-        return float(shape.height[0])
-    shapes = free_shapes(kind, SHARES * kpa)
-    return float(np.interp(MOST_STRETCH, stretch(kind, shapes), shapes.height))
-
-
-def _refuse_stretched(kinds: Sequence[Balloon], kpa: float, stroke: float) -> None:
-    """Raises DesignError where a film would be stretched too far at a stroke in mm."""
-    for kind in dict.fromkeys(kinds):
-        height = stroke * kind.pocket / sum(balloon.pocket for balloon in kinds)
-        longer = float(stretch(kind, compressed_shapes(kind, [kpa], [max(height, 1e-3)]))[0])
-        if longer > MOST_STRETCH:
-            raise DesignError(
-                f"at {kpa:g} kPa and a rise of {height:.3g} mm a balloon's film would be "
-                f"{100 * longer:.0f} % longer, and one modulus is unlikely to hold beyond "
-                f"{100 * MOST_STRETCH:g} %"
-            )
+    """By how many mm a balloon rises. Raises BeyondError where its film does not stand it."""
+    return free_rise(Counter([kind]), kpa).stroke
 
 
 def refuse_unknown_key(quantity: RequestedQuantity, design: Design) -> None:

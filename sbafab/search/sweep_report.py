@@ -53,7 +53,7 @@ FIRST = (
     "reached diameter",
     "deflated height",
     "mass",
-    "full stroke",
+    "reference stroke",
 )
 """Figures that are looked for first, whatever the pressure."""
 MOVED = ("free stroke", "bend", "blocked force", "blocked force of one SBA")
@@ -534,12 +534,12 @@ def _objectives(table: Table) -> list[Objective]:
     objectives = [
         Objective(name, _label(name), more) for name, more in INTRODUCTION if name in names
     ]
-    strokes = [name for name in names if name.startswith(("free stroke", "full stroke"))]
+    strokes = [name for name in names if name.startswith(("free stroke", "reference stroke"))]
     flat = [n for n in names if n.startswith("blocked force") and ", flat" in n]
     # Of the highest pressure, which comes last.
     highest = flat[-1].split(", ")[0] if flat else ""
     forces = _designed_with([name for name in flat if name.startswith(f"{highest}, ")])
-    for group in (sorted(strokes, key=lambda name: name.startswith("full")), forces):
+    for group in (sorted(strokes, key=lambda name: name.startswith("reference")), forces):
         if group:
             objectives.append(Objective(group[0], _label(group[0]), True))
     return [*objectives, GOOD_BUILDS] if YIELD[0] in names else objectives

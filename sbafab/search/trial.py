@@ -10,7 +10,7 @@ from typing import Any
 from sbafab.actuators import build
 from sbafab.design.files import shown
 from sbafab.design.records import Design, Free, keys_of
-from sbafab.errors import DesignError, GeometryError
+from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.mechanisms import ASKED
 from sbafab.models.paper import WATER_FLOW
@@ -75,7 +75,7 @@ class Goal:
 
 
 GOOD_IF_MORE = (
-    *("stroke", "bend", "force", "lateral_stiffness", "yield", "lumen"),
+    *("stroke", "reference_stroke", "bend", "force", "lateral_stiffness", "yield", "lumen"),
     *ASKED,
 )
 """Of these as much as can be is best, of all others as little."""
@@ -86,8 +86,8 @@ def read_all(
 ) -> tuple[tuple[Requirement, ...], Goal]:
     """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A bend, force or stiffness without a pressure is one at the highest that any of them names; a
-    stroke without one is the full stroke, a time without a flow is at ``flow_ml_min``.
+    A quantity at a pressure that names none is one at the highest that any of them names, a time
+    without a flow is at ``flow_ml_min``.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     kpa = named_pressure([text.partition("=")[0] for text, _ in pairs] + [best])
@@ -132,7 +132,8 @@ def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
-"""By how much a design that cannot be made misses: by more than any that can."""
+"""By how much a design that cannot be made misses: by more than any that can, and by the excess
+where its film would not stand what it is asked for."""
 GridPoint = tuple[int, ...]
 """A design by the step at which each free key stands."""
 
@@ -230,7 +231,8 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
         intervals = {} if problem.sure is None else _intervals(problem, subject, problem.sure)
     except (DesignError, GeometryError) as error:
         message = " ".join(str(error).split())
-        return Trial(values, missed=IMPOSSIBLE, refused=message)
+        excess = error.excess if isinstance(error, BeyondError) else 0.0
+        return Trial(values, missed=IMPOSSIBLE + excess, refused=message)
     missed = sum(
         -min(0.0, requirement.margin(judged(requirement, figures, intervals)) + CLOSE)
         for requirement in problem.requirements

@@ -141,8 +141,8 @@ def test_a_figure_of_two_models_wants_one_named() -> None:
     with pytest.raises(KeyError, match=r"given by .*Eq\. 4.*Eqs\. 1-3.*name one"):
         found.value("largest volume a balloon")
     assert found.value("largest volume a balloon", "Eqs. 1-3") == pytest.approx(16.95, abs=0.01)
-    with pytest.raises(KeyError, match="did you mean 'full stroke'"):
-        found.value("full strok")
+    with pytest.raises(KeyError, match="did you mean 'reference stroke'"):
+        found.value("referenc stroke")
 
 
 def test_cut_press_and_nest_write_their_parts(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def _table_reads_well(out: str) -> None:
     ]
     first, second = (" ".join(lines[heads[1] + row].split()) for row in (1, 2))
     assert first == "blocked force at 10 kPa, flat 0.3927 N"
-    assert second.startswith("at 25 % of full stroke")
+    assert second.startswith("at 25 % of the reference stroke")
     # Above the heading of other models each quantity stands once.
     others = lines.index("Alternative models: design with the figures above")
     assert heads[0] < others < heads[1]
@@ -99,7 +99,7 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
         ["1dof-5mm", "-o", str(tmp_path / "a"), "--set", "stack.balloons=3"], capsys
     )
     assert code == 2
-    assert "full stroke" in out
+    assert "reference stroke" in out
     assert "press.json" in err
     assert "predict.json" not in err
 
@@ -110,7 +110,7 @@ def test_failing_design_is_predicted_but_not_written(
     arguments = ["1dof-5mm", "--set", "bond.width=0.6", "-o", str(tmp_path)]
     code, out, err = run(arguments, capsys)
     assert code == 1
-    assert "full stroke" in out
+    assert "reference stroke" in out
     assert "bond-width" in err
     assert "no prediction was written" in err
     assert not (tmp_path / "1dof-5mm" / "predict.json").exists()

@@ -77,7 +77,7 @@ def test_the_folder_holds_the_changed_design(
     reached = json.loads(out)["yield"]
     changed = {row["key"]: row["to"] for row in reached["changes"]}
     assert changed == {"registration.method": "ears"}
-    assert {row["name"] for row in reached["figures"]} >= {"outline diameter", "full stroke"}
+    assert {row["name"] for row in reached["figures"]} >= {"outline diameter", "reference stroke"}
     design = tmp_path / "1dof-5mm" / "design.toml"
     written = tomllib.loads(design.read_text(encoding="utf-8"))
     assert written["registration"]["method"] == "ears"

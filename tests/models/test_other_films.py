@@ -45,8 +45,13 @@ def test_what_needs_a_number_that_is_not_known_is_left_out_by_name() -> None:
     assert "films.tpe.modulus" in why["elastic stack"]
     assert "films.tpe.modulus" in why["free stroke, elastic balloon"]
     names = {figure.name for figure in found.figures}
-    assert not names & {"mass", "full stroke", "full height", "lateral tip stiffness, inflated"}
-    assert not any("full stroke" in name or "power density" in name for name in names)
+    assert not names & {
+        "mass",
+        "reference stroke",
+        "reference height",
+        "lateral tip stiffness, inflated",
+    }
+    assert not any("reference stroke" in name or "power density" in name for name in names)
     assert not any("elastic" in figure.model.name for figure in found.figures)
     # Geometry needs no film.
     assert "blocked force at 100 kPa, flat" in names
@@ -56,14 +61,14 @@ def test_what_the_paper_measured_of_its_film_holds_for_no_other() -> None:
     """17.5 mm of full height and the moduli of 35 and 60 kPa are those of Stretchlon 200."""
     found = predicted(*KNOWN, "films.tpe.density=1200", UNCALIBRATED)
     assert {name for name, why in left_out(found).items() if "own film" in why} == {
-        "full stroke, full height, and what is predicted at them",
-        "bend and tip displacement at full stroke, constant curvature",
+        "reference stroke and height, and what is predicted at them",
+        "bend and tip displacement at the reference stroke, constant curvature",
         "lateral tip stiffness, inflated",
     }
     drawn = [line.label for curve in found.relations for line in (*curve.lines, *curve.points)]
     assert not any("paper" in label for label in drawn)
     thicker = left_out(predict(_design("films.tpe.thickness=0.05"), quick=True))
-    assert "own film" in thicker["full stroke, full height, and what is predicted at them"]
+    assert "own film" in thicker["reference stroke and height, and what is predicted at them"]
 
 
 def test_the_elastic_balloon_takes_the_films_own_numbers() -> None:

@@ -23,7 +23,7 @@ def build(**changed: object) -> Build:
         "family": "lobed",
         "method": "channel-pin",
         "toml": "",
-        "predicted": {"stroke_mm": (17.5, "the paper's full height")},
+        "predicted": {"stroke_mm": (17.5, "the paper's height, scaled")},
         "tolerances": {"offset_mm": 0.2, "turn_deg": 1.0, "cut_mm": 0.1},
         "good_builds": (900, 1000),
         "actuator_sha256": changed.get("sha256", SHA),

@@ -79,7 +79,7 @@ def test_what_is_missed_by_a_few_designs_alone_ends_with_the_nearest() -> None:
     """Two of them: once they are tried, nothing is left to try."""
     found = sbafab.find(
         "1dof-5mm",
-        least={"stroke": 1000},
+        least={"stroke@10kPa": 1000},
         free=(Free("stack.balloons", 3, 4, 1),),
     )
     assert not found.holds
@@ -168,7 +168,7 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
         (["--max", "time=1", "--flow", "35 l"], "must be a flow"),
         (["--sure", "0.4"], "must be above 0.5 and below 1"),
         (["--sure", "90"], "must be a share from 0 to 1"),
-        (["--min", "stroke=5", "--sure", "0.9"], "ask for stroke@10kPa"),
+        (["--min", "reference_stroke=5", "--sure", "0.9"], "ask for stroke@10kPa"),
         (["--set", "models.calibration=none", "--sure", "0.9"], "needs a calibration"),
         (["--max", "mass=-1"], "must be at least 0"),
         (["--min", "yield=95"], "a share from 0 to 1"),
@@ -224,7 +224,17 @@ TAPER = ["--set", "chamber.diameter=[8, 7, 6]", "--set", "stack.balloons=3"]
 
 def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", *TAPER, "--min", "stroke=4", "--tries", "200", "-o", str(target)]
+    asked = [
+        "find",
+        "1dof-5mm",
+        *TAPER,
+        "--min",
+        "reference_stroke=4",
+        "--tries",
+        "200",
+        "-o",
+        str(target),
+    ]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 0, ended.output
     diameters: Any = sbafab.load(target).chamber.diameter  # type: ignore[attr-defined]
@@ -233,7 +243,7 @@ def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
     # Sec. 4.6: 17.5 mm of 15 balloons of d = 5; the largest diameter goes in steps of 0.1.
     stroke = 17.5 / 15 / 5 * sum(diameters)
     assert 4 <= stroke < 4 * (1 + 0.1 / first) + 0.01
-    assert f"stroke {stroke:.4g} mm; at least 4 mm" in ended.output
+    assert f"reference_stroke {stroke:.4g} mm; at least 4 mm" in ended.output
     refused = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "b"), *BALLOONS])
     assert refused.exit_code == 2
     assert "a search scales that list" in refused.output
@@ -246,17 +256,30 @@ BALLOONS = ["--free", "stack.balloons=2:4:1"]
 def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> None:
     """The elastic balloon rises by 20 mm where in proportion to what was measured it is 14."""
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--min", "stroke=20", "--max", "outline_diameter=8"]
+    asked = ["find", "1dof-5mm", "--min", "reference_stroke=20", "--max", "outline_diameter=8"]
     ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
     assert ended.exit_code == 0, ended.output
-    assert sbafab.predict(target).value("full stroke") >= 20
+    assert sbafab.predict(target).value("reference stroke") >= 20
     target.unlink()
     asked[3] = "stroke@10kPa=20"
     ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
     assert ended.exit_code == 0, repr(ended.exception) + ended.output
-    full = sbafab.predict(target).value("full stroke")
-    assert full < 20
-    assert f"full stroke {full:.4g} mm" in ended.output
+    assert sbafab.predict(target).value("reference stroke") < 20
+
+
+def test_find_refuses_what_predict_leaves_out() -> None:
+    """Another film has no reference stroke, and none rises where it would be 15 % longer."""
+    film = {"product": "TPU", "thickness": 0.1, "modulus": 20, "poisson": 0.45}
+    other = sbafab.load("3dof-15mm", films={"tpe": film})
+    wide = sbafab.load("1dof-10mm")
+    for design, text, name in (
+        (other, "reference_stroke", "reference stroke and height, and what is predicted at them"),
+        (wide, "stroke@100kPa", "free stroke at 100 kPa, elastic balloon"),
+    ):
+        told = {left.name: left.reason for left in sbafab.predict(design).left_out}
+        with pytest.raises(DesignError) as refused:
+            sbafab.find(design, least={text: 1}, tries=4, free=(Free("stack.balloons", 5, 6, 1),))
+        assert told[name] in str(refused.value)
 
 
 def test_the_help_lists_every_quantity_with_its_unit() -> None:

@@ -65,7 +65,7 @@ def test_a_table_opens_with_what_was_varied_asked_for_and_binding(
     assert len(every) > 100
     varied = [text.partition("=")[0] for text in VARY]
     assert first[4 : 4 + len(varied)] == varied
-    for asked in ("mass [g]", "full stroke [mm]", "free stroke at 10 kPa [mm]", "yield.low"):
+    for asked in ("mass [g]", "reference stroke [mm]", "free stroke at 10 kPa [mm]", "yield.low"):
         assert asked in first
     # A narrow bond fails bond-width, and the others have nothing to spare.
     assert {"bond-width.verdict", "bond-width.margin"} <= set(first)
