@@ -22,7 +22,7 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Return a function of ``sbafab.api``, which is loaded when first asked for one.
+    """Return what ``sbafab.api`` has of this name; it is loaded when first asked for.
 
     Loaded so and not by a statement, ``sbafab --help`` loads no geometry, and no circle of imports
     runs through this module.
@@ -31,9 +31,6 @@ def __getattr__(name: str) -> Any:
         from importlib import import_module
 
         api = import_module("sbafab.api")
-        functions = [public for public in api.__all__ if public.islower()]
-        if name == "__all__":
-            return functions
-        if name in functions:
+        if name == "__all__" or name in api.__all__:
             return getattr(api, name)
     raise AttributeError(f"module 'sbafab' has no attribute '{name}'")

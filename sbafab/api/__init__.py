@@ -6,8 +6,8 @@
 
 A design is given as a template's name, a TOML file, or a ``Design``. Keys are changed by texts,
 ``"stack.balloons=6"``, by dicts, ``{"stack.balloons": 6}``, or by keywords, ``stack={"balloons":
-6}``. Bad input raises ``sbafab.errors.DesignError``, a folder that cannot be written
-``OutputError``, each with one sentence.
+6}``. Bad input raises ``sbafab.DesignError``, a folder that cannot be written
+``sbafab.errors.OutputError``, each with one sentence.
 """
 
 from __future__ import annotations
@@ -36,9 +36,19 @@ if TYPE_CHECKING:
     from sbafab.api.predictions import grip, motion, predict, predict_assembly, stack
     from sbafab.api.runs import cut, generate, import_design, mesh, nest, press, simulate
     from sbafab.api.search import compare, find, reach_yield, sweep
+    from sbafab.design.records import Design
+    from sbafab.errors import DesignError
+    from sbafab.laminate.laminate import Laminate
+    from sbafab.models.stack_batch import StackBatch
+    from sbafab.rules.finding import Findings
 
 __all__ = [
+    "Design",
+    "DesignError",
+    "Findings",
+    "Laminate",
     "Source",
+    "StackBatch",
     "assemble",
     "build",
     "check",
@@ -79,14 +89,16 @@ __all__ = [
 ]
 
 MODULES = {
-    "checks": ("check", "check_folder", "checking", "nets_of"),
-    "lab": ("kerf", "record", "record_history", "record_sheet", "report"),
-    "predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
-    "runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
-    "search": ("compare", "find", "reach_yield", "sweep"),
+    "api.checks": ("check", "check_folder", "checking", "nets_of"),
+    "api.lab": ("kerf", "record", "record_history", "record_sheet", "report"),
+    "api.predictions": ("grip", "motion", "predict", "predict_assembly", "stack"),
+    "api.runs": ("cut", "generate", "import_design", "mesh", "nest", "press", "simulate"),
+    "api.search": ("compare", "find", "reach_yield", "sweep"),
+    "models.stack_batch": ("StackBatch",),
+    "rules.finding": ("Findings",),
 }
-"""The functions by their module, which is loaded when first asked for one of them; ``designs`` has
-the rest.
+"""Functions and records by their module, which is loaded when first asked for one of them;
+``api.designs`` has the rest.
 
 So a script that builds laminates loads no model, and a page that runs Python in a browser may lack
 numpy.
@@ -98,9 +110,9 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Return a function from the module that has it."""
+    """Return a function or a record from the module that has it."""
     if name not in __all__:
         raise AttributeError(f"module 'sbafab.api' has no attribute '{name}'")
-    home = next((module for module, names in MODULES.items() if name in names), "designs")
-    value = globals()[name] = getattr(import_module(f"sbafab.api.{home}"), name)
+    home = next((module for module, names in MODULES.items() if name in names), "api.designs")
+    value = globals()[name] = getattr(import_module(f"sbafab.{home}"), name)
     return value

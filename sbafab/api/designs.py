@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from inspect import signature
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar, overload
 
 from sbafab import actuators
+from sbafab.actuators.drawn import DrawnDesign
+from sbafab.actuators.lobed import LobedDesign
+from sbafab.actuators.one_dof import OneDofDesign
+from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.build import assemble as put_together
 from sbafab.assemblies.files import load as load_either
@@ -17,9 +23,10 @@ from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import bent_surface
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
-from sbafab.design.files import Change, template_names, template_text
+from sbafab.design.files import Change, as_in_a_file, shown, template_names, template_text
 from sbafab.design.records import Design
 from sbafab.design.records import resolved as written_out
+from sbafab.errors import DesignError
 from sbafab.laminate import laminate_file
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.solid import solid as surface_of
@@ -32,6 +39,41 @@ if TYPE_CHECKING:
 
 Source = Design | str | Path
 """A design: itself, a template's name, or a TOML file."""
+AnyDesign = TypeVar("AnyDesign", bound=Design)
+Arguments = ParamSpec("Arguments")
+Returned = TypeVar("Returned")
+
+
+def suggesting(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+    """Return a function that takes tables of a design as keywords, and that names the argument
+    which a misspelt keyword is most like. Raises DesignError.
+    """
+    arguments = list(signature(function).parameters)
+
+    @wraps(function)
+    def call(*args: Arguments.args, **keywords: Arguments.kwargs) -> Returned:
+        for name in keywords.keys() - set(arguments):
+            near = difflib.get_close_matches(name, arguments, 1, 0.7)
+            tables = near and {*Assembly.model_fields}.union(
+                *(record.model_fields for record in actuators.records().values())
+            )
+            if near and name not in tables:
+                raise DesignError(
+                    f"{name} is neither an argument of {function.__name__} nor a table of a "
+                    f"design; did you mean {near[0]}?"
+                )
+        return function(*args, **keywords)
+
+    return call
+
+
+def numbers(name: str, values: float | Sequence[float]) -> tuple[float, ...]:
+    """Return one number or several as a tuple. Raises DesignError."""
+    plain = as_in_a_file(values)
+    try:
+        return tuple(map(float, plain if isinstance(plain, list) else [plain]))
+    except (TypeError, ValueError):
+        raise DesignError(f"{name} = {shown(values)} must be a number or a list of them") from None
 
 
 def design_of(source: Source, changes: Sequence[Change], tables: Mapping[str, Any]) -> Design:
@@ -52,15 +94,6 @@ def either_of(
     return load_either(source, [*changes, tables])
 
 
-def parted(options: Mapping[str, Any], record: type) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Split keywords into fields of the record and tables of a design."""
-    names = {field.name for field in fields(record)}
-    return (
-        {name: value for name, value in options.items() if name in names},
-        {name: value for name, value in options.items() if name not in names},
-    )
-
-
 def templates() -> list[str]:
     """Return the names of the designs and assemblies that ship, in alphabetical order."""
     return template_names()
@@ -76,11 +109,31 @@ def schema() -> dict[str, Any]:
     return actuators.schema(Assembly)
 
 
+@overload
+def load(source: AnyDesign, *changes: Change, **tables: Any) -> AnyDesign: ...
+@overload
+def load(
+    source: Literal["1dof-5mm", "1dof-10mm"], *changes: Change, **tables: Any
+) -> OneDofDesign: ...
+@overload
+def load(source: Literal["3dof-15mm"], *changes: Change, **tables: Any) -> LobedDesign: ...
+@overload
+def load(source: Literal["radial-15mm"], *changes: Change, **tables: Any) -> RadialDesign: ...
+@overload
+def load(
+    source: Literal["array", "diode", "finger", "folded", "gripper", "pouch", "truss", "vacuum"],
+    *changes: Change,
+    **tables: Any,
+) -> DrawnDesign: ...
+@overload
+def load(source: str | Path, *changes: Change, **tables: Any) -> Design: ...
 def load(source: Source, *changes: Change, **tables: Any) -> Design:
     """Return a design, with keys changed and checked like those of a file.
 
-    Lengths are mm, or texts with a unit such as ``"0.75 mm"`` and ``"6 in"``. Raises DesignError
-    with field, value and what is allowed.
+    Lengths are mm, or texts with a unit such as ``"0.75 mm"`` and ``"6 in"``. A type checker knows
+    the family of a template, and so ``load("3dof-15mm").chamber.diameter``; that of a file is told
+    by ``typing.cast(LobedDesign, load("my.toml"))``, with ``LobedDesign`` of
+    ``sbafab.actuators.lobed``. Raises DesignError with field, value and what is allowed.
     """
     return design_of(source, changes, tables)
 

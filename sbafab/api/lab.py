@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source
+from sbafab.api.designs import Source, suggesting
 from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
 from sbafab.design.files import Change
 from sbafab.reports.traveller.record_sheet import RecordTable
@@ -32,6 +32,7 @@ def kerf(
     return calibrated(read_measurements(Path(measurements), instrument), resolution)
 
 
+@suggesting
 def record(
     source: Source,
     *changes: Change,

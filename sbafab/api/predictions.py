@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, assemble, load, parted
+from sbafab.api.designs import Source, assemble, load, numbers, suggesting
 from sbafab.assemblies.build import Assembled, PlacedSba
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
-from sbafab.models.figures import Factors, Prediction, PredictionRequest
+from sbafab.models.figures import Prediction, PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import FLUIDS, Line
 from sbafab.models.prediction import predict as predict_design
-from sbafab.models.stack import Motion, Stack
+from sbafab.models.stack import MOST_PRESSURE, Motion, Stack
 from sbafab.models.stack import stack as stack_of
 from sbafab.reports.assembly_prediction import AssemblyPrediction, Grip
 from sbafab.reports.assembly_prediction import grip as grip_of
@@ -25,35 +25,47 @@ from sbafab.reports.assembly_prediction import predict_assembly as predict_assem
 from sbafab.reports.inflated import gripping
 
 
+@suggesting
 def predict(
     source: Source,
     *changes: Change,
-    pressures_kpa: Sequence[float] = (10.0, 100.0),
-    flow_ml_min: float = 35.0,
-    volumes_ul: Sequence[float] = (),
+    pressures_kpa: float | Sequence[float] = PredictionRequest.pressures_kpa,
+    flow_ml_min: float = PredictionRequest.flow_ml_min,
+    volumes_ul: float | Sequence[float] = PredictionRequest.volumes_ul,
+    press_factor: float | None = None,
+    contact_factor: float | None = None,
+    pocket_loss: float | None = None,
+    modulus_mpa: float | None = None,
     quick: bool = False,
     laminate: Laminate | None = None,
-    **options: Any,
+    **tables: Any,
 ) -> Prediction:
     """Predict what a design will do; each figure has a unit and names its model and its trust.
 
     Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
-    ``options`` holds the user's own values in place of the calibration's, by field of ``Factors``:
-    ``press_factor``, ``contact_factor``, ``pocket_loss`` mm and ``modulus_mpa``, beside tables of
-    the design, such as ``models={"calibration": "none"}``. Figures of calibrated models have a 90 %
-    ``interval``. Raises DesignError for what is out of every
-    model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of axisymmetric film
-    in balance.
+    The user's own ``press_factor`` and ``contact_factor`` (ratios), ``pocket_loss`` in mm and
+    ``modulus_mpa`` take the place of the calibration's. ``tables`` are those of the design, such as
+    ``models={"calibration": "none"}``. Figures of calibrated models have a 90 % ``interval``.
+    Raises DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec.
+    3), and elastic balloons of axisymmetric film in balance.
     """
-    factors, tables = parted(options, Factors)
-    wish = PredictionRequest(
-        tuple(pressures_kpa), flow_ml_min, tuple(volumes_ul), overrides=factors
+    request = PredictionRequest(
+        numbers("pressures_kpa", pressures_kpa),
+        flow_ml_min,
+        numbers("volumes_ul", volumes_ul),
+        overrides={
+            "press_factor": press_factor,
+            "contact_factor": contact_factor,
+            "pocket_loss": pocket_loss,
+            "modulus_mpa": modulus_mpa,
+        },
     )
-    return predict_design(load(source, *changes, **tables), wish, laminate, quick)
+    return predict_design(load(source, *changes, **tables), request, laminate, quick)
 
 
+@suggesting
 def predict_assembly(
     source: str | Path | Assembly | Assembled,
     *changes: Change,
@@ -90,16 +102,26 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     return outcome, gripping(placed, outcome.room or free)
 
 
-def stack(source: Source, *changes: Change, most_pressure: float = 110.0, **options: Any) -> Stack:
+@suggesting
+def stack(
+    source: Source,
+    *changes: Change,
+    most_pressure: float = MOST_PRESSURE,
+    press_factor: float | None = None,
+    pocket_loss: float | None = None,
+    modulus_mpa: float | None = None,
+    **tables: Any,
+) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
-    ``most_pressure`` kPa is the most that it may be asked for; ``options`` holds fields of
-    ``Factors`` beside tables of the design. Raises DesignError for pockets that are not round.
-    Balloons lengthen and tilt and carry no shear (paper, Sec. 4.4).
+    ``most_pressure`` kPa is the most that it may be asked for. The user's own ``press_factor`` (a
+    ratio), ``pocket_loss`` in mm and ``modulus_mpa`` take the place of the calibration's;
+    ``tables`` are those of the design. Raises DesignError for pockets that are not round. Balloons
+    lengthen and tilt and carry no shear (paper, Sec. 4.4).
     """
-    factors, tables = parted(options, Factors)
     design = load(source, *changes, **tables)
-    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, factors))
+    own = {"press_factor": press_factor, "pocket_loss": pocket_loss, "modulus_mpa": modulus_mpa}
+    return stack_of(design, most_pressure=most_pressure, factors=factors_of(design, own))
 
 
 def motion(

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, either_of, load, parted
+from sbafab.api.designs import Source, either_of, load, suggesting
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import Change
 from sbafab.design.records import Design
 from sbafab.importing.sources import import_source
 from sbafab.importing.write import default_file, write_imported
-from sbafab.meshing.conforming.layup import MeshSettings
+from sbafab.meshing.conforming.layup import Element, MeshSettings, Symmetry
 from sbafab.process import Progress
 from sbafab.runs.run import Conforming, Run, RunRequest, Simulated
 from sbafab.runs.run import generate as run
@@ -39,6 +39,7 @@ def import_design(source: str | Path, out: str | Path | None = None) -> Design:
     return design
 
 
+@suggesting
 def generate(
     source: Source | Assembly,
     *changes: Change,
@@ -55,6 +56,7 @@ def generate(
     return run(RunRequest(either_of(source, changes, tables), Path(out)), progress)
 
 
+@suggesting
 def cut(
     source: Source,
     *changes: Change,
@@ -75,6 +77,7 @@ def cut(
     return run(RunRequest(design, Path(out), ("cut",), curves), progress)
 
 
+@suggesting
 def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
     """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
 
@@ -84,23 +87,31 @@ def press(source: Source, *changes: Change, out: str | Path = "out", **tables: A
     return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)))
 
 
+@suggesting
 def mesh(
     source: Source,
     *changes: Change,
     out: str | Path = "out",
-    formats: Sequence[str] = ("vtu",),
-    **options: Any,
+    formats: str | Sequence[str] = ("vtu",),
+    h: float = MeshSettings.h,
+    element: Element = MeshSettings.element,
+    symmetry: Symmetry = MeshSettings.symmetry,
+    fill_ul: float | Mapping[str, float] | None = MeshSettings.fill_ul,
+    gaps: bool = MeshSettings.gaps,
+    wrapped: bool = MeshSettings.wrapped,
+    **tables: Any,
 ) -> Run:
     """Writes solid, cavities and conforming meshes; the latter stand in the run's ``conforming``.
 
-    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``options`` holds
-    fields of ``MeshSettings``, such as ``h`` mm, ``symmetry`` and ``fill_ul``, beside tables of the
-    design. Takes the extra "mesh". Raises DesignError and OutputError.
+    ``formats`` are of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``h`` mm and all after it
+    are the fields of ``MeshSettings``; ``tables`` are those of the design. Takes the extra "mesh".
+    Raises DesignError and OutputError.
     """
-    settings, tables = parted(options, MeshSettings)
-    conforming = Conforming(MeshSettings(**settings), tuple(formats))
+    settings = MeshSettings(h, element, symmetry, fill_ul, gaps, wrapped)
+    each = (formats,) if isinstance(formats, str) else tuple(formats)
     design = load(source, *changes, **tables)
-    return run(RunRequest(design, Path(out), ("mesh",), conforming=conforming))
+    request = RunRequest(design, Path(out), ("mesh",), conforming=Conforming(settings, each))
+    return run(request)
 
 
 def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") -> Run:
@@ -111,21 +122,33 @@ def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") 
     return run(RunRequest([load(source) for source in sources], Path(out), name=name))
 
 
+@suggesting
 def simulate(
     source: Source,
     *changes: Change,
     simulator: Name,
     out: str | Path = "out",
     export: bool = False,
-    **options: Any,
+    pressure: float | None = None,
+    chambers: Mapping[str, float] | None = None,
+    minutes: float = SimulationRequest.minutes,
+    h: float | None = None,
+    symmetry: str | None = None,
+    procedure: str | None = None,
+    scene: str | None = None,
+    seconds: float | None = None,
+    volumes: Mapping[str, float] | None = None,
+    **tables: Any,
 ) -> Simulated:
     """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
 
-    ``simulator`` is "calculix", "sofa" or "mujoco". ``options`` holds fields of ``Wish``, such as
-    ``pressure`` kPa, ``chambers`` kPa by name and ``minutes``, beside tables of the design.
-    ``export`` writes what it reads and runs nothing. Raises DesignError for what it cannot do, and
-    OutputError.
+    ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes what it reads and runs
+    nothing. ``pressure`` kPa, ``chambers`` kPa by name and all after them are the fields of
+    ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul by chamber;
+    ``tables`` are those of the design. Raises DesignError for what it cannot do, and OutputError.
     """
-    wish, tables = parted(options, SimulationRequest)
+    request = SimulationRequest(
+        pressure, chambers or {}, minutes, h, symmetry, procedure, scene, seconds, volumes or {}
+    )
     design = load(source, *changes, **tables)
-    return run_simulator(design, simulator, SimulationRequest(**wish), Path(out), export=export)
+    return run_simulator(design, simulator, request, Path(out), export=export)

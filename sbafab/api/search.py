@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, load, parted
-from sbafab.design.files import Change, changed_keys
-from sbafab.design.records import Design
+from sbafab.api.designs import Source, load, numbers, suggesting
+from sbafab.design.files import Change, as_in_a_file, changed_keys
+from sbafab.design.records import Design, Free
 from sbafab.search.compare import PRESSURES, DesignComparison, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
 from sbafab.search.find import FindRequest, FoundDesign
@@ -18,34 +18,43 @@ from sbafab.search.sweep import sweep as run_sweep
 from sbafab.search.target_yield import ReachedYield
 from sbafab.search.target_yield import reach_yield as run_reach_yield
 from sbafab.search.trial import read_all
-from sbafab.search.vary import read_varied
+from sbafab.search.vary import varied_keys
 
 
+@suggesting
 def find(
     source: Source,
     *changes: Change,
-    least: Mapping[str, float] | None = None,
-    most: Mapping[str, float] | None = None,
+    least: Mapping[str, float | str] | None = None,
+    most: Mapping[str, float | str] | None = None,
     best: str = "mass",
     flow_ml_min: float = 35.0,
-    **options: Any,
+    free: Sequence[Free] | None = None,
+    tries: int = FindRequest.tries,
+    optuna: bool = False,
+    storage: str | None = None,
+    sure: float | None = None,
+    **tables: Any,
 ) -> FoundDesign:
     """The design that meets requirements and is best in one thing, or the nearest miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
-    20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, a ``time`` is with
-    water at ``flow_ml_min``. ``options`` holds fields of ``FindRequest``, such as ``tries``, or
-    ``sure=0.9`` for requirements that must hold with that probability, beside tables of the design;
-    ``found.best.values`` are the found keys, ``found.intervals`` the 90 % intervals. Raises
-    DesignError for a quantity that it does not know, with those it does.
+    20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, or texts with a unit;
+    a ``time`` is with water at ``flow_ml_min``. ``free`` and all after it are the fields of
+    ``FindRequest``, such as ``sure``, a share that is the probability of each requirement;
+    ``tables`` are those of the design. ``found.best.values`` are the found keys,
+    ``found.intervals`` the 90 % intervals. Raises DesignError for a quantity that it does not know,
+    with those it does.
     """
-    settings, tables = parted(options, FindRequest)
-    at_least = [f"{name}={value!r}" for name, value in (least or {}).items()]
-    at_most = [f"{name}={value!r}" for name, value in (most or {}).items()]
+    at_least = [f"{name}={as_in_a_file(value)}" for name, value in (least or {}).items()]
+    at_most = [f"{name}={as_in_a_file(value)}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
-    return run_find(FindRequest(load(source, *changes, **tables), requirements, goal, **settings))
+    design = load(source, *changes, **tables)
+    keys = None if free is None else tuple(free)
+    return run_find(FindRequest(design, requirements, goal, keys, tries, optuna, storage, sure))
 
 
+@suggesting
 def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> ReachedYield:
     """The design changed as little as a yield needs, and what that costs.
 
@@ -63,7 +72,7 @@ def compare(
     first: Source,
     second: Source,
     *,
-    pressures_kpa: Sequence[float] = PRESSURES,
+    pressures_kpa: float | Sequence[float] = PRESSURES,
     flow_ml_min: float = 35.0,
     out: str | Path | None = None,
 ) -> DesignComparison:
@@ -82,28 +91,50 @@ def compare(
         source.name if isinstance(source, Design) else str(source) for source in (first, second)
     ]
     comparison = run_compare(
-        designs[0], designs[1], (names[0], names[1]), pressures_kpa, flow_ml_min
+        designs[0],
+        designs[1],
+        (names[0], names[1]),
+        numbers("pressures_kpa", pressures_kpa),
+        flow_ml_min,
     )
     if out is not None:
         write_page(comparison, Path(out))
     return comparison
 
 
+@suggesting
 def sweep(
     source: Source,
     *changes: Change,
-    vary: Sequence[str],
+    vary: Mapping[str, str | Iterable[Any]] | Sequence[str],
     out: str | Path = "out",
-    **options: Any,
+    samples: int | None = None,
+    seed: int = 0,
+    pressures_kpa: float | Sequence[float] = SweepRequest.pressures_kpa,
+    workers: int | None = None,
+    dask: str | None = None,
+    seconds: float = SweepRequest.seconds,
+    all_columns: bool = False,
+    **tables: Any,
 ) -> SweptDesigns:
     """Checks and predicts a design with keys varied into ``out/<name>-sweep/``; a row a design.
 
-    ``vary`` holds texts such as ``"chamber.diameter=4:8:0.5"`` (mm) and
-    ``"stack.balloons=3,6,9"``. ``options`` holds fields of ``SweepRequest``, such as ``samples``,
-    ``pressures_kpa``, ``workers`` and ``dask``, beside tables of the design. Raises DesignError for
-    a key that is not there, and OutputError.
+    ``vary`` has the values of each key, ``{"chamber.diameter": numpy.linspace(4, 8, 9),
+    "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range in words, ``"4:8:0.5"``; or it
+    holds texts such as ``"chamber.diameter=4:8:0.5"``. ``samples`` and all after it are the fields
+    of ``SweepRequest``, with the ``seconds`` s that a design may take; ``tables`` are those of the
+    design. ``swept.frame()`` has the rows. Raises DesignError for a key that is not there, and
+    OutputError.
     """
-    settings, tables = parted(options, SweepRequest)
-    design = load(source, *changes, **tables)
-    varied = tuple(read_varied(text) for text in vary)
-    return run_sweep(SweepRequest(design, varied, **settings), Path(out))
+    request = SweepRequest(
+        load(source, *changes, **tables),
+        varied_keys(vary),
+        samples,
+        seed,
+        numbers("pressures_kpa", pressures_kpa),
+        workers,
+        dask,
+        seconds,
+        all_columns,
+    )
+    return run_sweep(request, Path(out))

@@ -337,16 +337,16 @@ def _set(table: dict[str, Any], key: str, value: Any) -> None:
     if isinstance(value, Mapping):
         table[parts[-1]] = override(current if isinstance(current, dict) else {}, [value])
     else:
-        table[parts[-1]] = _as_in_a_file(value)
+        table[parts[-1]] = as_in_a_file(value)
 
 
-def _as_in_a_file(value: Any) -> Any:
+def as_in_a_file(value: Any) -> Any:
     """Return a value as TOML holds it: tuples and arrays as lists, numpy's numbers as Python's."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):
-        return {key: _as_in_a_file(inner) for key, inner in value.items()}
-    return [_as_in_a_file(inner) for inner in value] if isinstance(value, list | tuple) else value
+        return {key: as_in_a_file(inner) for key, inner in value.items()}
+    return [as_in_a_file(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) -> None:

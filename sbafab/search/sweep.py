@@ -8,9 +8,9 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
@@ -18,6 +18,7 @@ from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
 from sbafab.errors import OutputError
+from sbafab.notebook import data_frame
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
 from sbafab.search.measure import SweepOutcome, SweepRow, fingerprint
@@ -34,6 +35,9 @@ from sbafab.search.sweep_report import (
     write_times,
 )
 from sbafab.search.vary import Values, Varied, grid, latin_hypercube, refuse_unknown
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 SECONDS = 300.0
 """How long one design may take."""
@@ -64,7 +68,8 @@ class SweepRequest:
 class SweptDesigns:
     """Result of a sweep: its folder, number of designs by outcome, number measured in this run.
 
-    ``no_longer_asked`` designs of an earlier sweep stood in the tables that it has replaced.
+    ``table`` holds the rows; ``no_longer_asked`` designs of an earlier sweep stood in the tables
+    that it has replaced.
     """
 
     folder: Path
@@ -72,7 +77,20 @@ class SweptDesigns:
     measured: int
     outcomes: dict[SweepOutcome, int]
     files: tuple[str, ...]
+    table: Table = field(repr=False, compare=False)
     no_longer_asked: int = 0
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row a design, with the columns of ``sweep.csv``; units stand in their names."""
+        names = [column.name for column in self.table.written]
+        return [
+            dict(zip(names, cells, strict=True)) for cells in self.table.cells(self.table.written)
+        ]
+
+    def frame(self) -> DataFrame:
+        """Return ``rows`` as a pandas DataFrame. Raises DesignError without pandas."""
+        return data_frame(self.rows)
 
 
 class SweepStopped(KeyboardInterrupt):
@@ -120,7 +138,7 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
         gone = stale_designs(folder / CSV, table)
         files = _write(folder, request, table)
     outcomes = Counter(row["outcome"] for row in table.rows())
-    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, gone)
+    return SweptDesigns(folder, len(values), len(missing), dict(outcomes), files, table, gone)
 
 
 def _measure(

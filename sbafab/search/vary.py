@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from sbafab.design.files import key_paths, override, shown
+from sbafab.design.files import as_in_a_file, key_paths, override, shown
 from sbafab.design.records import Design
 from sbafab.design.units import millimetres
 from sbafab.errors import DesignError
@@ -36,6 +36,26 @@ class Varied:
         return not self.values
 
 
+def varied_keys(vary: Mapping[str, str | Iterable[Any]] | Sequence[str]) -> tuple[Varied, ...]:
+    """Return the keys of texts such as ``"stack.balloons=3,6"``, or of the values by key: several,
+    one, or the text after the equals sign. Raises DesignError.
+    """
+    if not isinstance(vary, Mapping):
+        return tuple(read_varied(text) for text in ([vary] if isinstance(vary, str) else vary))
+    return tuple(
+        read_varied(f"{key}={values}") if isinstance(values, str) else _of_values(key, values)
+        for key, values in vary.items()
+    )
+
+
+def _of_values(key: str, values: Iterable[Any]) -> Varied:
+    is_one = isinstance(values, Mapping) or not isinstance(values, Iterable)
+    table = as_in_a_file([values] if is_one else list(values))
+    if not table:
+        raise DesignError(f"vary holds no value of {key}; give one or several")
+    return _varied(key, table, key, "vary")
+
+
 def read_varied(text: str, option: str = "--vary") -> Varied:
     """``KEY=START:STOP:STEP``, ``KEY=START:STOP`` or ``KEY=a,b,c``. Raises DesignError."""
     key, equals, values = text.partition("=")
@@ -48,9 +68,7 @@ def read_varied(text: str, option: str = "--vary") -> Varied:
     table = override({}, [f"values=[{values}]"])["values"]
     if not isinstance(table, list):
         table = [override({}, [f"value={value.strip()}"])["value"] for value in values.split(",")]
-    if any(isinstance(value, float) for value in table):
-        table = [float(value) if type(value) is int else value for value in table]
-    return _distinct(Varied(key, tuple(table)), text, option)
+    return _varied(key, table, text, option)
 
 
 def _example(option: str) -> str:
@@ -91,13 +109,17 @@ def _exact(text: str) -> Decimal:
     return Decimal(repr(millimetres(text)))
 
 
-def _distinct(varied: Varied, text: str, option: str) -> Varied:
-    distinct: list[Any] = []
-    for value in varied.values:
-        if value in distinct:
+def _varied(key: str, values: Sequence[Any], text: str, option: str) -> Varied:
+    if any(isinstance(value, float) for value in values):
+        values = [float(value) if type(value) is int else value for value in values]
+    if len(values) > MOST_VALUES:
+        raise DesignError(
+            f"{option} {key} has {len(values):,} values, and at most {MOST_VALUES:,} are allowed"
+        )
+    for number, value in enumerate(values):
+        if value in values[:number]:
             raise DesignError(f"{option} {shown(text)} names {shown(value)} twice; once is enough")
-        distinct.append(value)
-    return varied
+    return Varied(key, tuple(values))
 
 
 def refuse_unknown(design: Design, varied: Sequence[Varied], option: str = "--vary") -> None:

@@ -145,6 +145,42 @@ def test_a_figure_of_two_models_wants_one_named() -> None:
         found.value("referenc stroke")
 
 
+def test_one_pressure_is_a_number_or_a_list_and_no_text() -> None:
+    one, several = (
+        sbafab.predict("1dof-5mm", pressures_kpa=pressures, quick=True)
+        for pressures in (np.float64(5), [5])
+    )
+    assert one.rows == several.rows
+    with pytest.raises(DesignError, match="pressures_kpa = 'high' must be a number or a list"):
+        sbafab.predict("1dof-5mm", pressures_kpa="high", quick=True)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("function", "keyword", "near"),
+    [
+        ("predict", "pressure_kpa", "pressures_kpa"),
+        ("predict", "volume_ul", "volumes_ul"),
+        ("stack", "modulus", "modulus_mpa"),
+        ("mesh", "format", "formats"),
+        ("simulate", "presure", "pressure"),
+        ("find", "trials", "tries"),
+        ("sweep", "sample", "samples"),
+        ("generate", "outs", "out"),
+    ],
+)
+def test_a_misspelt_argument_is_told_from_a_table_of_the_design(
+    function: str, keyword: str, near: str
+) -> None:
+    wanted = {"simulate": {"simulator": "sofa"}, "sweep": {"vary": []}}.get(function, {})
+    said = f"{keyword} is neither an argument of {function} nor a table .* did you mean {near}?"
+    with pytest.raises(DesignError, match=said):
+        getattr(sbafab, function)("1dof-5mm", **{keyword: 5}, **wanted)
+    with pytest.raises(
+        DesignError, match=r"pres is not a key of a design file; did you mean press"
+    ):
+        sbafab.predict("1dof-5mm", pres={"temperature_c": 150})
+
+
 def test_cut_press_and_nest_write_their_parts(tmp_path: Path) -> None:
     run = sbafab.cut("1dof-5mm", SMALL, out=tmp_path, dxf_profile="arcs")
     assert sorted(path.name for path in (run.folder / "layers").iterdir())[0].startswith("001_TPE")

@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -418,8 +419,9 @@ def test_what_a_program_asks_is_checked_too(asked: dict[str, Any], said: str) ->
 
 
 def test_a_requirement_beyond_a_range_that_widens_moves_it() -> None:
-    found = sbafab.find("1dof-5mm", least={"chamber.diameter": 20}, tries=12)
-    assert found.best.values["chamber.diameter"] == 20
+    for least in ("20 mm", np.int64(20)):
+        found = sbafab.find("1dof-5mm", least={"chamber.diameter": least}, tries=12)
+        assert found.best.values["chamber.diameter"] == 20
     design = sbafab.load("1dof-5mm")
     for least, most, ends in (("2", "9", (2.6, 9.0)), ("3", "20", (3.0, 16.0)), ("1", "2", (2, 2))):
         asked = [f"chamber.diameter={least}"], [f"chamber.diameter={most}"]

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from scipy.stats import binomtest
 
@@ -190,6 +191,21 @@ def test_a_row_that_a_journal_lost_is_the_only_one_measured(
     keys = [json.loads(line)["key"] for line in (folder / "journal.jsonl").read_text().splitlines()
             if line.endswith("}}")]  # fmt: skip
     assert len(keys) == len(set(keys)) == 4
+
+
+def test_a_sweep_of_arrays_is_that_of_texts_and_has_its_table_as_rows(
+    found: SweptDesigns, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "run_jobs", _here)
+    vary = {"chamber.diameter": np.linspace(2, 5, 2), "bond.width": [np.float64(0.7), 0.75]}
+    swept = sbafab.sweep("1dof-5mm", vary=vary, out=tmp_path, all_columns=True, **QUICK)
+    assert (swept.folder / "sweep.csv").read_bytes() == (found.folder / "sweep.csv").read_bytes()
+    assert [list(row) for row in swept.rows] == [list(row) for row in _rows(swept)]
+    table = swept.frame()
+    assert list(table["chamber.diameter"]) == [2, 2, 5, 5]
+    for name in ("mass [g]", "bond-width.margin"):
+        written = [float(row[name] or "nan") for row in _rows(swept)]
+        assert table[name].tolist() == pytest.approx(written, nan_ok=True)
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.search.vary import Varied, grid, latin_hypercube, read_varied, refuse_unknown
+from sbafab.search.vary import (
+    Varied,
+    grid,
+    latin_hypercube,
+    read_varied,
+    refuse_unknown,
+    varied_keys,
+)
 
 
 @pytest.mark.parametrize(
@@ -52,6 +62,42 @@ def test_values(text: str, values: tuple[object, ...]) -> None:
 def test_what_is_no_range_is_said(text: str, said: str) -> None:
     with pytest.raises(DesignError, match=said):
         read_varied(text)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        (np.linspace(4, 8, 9), "4:8:0.5"),
+        (np.arange(3, 6), "3,4,5"),
+        (range(3, 6), "3:5:1"),
+        (pd.Series([4.0, 4.5]), "4,4.5"),
+        ((value for value in (3, 4.5)), "3,4.5"),
+        ([np.int64(3), np.float32(4.5)], "3,4.5"),
+        (np.array([[5, 6], [7, 8]]), "[5, 6],[7, 8]"),
+        (np.float64(4.5), "4.5"),
+        ("4:8", "4:8"),
+        (["ears", "channel-pin"], "ears,channel-pin"),
+    ],
+)
+def test_values_of_python_are_those_of_a_text(values: Any, text: str) -> None:
+    (found,) = varied_keys({"a": values})
+    (written,) = varied_keys([f"a={text}"])
+    assert found == written
+    assert [type(one) for one in found.values] == [type(one) for one in written.values]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([], "vary holds no value of a"),
+        ([3, np.int64(3)], "names 3 twice"),
+        (np.arange(10_001), "a has 10,001 values, and at most 10,000"),
+        ("8:4", "smaller number first"),
+    ],
+)
+def test_what_is_no_list_of_values_is_said(values: Any, said: str) -> None:
+    with pytest.raises(DesignError, match=said):
+        varied_keys({"a": values})
 
 
 def test_unknown_keys_and_keys_without_any_good_value_are_refused() -> None:
