@@ -55,10 +55,15 @@ OTHERS = "<!-- every other page -->"
 """In index.md, where the guides that no list names are put."""
 
 
+MADE = re.compile(r"<!-- made: (.+) -->")
+"""In index.md, where pages are put that the build makes and the source does not have."""
+
+
 def with_other_pages(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Puts pages that index.md does not name among its guides, so that none is lost."""
+    """Put into index.md the pages that the build makes, and those that it does not name."""
     if docname != "index":
         return
+    source[0] = MADE.sub(lambda m: "\n".join(f"_made/{name}" for name in m[1].split()), source[0])
     named = set(re.findall(r"^([\w./-]+)$", source[0], re.MULTILINE))
     pages = sorted(path.stem for path in HERE.glob("*.md") if path.stem != "index")
     source[0] = source[0].replace(OTHERS, "\n".join(p for p in pages if p not in named))

@@ -6,15 +6,12 @@ import shutil
 from pathlib import Path
 
 from docs.scripts import (
-    measured,
     reference_cli,
     reference_formats,
     reference_keys,
     reference_rules,
-    tables,
 )
 from docs.scripts.gallery import write_gallery
-from docs.scripts.steps import write_steps
 
 
 def write_all(folder: Path) -> None:
@@ -26,6 +23,3 @@ def write_all(folder: Path) -> None:
     reference_formats.write(folder)
     reference_rules.write(folder)
     write_gallery(folder)
-    write_steps(folder)
-    tables.write(folder)
-    measured.write(folder)

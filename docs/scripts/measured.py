@@ -87,16 +87,6 @@ def _said(name: str, table: str) -> str:
     return f"\n{text}\n"
 
 
-def write(folder: Path) -> None:
-    """Write a page with all tables of all records, which no sidebar lists."""
-    parts = ["---\norphan: true\n---\n\n# Measured tables\n"]
-    for path in sorted(FOLDER.glob("*.json")):
-        found = record(path.stem)
-        parts.append(f"## {path.stem}\n\n{found.how}\n")
-        parts += [f"**{name}**\n\n{table.markdown}\n" for name, table in found.tables.items()]
-    (folder / "measured-tables.md").write_text("\n".join(parts), encoding="utf-8")
-
-
 def versions(**distributions: str) -> dict[str, str]:
     """Versions of installed distributions, by the names that the page gives them."""
     return {name: metadata.version(dist) for name, dist in distributions.items()}

@@ -6,6 +6,8 @@ the traveller takes Chromium.
 
 from __future__ import annotations
 
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -15,6 +17,7 @@ from pathlib import Path
 from PIL import Image
 
 import sbafab
+from sbafab.cutting.sheets import STROKE
 from sbafab.reports.assembly_png import assembly_png
 from sbafab.reports.charts import relation_svg
 from sbafab.reports.inflated_picture import PictureRequest, write_picture
@@ -24,6 +27,8 @@ from sbafab.reports.stack_svg import stack_svg
 
 IMAGES = Path(__file__).parents[1] / "images"
 ARM = "3dof-15mm"
+ROOM_ABOVE = 8.0
+"""mm of film that are shown above the parts of a sheet."""
 PAGE = "820,1160"
 """Pixels of the window in which a page of A4 is seen whole."""
 
@@ -40,6 +45,31 @@ def flat() -> None:
     laminate = sbafab.build(ARM)
     (IMAGES / f"{ARM}-layers.svg").write_text(layers_svg(laminate), encoding="utf-8")
     (IMAGES / f"{ARM}-stack.svg").write_text(stack_svg(laminate), encoding="utf-8")
+
+
+def tutorials() -> None:
+    """What the tutorials generate: a first actuator of four balloons, and an oval outline."""
+    with tempfile.TemporaryDirectory() as scratch:
+        first = sbafab.generate("1dof-5mm", "stack.balloons=4", out=scratch, name="first").folder
+        for name in ("solid.png", "layers.svg", "stack.svg"):
+            shutil.copyfile(first / "preview" / name, IMAGES / f"first-{name}")
+        # A laser's lines are too fine for a small picture.
+        sheet = (first / "sheets" / "TPE_1.svg").read_text(encoding="utf-8")
+        thicker = sheet.replace(f'stroke-width="{STROKE:g}"', 'stroke-width="0.6"')
+        (IMAGES / "first-sheet.svg").write_text(_lower_part(thicker), encoding="utf-8")
+        oval = sbafab.generate(str(IMAGES.with_name("gallery") / "oval.toml"), out=scratch).folder
+        shutil.copyfile(oval / "preview" / "layers.svg", IMAGES / "oval-layers.svg")
+
+
+def _lower_part(drawing: str) -> str:
+    """The part of a sheet that is cut, which begins below; the film above it is left out."""
+    box = re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', drawing)
+    assert box is not None
+    width, height = map(float, box.groups())
+    cut = drawing.partition('id="REFERENCE"')[0]
+    top = max(0.0, min(float(y) for y in re.findall(r"[ML][\d.]+ ([\d.]+)", cut)) - ROOM_ABOVE)
+    shown = f'width="{width}mm" height="{height - top}mm" viewBox="0 {top} {width} {height - top}"'
+    return re.sub(r'width="\S+" height="\S+" viewBox="[^"]+"', shown, drawing, count=1)
 
 
 def force() -> None:
@@ -74,7 +104,7 @@ def traveller() -> None:
 
 
 MAKERS: dict[str, Callable[[], None]] = {
-    made.__name__: made for made in (solid, flat, force, inflated, traveller)
+    made.__name__: made for made in (solid, flat, tutorials, force, inflated, traveller)
 }
 
 

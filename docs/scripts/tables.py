@@ -3,8 +3,7 @@
 ``validation`` holds every figure of the paper beside its prediction, ``calibrated`` those of the
 calibrated models with their intervals, ``sensitivity`` the calibrated forces with one assumption
 changed, ``candidates`` those of other physics, ``balloons`` the elastic balloon beside CalculiX,
-``faults`` what each rule says of each faulty folder. ``write`` makes the pages, which no sidebar
-lists.
+``faults`` what each rule says of each faulty folder.
 """
 
 from __future__ import annotations
@@ -135,28 +134,3 @@ SUMMARIES: Mapping[tuple[str, str], Callable[[], Table]] = {
     ("sofa", "summary"): sofa_summary,
 }
 """What a page may name in ``<!-- measured: NAME TABLE -->`` beside the tables of the records."""
-
-TITLES = {
-    "validation": ("Every figure of the paper beside its prediction", "validation"),
-    "calibrated": ("The paper's values beside the calibrated models", "validation"),
-    "sensitivity": ("Calibrated forces with one assumption changed", "validation"),
-    "candidates": ("Physics that might explain the misses, each by itself", "validation"),
-    "balloons": ("The elastic balloon beside CalculiX", "prediction"),
-    "faults": ("Every fault in every template", "faults"),
-}
-
-
-def write(folder: Path) -> None:
-    """Write a page for each table; a first column ``section`` becomes headings."""
-    for name, (title, page) in TITLES.items():
-        shown = table(name)
-        parts = [f"---\norphan: true\n---\n\n# {title}\n\nExplained in [{page}](../{page}.md).\n"]
-        if shown.columns[0] == "section":
-            first = 2 if shown.columns[1] == "note" else 1
-            for heading in dict.fromkeys(tuple(row[:first]) for row in shown.rows):
-                rows = [row[first:] for row in shown.rows if tuple(row[:first]) == heading]
-                said = "\n\n".join(heading)
-                parts.append(f"## {said}\n\n{Table(shown.columns[first:], rows).markdown}\n")
-        else:
-            parts.append(shown.markdown + "\n")
-        (folder / f"{name}-table.md").write_text("\n".join(parts), encoding="utf-8")

@@ -1,46 +1,65 @@
-"""``sbafab explain``: a rule's criterion, its reason and its remedy."""
+"""``sbafab explain``: a rule's criterion, reason and remedy; a design key; a quantity."""
 
 from __future__ import annotations
 
+import difflib
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
 import click
 
-from sbafab.cli.options import json_option
-from sbafab.cli.options import rules as rule_names
+from sbafab.cli.options import explainable, json_option
 from sbafab.cli.printing import print_facts, print_json
 from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
 from sbafab.rules.explained import EXPLAINED
 
+NAMED = "NAME"
+"""In a key, a name that the design file chooses, as that of a film or a shape."""
+
+
+class Key(NamedTuple):
+    """A key of design files, as one or several families have it; texts as a person reads them."""
+
+    key: str
+    meaning: str
+    default: str
+    allowed: str
+    families: tuple[str, ...] = ()
+
 
 @click.command()
-@click.argument("rule", required=False, shell_complete=rule_names)
+@click.argument("name", required=False, shell_complete=explainable)
 @json_option
-def explain(rule: str | None, as_json: bool) -> None:
-    """Explain a rule: criterion, reason, remedy.
+def explain(name: str | None, as_json: bool) -> None:
+    """Explain a rule, a key of design files, or a quantity that find and predict know.
 
-    Without RULE: list all rules and checks, a line each.
+    Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
     """
-    if rule is None:
+    if name is None:
+        _explain_all(as_json)
+    elif name in EXPLAINED:
         if as_json:
-            rules = {name: explanation._asdict() for name, explanation in EXPLAINED.items()}
-            print_json({"schema": EXPLAINED_SCHEMA, "rules": rules})
-            return
-        width = max(map(len, EXPLAINED))
-        for name, explanation in EXPLAINED.items():
-            click.echo(f"{name:<{width}}  {explanation.holds}")
-        return
-    if rule not in EXPLAINED:
-        import difflib
-
-        near = difflib.get_close_matches(rule, EXPLAINED, 1)
+            print_json({"schema": EXPLAIN_SCHEMA, "rule": name, **EXPLAINED[name]._asdict()})
+        else:
+            _print_rule(name)
+    elif not (_explain_quantity(name, as_json) or _explain_keys(name, as_json)):
+        near = difflib.get_close_matches(name, explainable_names(), 1)
         hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
-        raise click.BadParameter(f"{rule!r} is not a rule; {hint}", param_hint="RULE")
+        raise click.BadParameter(f"{name!r} is no rule, key or quantity; {hint}", param_hint="NAME")
+
+
+def _explain_all(as_json: bool) -> None:
     if as_json:
-        print_json({"schema": EXPLAIN_SCHEMA, "rule": rule, **EXPLAINED[rule]._asdict()})
+        rules = {name: explanation._asdict() for name, explanation in EXPLAINED.items()}
+        print_json({"schema": EXPLAINED_SCHEMA, "rules": rules})
         return
-    _print(rule)
+    width = max(map(len, EXPLAINED))
+    for name, explanation in EXPLAINED.items():
+        click.echo(f"{name:<{width}}  {explanation.holds}")
 
 
-def _print(rule: str) -> None:
+def _print_rule(rule: str) -> None:
     explanation = EXPLAINED[rule]
     print_facts(
         (
@@ -51,3 +70,125 @@ def _print(rule: str) -> None:
             ("keys", ", ".join(explanation.keys) or "none"),
         )
     )
+
+
+def _explain_quantity(name: str, as_json: bool) -> bool:
+    """Explain a quantity; return False if there is none of the name."""
+    from sbafab.search.quantities import QUANTITIES
+
+    rows = [row for row in QUANTITIES if row.name == name.partition("@")[0].replace("-", "_")]
+    if as_json and rows:
+        print_json({"schema": EXPLAIN_SCHEMA, "quantities": [row._asdict() for row in rows]})
+        return True
+    for row in rows:
+        facts = (("quantity", row.written), ("unit", row.unit or "none"), ("meaning", row.meaning))
+        print_facts(facts)
+    return bool(rows)
+
+
+def _explain_keys(name: str, as_json: bool) -> bool:
+    """Explain a key, or list those of a section; return False if there is neither."""
+    keys = design_keys()
+    section = [row for row in keys if row.key.startswith(f"{name}.")]
+    chosen = section or [row for row in keys if row.key == name]
+    if as_json and chosen:
+        print_json({"schema": EXPLAIN_SCHEMA, "keys": [row._asdict() for row in chosen]})
+    elif section:
+        width = max(len(row.key) for row in section)
+        for row in section:
+            click.echo(f"{row.key:<{width}}  {row.meaning}")
+    else:
+        for row in chosen:
+            print_facts(tuple({**row._asdict(), "families": ", ".join(row.families)}.items()))
+    return bool(chosen)
+
+
+def explainable_names() -> list[str]:
+    """Return the names of all rules, checks, keys and quantities."""
+    from sbafab.search.quantities import QUANTITIES
+
+    keys = dict.fromkeys(row.key for row in design_keys())
+    return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES)]
+
+
+def design_keys(schema: Mapping[str, Any] | None = None) -> list[Key]:
+    """Return every key of design files from their JSON schema, in the order of the file.
+
+    A key that two families have alike stands once, with both names.
+    """
+    from sbafab import actuators
+    from sbafab.assemblies.records import Assembly
+
+    schema = schema or actuators.schema(Assembly)
+    families: dict[Key, list[str]] = {}
+    for reference in schema["oneOf"]:
+        record = _resolved(reference, schema)
+        name = record["properties"]["family"]["const"]
+        for row in _keys("", record, schema):
+            families.setdefault(row, []).append(name)
+    return [row._replace(families=tuple(names)) for row, names in families.items()]
+
+
+def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> Iterator[Key]:
+    """Yield the keys of a table and of the tables below it."""
+    for key, value in record.get("properties", {}).items():
+        tables = list(_tables(value, schema))
+        for below, table in tables:
+            yield from _keys(f"{prefix}{key}.{below}", table, schema)
+        if not tables:
+            meaning = " ".join(value.get("description", "").split())
+            constant = "const" in value
+            default = "required" if constant else _default(value)
+            allowed = value["const"] if constant and key != "family" else _allowed(value)
+            yield Key(f"{prefix}{key}", meaning, default, allowed)
+
+
+def _tables(value: Any, schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables that a key may hold, each with what stands between the key and theirs."""
+    for choice in (value, *value.get("anyOf", ())):
+        found = _resolved(choice, schema)
+        more = found.get("additionalProperties")
+        if isinstance(more, dict):
+            for _, table in _tables(more, schema):
+                yield f"{NAMED}.", table
+        if "items" in found:
+            for _, table in _tables(found["items"], schema):
+                yield "", table
+        if found.get("properties"):
+            yield "", found
+
+
+def _resolved(value: Mapping[str, Any], schema: Mapping[str, Any]) -> Any:
+    return schema["$defs"][value["$ref"].rpartition("/")[2]] if "$ref" in value else value
+
+
+def _default(value: Mapping[str, Any]) -> str:
+    if "default" not in value:
+        return "required"
+    default = value["default"]
+    return "none" if default in (None, {}, []) else json.dumps(default, ensure_ascii=False)
+
+
+def _allowed(value: Mapping[str, Any]) -> str:
+    """Return the choices, kinds and limits of a key."""
+    choices = value.get("anyOf", (value,))
+    is_length = any("mm" in choice.get("pattern", "") for choice in choices)
+    kinds = [_kind(choice, is_length) for choice in choices if choice.get("type") != "null"]
+    return ", or ".join(dict.fromkeys(filter(None, kinds))) or "see its meaning"
+
+
+def _kind(value: Mapping[str, Any], is_length: bool) -> str:
+    if "enum" in value:
+        return ", ".join(map(str, value["enum"]))
+    kind = str(value.get("type"))
+    if kind == "array":
+        return "a list of them" if is_length or "items" in value else "a list"
+    if is_length and kind == "string":
+        return "a length with its unit"
+    words = {"boolean": "true or false", "string": "text", "integer": "a whole number"}
+    words["number"] = "mm" if is_length else "a number"
+    low = value.get("minimum", value.get("exclusiveMinimum"))
+    high = value.get("maximum", value.get("exclusiveMaximum"))
+    above = "" if low is None else f" {'above' if 'exclusiveMinimum' in value else 'from'} {low:g}"
+    below = "" if high is None else f" {'below' if 'exclusiveMaximum' in value else 'to'} {high:g}"
+    return words.get(kind, "") + above + below

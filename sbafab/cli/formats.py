@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
+from sbafab.cli.explain import Key
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
@@ -43,6 +44,7 @@ from sbafab.results.report import Comparison, MeasuredYield, Most, Success, Tole
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.rule import Explanation
 from sbafab.search.find import Binding, RangeEnd, Spare
+from sbafab.search.quantities import QuantityName
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TEXT = {"type": "string"}
@@ -328,7 +330,10 @@ def _inspection() -> dict[str, Any]:
 
 
 def _explain() -> dict[str, Any]:
-    return of(Explanation, schema={"const": ids.EXPLAIN_SCHEMA}, rule=TEXT)
+    schema = {"const": ids.EXPLAIN_SCHEMA}
+    rule = of(Explanation, schema=schema, rule=TEXT)
+    keys = table(schema=schema, keys=array(of(Key)))
+    return {"oneOf": [rule, keys, table(schema=schema, quantities=array(of(QuantityName)))]}
 
 
 def _explained() -> dict[str, Any]:
@@ -854,7 +859,7 @@ FORMATS: Mapping[str, Format] = {
         ids.INSPECTION_SCHEMA, "what `inspect` writes, and prints with `--json`", _inspection
     ),
     "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),
-    "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain RULE --json` prints", _explain),
+    "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain NAME --json` prints", _explain),
     "explained": Format(
         ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained
     ),

@@ -12,10 +12,13 @@ import pytest
 from click.shell_completion import ShellComplete
 
 import sbafab
+from sbafab.actuators import records
 from sbafab.assemblies.checks import CHECKS
 from sbafab.cli import app, main
 from sbafab.cli.check import file_states, watch_source
+from sbafab.cli.explain import design_keys
 from sbafab.cli.printing import limit_text
+from sbafab.design.files import key_paths
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, EXPLAINED
 from sbafab.rules.finding import Finding, Place
@@ -178,6 +181,23 @@ def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -
     code, _, err = run(["explain", "mask-overhag"], capsys)
     assert code == 2
     assert "did you mean mask-overhang?" in err
+
+
+def test_every_key_and_quantity_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["explain", "chamber.diameter"], capsys)
+    assert "mm from 0.001 to 1000" in out
+    assert "1dof, lobed" in out
+    _, out, _ = run(["explain", "chamber", "--json"], capsys)
+    listed = {row["key"]: row for row in json.loads(out)["keys"]}
+    assert listed["chamber.diameter"]["default"] == "5.0"
+    _, out, _ = run(["explain", "force"], capsys)
+    assert "blocked" in out
+    told = [(family, row.key) for row in design_keys() for family in row.families]
+    for family, record in records().items():
+        keys = {key for of, key in told if of == family}
+        for path in key_paths(record):
+            assert path in keys or any(key.startswith(f"{path}.") for key in keys), path
+    assert [row.key for row in design_keys() if not row.meaning] == []
 
 
 def test_the_keys_that_are_named_are_keys(capsys: pytest.CaptureFixture[str]) -> None:

@@ -62,7 +62,8 @@ def test_what_is_printed_is_of_its_schema(
 def test_what_is_printed_of_rules_and_templates_is_of_its_schema(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    hold("explain", json.loads(run(["explain", "bond-width", "--json"], capsys)))
+    for name in ("bond-width", "chamber.diameter", "chamber", "force"):
+        hold("explain", json.loads(run(["explain", name, "--json"], capsys)))
     hold("explained", json.loads(run(["explain", "--json"], capsys)))
     jsonschema.validate(json.loads(run(["templates", "--json"], capsys)), schema_of("templates"))
 

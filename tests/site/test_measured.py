@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.scripts import measured, tables
+from docs.scripts import measured
 from docs.scripts.measured import BLOCK, FOLDER, HOW, filled, record
 from docs.scripts.nesting import most_rectangles
 from docs.scripts.rates import WORDS
@@ -60,18 +60,6 @@ def test_blocks_name_what_is_recorded_and_each_record_says_its_day() -> None:
     assert {name for name, table in BLOCKS if table == HOW} == {*NAMES}
     for name in NAMES:
         assert re.fullmatch(r"\d{4}-\d\d-\d\d", record(name).day)
-
-
-def test_every_table_stands_whole_on_a_page_of_its_own(tmp_path: Path) -> None:
-    measured.write(tmp_path)
-    tables.write(tmp_path)
-    page = (tmp_path / "measured-tables.md").read_text(encoding="utf-8")
-    for name in NAMES:
-        assert all(table.markdown in page for table in record(name).tables.values())
-    for name in tables.TITLES:
-        rows = tables.table(name).rows
-        page = (tmp_path / f"{name}-table.md").read_text(encoding="utf-8")
-        assert all(row[-1] in page for row in rows)
 
 
 def test_every_command_on_the_pages_exists() -> None:
