@@ -1,4 +1,4 @@
-"""Measures what docs/benchmarks.md shows and writes its tables.
+"""Measures what docs/testing.md shows and writes its tables.
 
 ``python -m docs.scripts.benchmark_runs --before FOLDER`` wants a checkout of the version to compare
 with, and a machine that does nothing else; it takes half an hour.

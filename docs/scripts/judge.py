@@ -1,6 +1,6 @@
 """Lets KLayout and GDAL judge random designs: ``python -m docs.scripts.judge [NUMBER]``.
 
-Of 200 designs, the usual number, it writes the tables of docs/judges.md.
+Of 200 designs, the usual number, it writes the tables of docs/testing.md.
 """
 
 from __future__ import annotations

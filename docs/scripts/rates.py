@@ -31,7 +31,7 @@ def speed(record: Record) -> str:
         "On one core of a 2-core virtual machine, imports included, "
         f"{statistic(versions)} processor time of several rounds:\n"
         f"`sbafab generate 3dof-15mm` takes {generate} s, `sbafab --help` "
-        f"{seconds(commands, 'sbafab --help')} s ([benchmarks](docs/benchmarks.md))."
+        f"{seconds(commands, 'sbafab --help')} s ([benchmarks](docs/testing.md#benchmarks))."
     )
 
 

@@ -10,7 +10,7 @@ from tests.interop.made import DESIGNS, NAMES, PROFILES, Sheet, sheet_of, write_
 
 
 def pytest_sessionfinish() -> None:
-    """Writes what was measured for docs/programs.md, where that was asked for."""
+    """Writes what was measured for docs/testing.md, where that was asked for."""
     if page.is_measuring and page.measured:
         page.write_page()
 

@@ -1,4 +1,4 @@
-"""How far off the sheets' area is in each program, as docs/programs.md says.
+"""How far off the sheets' area is in each program, as docs/testing.md says.
 
 ``SBAFAB_MEASURE=1 SBAFAB_LONG=1 python -m pytest tests/interop`` measures it anew for the page.
 """

@@ -88,7 +88,7 @@ def test_the_pages_of_judges_say_what_is_run_for_them() -> None:
             for word, value in zip(words, words[1:], strict=False)
             if word.startswith("--")
         }
-        assert said.format(**told) in text("judges")
+        assert said.format(**told) in text("testing")
 
 
 def test_what_the_judges_saw_adds_up() -> None:
@@ -96,7 +96,7 @@ def test_what_the_judges_saw_adds_up() -> None:
     (row,) = found["designs"].rows
     designs, *families, areas, off = row
     assert int(designs) == sum(map(int, families)) == 200
-    assert float(off.removesuffix(" %")) < 0.01  # what docs/judges.md allows
+    assert float(off.removesuffix(" %")) < 0.01  # what docs/testing.md allows
     widths = found["widths"]
     for cells in widths.rows:
         name, compared, *ways, apart, disagree = cells
@@ -107,18 +107,18 @@ def test_what_the_judges_saw_adds_up() -> None:
     assert widths.cell("web", "compared") == areas
     judged = re.search(
         r"(\d+) designs judged \((\d+) 1-DoF, (\d+) lobed, (\d+) radial, (\d+) pairs",
-        text("judges"),
+        text("testing"),
     )
     assert judged is not None
     whole, *parts = map(int, judged.groups())
     assert whole == sum(parts)
-    refused = re.search(r"\. (\d+) were refused", text("judges"))
+    refused = re.search(r"\. (\d+) were refused", text("testing"))
     assert refused is not None
     assert whole + int(refused[1]) == 1000
 
 
 def test_every_judge_has_its_line() -> None:
-    lines = set(re.findall(r"^\| `([a-z]+)` \| ", TEXTS[DOCS / "judges.md"], re.MULTILINE))
+    lines = set(re.findall(r"^\| `([a-z]+)` \| ", TEXTS[DOCS / "testing.md"], re.MULTILINE))
     source = "".join(path.read_text() for path in (ROOT / "tests" / "judge").glob("*.py"))
     named = set(re.findall(r"Disagreement\(\s*\"([a-z]+)\"", source))
     # A crash, an exit, what cannot be read and what takes too long are told in a sentence.
@@ -138,7 +138,7 @@ def test_mutation_testing_adds_up() -> None:
     run, killed, survived = (numbers(table, name) for name in ("run", "killed", "survived"))
     assert [k + s for k, s in zip(killed, survived, strict=True)] == run
     share = f"{sum(killed)} of {sum(run)} ({100 * sum(killed) / sum(run):.0f} %)"
-    assert f"it is {share}" in text("mutation")
+    assert f"it is {share}" in text("testing")
     assert abs(sum(numbers(table, "mutants")) - 4100) < 50
 
 

@@ -61,7 +61,7 @@ def test_a_statistic_is_called_by_its_name() -> None:
 
 def test_factors_on_the_page_are_the_record_s() -> None:
     """Medians of one run: the other programs' seconds by ours, one process's by that of two."""
-    page = " ".join((ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8").split())
+    page = " ".join((ROOT / "docs" / "testing.md").read_text(encoding="utf-8").split())
     plates = {name: recorded("plates", name) for name in ("sbafab", "foldable", "build123d")}
     others = re.search(r"took ([\d.]+) \(foldable, chords\) and ([\d.]+) times", page)
     assert others is not None
