@@ -145,7 +145,8 @@ def simulate(
     ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes what it reads and runs
     nothing. ``pressure`` kPa, ``chambers`` kPa by name and all after them are the fields of
     ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul by chamber;
-    ``tables`` are those of the design. Raises DesignError for what it cannot do, and OutputError.
+    ``tables`` are those of the design. Raises DesignError for another simulator or word and for
+    what cannot be done, and OutputError.
     """
     request = SimulationRequest(
         pressure, chambers or {}, minutes, h, symmetry, procedure, scene, seconds, volumes or {}

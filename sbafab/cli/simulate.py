@@ -25,8 +25,7 @@ from sbafab.models.paper import BURST
 from sbafab.output.checked import checks
 from sbafab.runs.run import result_json
 from sbafab.runs.run import simulate as run
-from sbafab.simulators.simulator import NAMES, Name, Result, SimulationRequest, users
-from sbafab.simulators.simulator import simulator as simulator_module
+from sbafab.simulators.simulator import CHOICES, NAMES, Name, Result, SimulationRequest
 
 MOST_MINUTES = 10_000
 
@@ -64,18 +63,18 @@ MOST_MINUTES = 10_000
 @click.option("--h", type=LENGTH.read, metavar="MM", help="calculix: mesh size.  [default: 0.35]")
 @click.option(
     "--symmetry",
-    type=click.Choice(["full", "half", "quarter", "sector"]),
+    type=click.Choice(CHOICES["symmetry"]),
     help="calculix: part that is computed; only the full one wrinkles and bends freely."
     "  [default: full]",
 )
 @click.option(
     "--procedure",
-    type=click.Choice(["dynamic", "static"]),
+    type=click.Choice(CHOICES["procedure"]),
     help="calculix: static is faster but stops when films wrinkle.  [default: dynamic]",
 )
 @click.option(
     "--scene",
-    type=click.Choice(["shell", "frames", "volume", "beam"]),
+    type=click.Choice(CHOICES["scene"]),
     help="sofa: scene that is run.  [default: shell]",
 )
 @click.option(
@@ -102,7 +101,6 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     and the exit code is 1.
     """
     wish = SimulationRequest(**settings)
-    _refuse_unused(simulator, wish)
     design = load_design(request.designs[0], request.assignments, request.waivers)
     with shown_progress(request.as_json) as progress:
         simulation = run(design, simulator, wish, request.out, progress, export)
@@ -127,16 +125,6 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     if result.stopped is not None:
         print_error(result.stopped)
         click.get_current_context().exit(RULE_FAILED)
-
-
-def _refuse_unused(simulator: Name, wish: SimulationRequest) -> None:
-    """Raise UsageError for an option that the simulator does not use."""
-    for name in wish.specific_fields:
-        if name not in simulator_module(simulator).USES:
-            option = "volume" if name == "volumes" else name
-            raise click.UsageError(
-                f"--{option} is for {' and '.join(users(name))}; leave it out with {simulator}"
-            )
 
 
 def _print(name: str, result: Result, folder: Path, is_export: bool) -> None:

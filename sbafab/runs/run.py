@@ -44,7 +44,7 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
 from sbafab.runs.stock import cut_from_stock
-from sbafab.simulators.simulator import Name, Result, SimulationRequest, simulator
+from sbafab.simulators.simulator import Name, Result, SimulationRequest, refuse_unused, simulator
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import MeshSettings
@@ -319,6 +319,7 @@ def simulate(
     Raises DesignError or OutputError for what it cannot do, if possible before it starts.
     """
     progress = progress or ignore_progress
+    refuse_unused(name, wish)
     result = Result((), {})
     with tempfile.TemporaryDirectory() as temporary:
         checked = check(design, progress)

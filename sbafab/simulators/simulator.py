@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol, cast
 
@@ -29,13 +30,23 @@ LARGEST_VACUUM = 101.325
 """kPa below the air outside, which no vacuum exceeds."""
 
 
+CHOICES = {
+    "symmetry": ("full", "half", "quarter", "sector"),
+    "procedure": ("dynamic", "static"),
+    "scene": ("shell", "frames", "volume", "beam"),
+}
+"""What a setting of a request may be, by its name."""
+
+
 @dataclass(frozen=True)
 class SimulationRequest:
     """Settings of a simulation; None where the simulator's default will do.
 
     ``pressure`` in kPa for every chamber that ``chambers`` does not name; ``minutes`` is the most
     real time a run may take. Each simulator's ``USES`` names the others that it reads:
-    ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber.
+    ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber;
+    ``CHOICES`` tells the words of the rest. Raises DesignError for another word, and for what is
+    no number.
     """
 
     pressure: float | None = None
@@ -47,6 +58,20 @@ class SimulationRequest:
     scene: str | None = None
     seconds: float | None = None
     volumes: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, words in CHOICES.items():
+            word = getattr(self, name)
+            if word not in (None, *words):
+                raise DesignError(f'{name} = "{word}" must be one of {", ".join(words)}')
+        numbers = {name: getattr(self, name) for name in ("pressure", "h", "seconds", "minutes")}
+        numbers |= {f"pressure of {name}": value for name, value in self.chambers.items()}
+        numbers |= {f"volume in {name}": value for name, value in self.volumes.items()}
+        for name, number in numbers.items():
+            if number is not None and not isinstance(number, Real):
+                raise DesignError(f"{name} = {number!r} must be a number")
+        if not 0 < self.minutes < math.inf:
+            raise DesignError(f"minutes = {self.minutes:g} must be a finite number above 0")
 
     @property
     def specific_fields(self) -> list[str]:
@@ -85,13 +110,21 @@ class Simulator(Protocol):
 
 
 def simulator(name: Name) -> Simulator:
-    """Return the simulator of that name; its imports are loaded only now."""
+    """Return the simulator of that name; its imports are loaded only now. Raises DesignError."""
+    if name not in NAMES:
+        raise DesignError(f'simulator = "{name}" must be one of {", ".join(NAMES)}')
     return cast(Simulator, import_module(f"sbafab.simulators.{name}.run"))
 
 
-def users(field_name: str) -> list[str]:
-    """Return the simulators that use a field of a request."""
-    return [name for name in NAMES if field_name in simulator(name).USES]
+def refuse_unused(name: Name, request: SimulationRequest) -> None:
+    """Raises DesignError for an unknown simulator, and for a setting that it does not use."""
+    used = simulator(name).USES
+    for name_of_field in request.specific_fields:
+        if name_of_field not in used:
+            users = [other for other in NAMES if name_of_field in simulator(other).USES]
+            raise DesignError(
+                f"{name_of_field} is for {' and '.join(users)}; leave it out with {name}"
+            )
 
 
 def chamber_pressures(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -198,6 +199,26 @@ def test_simulate_exports_a_deck_and_refuses_what_is_no_key(tmp_path: Path) -> N
     assert list(made.folder.glob("*.scn"))
     with pytest.raises(DesignError, match="presure"):
         sbafab.simulate("1dof-5mm", presure=3.0, **wish)
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        ({"simulator": "ccx"}, 'simulator = "ccx" must be one of calculix, sofa, mujoco'),
+        ({"simulator": "sofa", "scene": "film"}, 'scene = "film" must be one of shell, frames'),
+        ({"simulator": "calculix", "symmetry": "third"}, 'symmetry = "third" must be one of full'),
+        ({"simulator": "calculix", "procedure": "slow"}, "must be one of dynamic, static"),
+        ({"simulator": "calculix", "pressure": "6 kPa"}, "pressure = '6 kPa' must be a number"),
+        ({"simulator": "mujoco", "minutes": 0}, "minutes = 0 must be a finite number above 0"),
+        ({"simulator": "sofa", "h": 0.3}, "h is for calculix; leave it out with sofa"),
+    ],
+)
+def test_simulate_names_what_a_setting_may_be(
+    tmp_path: Path, wish: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(DesignError, match=re.escape(words)):
+        sbafab.simulate("1dof-5mm", stack={"balloons": 2}, out=tmp_path / "out", **wish)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("what", ["design", "laminate", "layer", "findings", "prediction", "run"])

@@ -80,9 +80,9 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "calculix", "--pressure", "nan"], "must be a pressure"),
         (["--with", "calculix", "--chamber", "chamber1"], "must be NAME=PRESSURE"),
         (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which is not there"),
-        (["--with", "calculix", "--scene", "beam"], "--scene is for sofa"),
+        (["--with", "calculix", "--scene", "beam"], "scene is for sofa"),
         (["--with", "calculix", "--h", "3"], "h = 3"),
-        (["--with", "sofa", "--h", "0.3"], "--h is for calculix"),
+        (["--with", "sofa", "--h", "0.3"], "h is for calculix"),
         (["--with", "sofa", "--volume", "chamber1=1 kg"], "must be a volume"),
         (["--with", "sofa", "--volume", "chamber1=8"], "--volume is for --scene volume"),
         (["--with", "sofa", "--seconds", "-1"], "simulated time = -1 s"),
@@ -97,7 +97,7 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
         (["--with", "mujoco", "--chamber", "left=3"], "names chamber left, which is not there"),
         (["--with", "mujoco", "--seconds", "1"], "simulated time = 1 s"),
-        (["--with", "mujoco", "--h", "3"], "--h is for calculix"),
+        (["--with", "mujoco", "--h", "3"], "h is for calculix"),
     ],
 )
 @pytest.mark.usefixtures("no_programs")
