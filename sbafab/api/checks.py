@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, build, either_of, load, suggesting
+from sbafab.api.designs import Source, build, command, either_of, load
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
 from sbafab.laminate.laminate import Laminate
@@ -19,7 +19,7 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.nets import connectivity
 
 
-@suggesting
+@command
 def check(
     source: Source | Assembly,
     *changes: Change,

@@ -44,9 +44,10 @@ Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
 
 
-def suggesting(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """Return a function that takes tables of a design as keywords, and that names the argument
-    which a misspelt keyword is most like. Raises DesignError.
+def command(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+    """Return a function with the name of a command, whose keywords may be tables of a design too:
+    numbers and arrays of numpy become Python's, and a misspelt keyword is told the argument that it
+    is most like. Raises DesignError.
     """
     arguments = list(signature(function).parameters)
 
@@ -62,16 +63,16 @@ def suggesting(function: Callable[Arguments, Returned]) -> Callable[Arguments, R
                     f"{name} is neither an argument of {function.__name__} nor a table of a "
                     f"design; did you mean {near[0]}?"
                 )
-        return function(*args, **keywords)
+        plain = {name: as_in_a_file(value) for name, value in keywords.items()}
+        return function(*args, **plain)
 
     return call
 
 
 def numbers(name: str, values: float | Sequence[float]) -> tuple[float, ...]:
     """Return one number or several as a tuple. Raises DesignError."""
-    plain = as_in_a_file(values)
     try:
-        return tuple(map(float, plain if isinstance(plain, list) else [plain]))
+        return tuple(map(float, values if isinstance(values, Sequence) else [values]))
     except (TypeError, ValueError):
         raise DesignError(f"{name} = {shown(values)} must be a number or a list of them") from None
 

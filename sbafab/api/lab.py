@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, suggesting
+from sbafab.api.designs import Source, command
 from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
 from sbafab.design.files import Change
 from sbafab.reports.traveller.record_sheet import RecordTable
@@ -32,7 +32,7 @@ def kerf(
     return calibrated(read_measurements(Path(measurements), instrument), resolution)
 
 
-@suggesting
+@command
 def record(
     source: Source,
     *changes: Change,

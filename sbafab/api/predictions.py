@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, assemble, load, numbers, suggesting
+from sbafab.api.designs import Source, assemble, command, load, numbers
 from sbafab.assemblies.build import Assembled, PlacedSba
 from sbafab.assemblies.records import Assembly
 from sbafab.design.files import Change
@@ -25,7 +25,7 @@ from sbafab.reports.assembly_prediction import predict_assembly as predict_assem
 from sbafab.reports.inflated import gripping
 
 
-@suggesting
+@command
 def predict(
     source: Source,
     *changes: Change,
@@ -65,7 +65,7 @@ def predict(
     return predict_design(load(source, *changes, **tables), request, laminate, quick)
 
 
-@suggesting
+@command
 def predict_assembly(
     source: str | Path | Assembly | Assembled,
     *changes: Change,
@@ -102,7 +102,7 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     return outcome, gripping(placed, outcome.room or free)
 
 
-@suggesting
+@command
 def stack(
     source: Source,
     *changes: Change,

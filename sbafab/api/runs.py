@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, either_of, load, suggesting
+from sbafab.api.designs import Source, command, either_of, load
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import Change
@@ -39,7 +39,7 @@ def import_design(source: str | Path, out: str | Path | None = None) -> Design:
     return design
 
 
-@suggesting
+@command
 def generate(
     source: Source | Assembly,
     *changes: Change,
@@ -56,7 +56,7 @@ def generate(
     return run(RunRequest(either_of(source, changes, tables), Path(out)), progress)
 
 
-@suggesting
+@command
 def cut(
     source: Source,
     *changes: Change,
@@ -77,7 +77,7 @@ def cut(
     return run(RunRequest(design, Path(out), ("cut",), curves), progress)
 
 
-@suggesting
+@command
 def press(source: Source, *changes: Change, out: str | Path = "out", **tables: Any) -> Run:
     """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
 
@@ -87,7 +87,7 @@ def press(source: Source, *changes: Change, out: str | Path = "out", **tables: A
     return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)))
 
 
-@suggesting
+@command
 def mesh(
     source: Source,
     *changes: Change,
@@ -122,7 +122,7 @@ def nest(sources: Sequence[Source], name: str = "job", out: str | Path = "out") 
     return run(RunRequest([load(source) for source in sources], Path(out), name=name))
 
 
-@suggesting
+@command
 def simulate(
     source: Source,
     *changes: Change,

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sbafab.api.designs import Source, load, numbers, suggesting
-from sbafab.design.files import Change, as_in_a_file, changed_keys
+from sbafab.api.designs import Source, command, load, numbers
+from sbafab.design.files import Change, changed_keys
 from sbafab.design.records import Design, Free
 from sbafab.search.compare import PRESSURES, DesignComparison, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
@@ -21,7 +21,7 @@ from sbafab.search.trial import read_all
 from sbafab.search.vary import varied_keys
 
 
-@suggesting
+@command
 def find(
     source: Source,
     *changes: Change,
@@ -46,15 +46,15 @@ def find(
     ``found.intervals`` the 90 % intervals. Raises DesignError for a quantity that it does not know,
     with those it does.
     """
-    at_least = [f"{name}={as_in_a_file(value)}" for name, value in (least or {}).items()]
-    at_most = [f"{name}={as_in_a_file(value)}" for name, value in (most or {}).items()]
+    at_least = [f"{name}={value}" for name, value in (least or {}).items()]
+    at_most = [f"{name}={value}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     design = load(source, *changes, **tables)
     keys = None if free is None else tuple(free)
     return run_find(FindRequest(design, requirements, goal, keys, tries, optuna, storage, sure))
 
 
-@suggesting
+@command
 def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> ReachedYield:
     """The design changed as little as a yield needs, and what that costs.
 
@@ -68,6 +68,7 @@ def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) 
     return run_reach_yield(load(source, *changes, **tables), target, fixed)
 
 
+@command
 def compare(
     first: Source,
     second: Source,
@@ -102,7 +103,7 @@ def compare(
     return comparison
 
 
-@suggesting
+@command
 def sweep(
     source: Source,
     *changes: Change,

@@ -346,7 +346,7 @@ def as_in_a_file(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, Mapping):
         return {key: as_in_a_file(inner) for key, inner in value.items()}
-    return [as_in_a_file(inner) for inner in value] if isinstance(value, list | tuple) else value
+    return [as_in_a_file(inner) for inner in value] if type(value) in (list, tuple) else value
 
 
 def suggest_from_user_folder(data: dict[str, Any], changes: Iterable[Change]) -> None:

@@ -43,6 +43,20 @@ def test_numbers_of_numpy_are_numbers(number: type[np.number[Any]]) -> None:
         few.with_({"stack.balloons": np.float64(2.5)})
 
 
+def test_options_of_numpy_are_plain_numbers(tmp_path: Path) -> None:
+    options = {"flow_ml_min": np.float32(30), "volumes_ul": np.int64(5), "press_factor": 0.5}
+    found = sbafab.predict("1dof-5mm", SMALL, quick=True, **options)  # type: ignore[arg-type]
+    assert json.loads(json.dumps(found.as_dict()))["asked"]["flow_ml_min"] == 30
+    wish = {"simulator": "sofa", "export": True, "pressure": np.float64(3.0)}
+    for name, pressure in (("a", np.float64(3)), ("b", 3.0)):
+        wish |= {"pressure": pressure, "out": tmp_path / name}
+        sbafab.simulate("1dof-5mm", SMALL, **wish)  # type: ignore[arg-type]
+    scenes = [sorted((tmp_path / name).rglob("*.scn")) for name in ("a", "b")]
+    assert scenes[0]
+    for one, other in zip(*scenes, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+
+
 def test_with_keeps_the_rest_and_checks_like_a_design_file() -> None:
     design = sbafab.load("1dof-5mm", inlet={"tube_outer_diameter": 0.8})
     wide = design.with_(bond={"width": 0.9})
