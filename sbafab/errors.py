@@ -45,6 +45,10 @@ class OutputError(SbafabError, OSError):
     """Files that cannot be written, or read back as written."""
 
 
+class OccupiedError(OutputError):
+    """A folder that holds another design's files, which a run would replace."""
+
+
 class DefectError(SbafabError):
     """Files that the program wrote and that differ from the design: a defect of the program."""
 

@@ -681,7 +681,8 @@ def _predict() -> dict[str, Any]:
         relations=array(relation),
     )
     moved = of(SensitivityRow)
-    return and_perhaps(found, failed=array(TEXT), folder=TEXT, sensitivity=array(moved))
+    folder = {"type": ["string", "null"], "description": "null where nothing was written"}
+    return and_perhaps(found, failed=array(TEXT), folder=folder, sensitivity=array(moved))
 
 
 def _counterpart() -> dict[str, Any]:

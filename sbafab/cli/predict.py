@@ -42,7 +42,7 @@ from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
 from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
 from sbafab.reports.assembly_prediction import AssemblyPrediction, as_json, predict_assembly
-from sbafab.runs.run import RunRequest, generate
+from sbafab.runs.run import Run, RunRequest, generate
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
@@ -117,7 +117,8 @@ def predict(
 
     Prints the main figures, with the paper's measurements where models differ from them by more
     than a quarter. -v and predict.json, which is written with plots, hold all figures with their
-    models and validity. A design that fails a rule is predicted on the screen only (exit code 1).
+    models and validity. A design that fails a rule is predicted on the screen only (exit code 1),
+    and so is one whose folder holds another design's files.
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
@@ -150,7 +151,8 @@ def predict(
         document = prediction_json(design, prediction)
         if sensitivity:
             document["sensitivity"] = [row._asdict() for row in rows]
-        print_json({**document, "failed": failed, "folder": str(run.folder)})
+        folder = None if run.occupied else str(run.folder)
+        print_json({**document, "failed": failed, "folder": folder})
     else:
         pressed = prediction.asked.factors.press_factor
         print_listed("size", size_phrases(design, run.laminate, pressed))
@@ -161,7 +163,7 @@ def predict(
             details = "" if verbose else " Details: -v"
             print_verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
-                f"validity. Written to {run.folder}: predict.json, predict/.{details}"
+                f"validity. {_place(run)}{details}"
             )
     if run.failed:
         print_error(
@@ -169,6 +171,13 @@ def predict(
             "was written. Change the design or waive the rule by name"
         )
         click.get_current_context().exit(RULE_FAILED)
+
+
+def _place(run: Run) -> str:
+    """Return where a prediction was written, or why it was not."""
+    if run.occupied:
+        return f"Nothing was written: {run.occupied}."
+    return f"Written to {run.folder}: predict.json, predict/."
 
 
 def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:

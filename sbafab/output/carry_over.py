@@ -10,7 +10,7 @@ from typing import Any
 
 from sbafab.design.files import shown
 from sbafab.design.records import Design, dotted, resolved
-from sbafab.errors import OutputError
+from sbafab.errors import OccupiedError, OutputError
 from sbafab.output.artefacts import ARTEFACTS, tops_of
 from sbafab.output.manifest import carried_over, file_hash, file_names, identity
 from sbafab.output.swap import listed_files, read_manifest
@@ -55,12 +55,12 @@ def removed_files(listed: Sequence[str], index: Mapping[str, Any]) -> tuple[str,
 def refuse_to_replace(
     target: Path, design: Design, waived: Sequence[str], replaced: Collection[str]
 ) -> None:
-    """Raises OutputError where a run that writes ``replaced`` would lose another design's files."""
+    """Raises OccupiedError where a run that writes ``replaced`` would lose others' files."""
     mine = identity(design, waived)
     lost = would_replace(target, mine, replaced)
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
-        raise OutputError(
+        raise OccupiedError(
             f"{target} holds {', '.join(names)} {_unlike(target, design, mine)}; take "
             f"{target / 'design.toml'} for the design that was run there, or give this one a "
             "folder of its own with --set name=NAME or -o"
@@ -79,10 +79,12 @@ def _unlike(target: Path, design: Design, mine: Mapping[str, Any]) -> str:
     keys = [key for key in {**there, **here} if there.get(key) != here.get(key)]
     if there and keys:
         differences = [
-            f"{key} {_value(there, key)}, not {_value(here, key)}" for key in keys[:MOST_KEYS]
+            f"{key} = {_value(there, key)} there, {_value(here, key)} here"
+            for key in keys[:MOST_KEYS]
         ]
         more = len(keys) - len(differences)
-        return f"with {'; '.join(differences)}" + (f"; and {more} more keys" if more else "")
+        rest = f"; and {more} more keys" if more else ""
+        return f"of another design ({'; '.join(differences)}{rest})"
     if old.get("generator") != mine["generator"]:
         return f"of another version ({shown(old.get('generator'))}, not {mine['generator']})"
     return "of a run with other settings"

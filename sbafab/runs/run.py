@@ -19,7 +19,7 @@ from sbafab.as_built.records import CLAIMS, DESIGNED, INTEGRITY
 from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
-from sbafab.errors import DefectError, OutputError
+from sbafab.errors import DefectError, OccupiedError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
@@ -97,6 +97,8 @@ class Run:
     """Files of an older run of another design or version that this one removed."""
     kept: bool = False
     """True if it failed and ``folder`` was left as it was."""
+    occupied: str = ""
+    """Why a prediction was not written: ``folder`` holds another design's files."""
     left_out: tuple[tuple[str, str], ...] = ()
     """Simulators that got no input, with the reason."""
 
@@ -154,7 +156,8 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     """Write the folder of a request and return the outcome.
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
-    meshes; a folder that holds another design's is then left untouched (``Run.kept``). Of several
+    meshes; a folder that holds another design's is then left untouched (``Run.kept``), and so it
+    is where a prediction alone would be written (``Run.occupied``). Of several
     designs nothing is written if one fails. With some of the ``parts`` only, the others stay if
     they are of the same design. Raises DesignError or OutputError, also where other parts are
     another design's, and DefectError where the cut files read back are not what was checked; the
@@ -163,7 +166,12 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     progress = progress or ignore_progress
     job = cut_from_stock(check_job(request.source, request.name, progress))
     target = request.out / job.name
-    parts = _parts_to_write(request, job, target)
+    try:
+        parts = _parts_to_write(request, job, target)
+    except OccupiedError as reason:
+        if set(request.parts) != {"predict"}:
+            raise
+        return Run(job, target, occupied=str(reason))
     if parts is None:
         return Run(job, target, kept=True)
     plan = _plan(request, job, parts, target, progress)

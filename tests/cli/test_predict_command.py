@@ -10,6 +10,7 @@ import pytest
 
 import sbafab
 from sbafab.cli import main
+from sbafab.output.manifest import file_hashes
 from sbafab.runs.run import RunRequest, generate
 from tests.site.formats import hold
 
@@ -95,13 +96,25 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
     assert a == b
     kept = generate(RunRequest(sbafab.load("1dof-5mm"), tmp_path / "a", ("press",)))
     assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
-    code, out, err = run(
-        ["1dof-5mm", "-o", str(tmp_path / "a"), "--set", "stack.balloons=3"], capsys
-    )
-    assert code == 2
-    assert "reference stroke" in out
-    assert "press.json" in err
-    assert "predict.json" not in err
+
+
+def test_a_prediction_leaves_another_designs_folder_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
+    folder = generate(RunRequest(wide, tmp_path, ("cut",))).folder
+    before = file_hashes(folder)
+    arguments = ["1dof-5mm", "--set", "stack.balloons=1", "-o", str(tmp_path)]
+    code, out, err = run(arguments, capsys)
+    assert (code, err) == (0, "")
+    told = " ".join(out.split())
+    assert f"Nothing was written: {folder} holds layers, sheets" in told
+    assert "another design (chamber.diameter = 6.0 there, 5.0 here); take" in told
+    code, out, err = run([*arguments, "--json"], capsys)
+    assert (code, err) == (0, "")
+    hold("predict", json.loads(out))
+    assert json.loads(out)["folder"] is None
+    assert file_hashes(folder) == before
 
 
 def test_failing_design_is_predicted_but_not_written(

@@ -58,7 +58,7 @@ def test_a_part_alone_does_not_put_away_another_designs_files(
 ) -> None:
     good = generate(RunRequest(load_design("1dof-5mm", SMALL), tmp_path))
     before = file_hashes(good.folder)
-    key = re.escape("with press.temperature_c 135.0, not 140.0; take")
+    key = re.escape("of another design (press.temperature_c = 135.0 there, 140.0 here); take")
     with pytest.raises(OutputError, match=f"{key}.* --set name=NAME"):
         generate(RunRequest(load_design("1dof-5mm", OTHER), tmp_path, (part,)))
     assert file_hashes(good.folder) == before
