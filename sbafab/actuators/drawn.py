@@ -241,7 +241,7 @@ class DrawnDesign(Design):
     lumen: Length | None = None
     """Diameter of the channel through all layers round (0, 0), and of its dowel pin."""
     pins: Annotated[tuple[DrawnPin, ...], Field(strict=False, max_length=200)] | None = None
-    """The dowel pins, by default one in every bore and in the lumen."""
+    """The dowel pins, by default one in every bore, unless there are nets, and in the lumen."""
     tube: DrawnTube | None = None
     """The tube that the laminate is wrapped round; none by default."""
     notes: Annotated[tuple[NoteText, ...], Field(strict=False, max_length=20)] | None = None
@@ -362,8 +362,7 @@ def build(design: DrawnDesign) -> Laminate:
         Bore(chamber.name, centre, design.bore.diameter)
         for chamber in chambers
         for centre in chamber.centres
-        # A chamber of a net goes from film to film through the holes that are drawn.
-        if len(chamber.balloons or range(balloons)) > 1 and design.nets is None
+        if len(chamber.balloons or range(balloons)) > 1
     )
     stack = _turned(layers(cuts, design), design)
     laminate = Laminate(
@@ -373,7 +372,8 @@ def build(design: DrawnDesign) -> Laminate:
         chambers=chambers,
         bores=bores,
         inlets=tuple(_inlet(chamber, design) for chamber in design.chambers),
-        pins=_pins(design, bores),
+        # With nets a bore is a hole like others: masks go on over it, and no pin stands in it.
+        pins=_pins(design, () if _nets(design) else bores),
         lumen=design.lumen,
         balloons=balloons,
         registration=design.registration.method,

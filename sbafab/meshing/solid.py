@@ -340,7 +340,7 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     laminate = parted(laminate)
     axes = [bore.centre for bore in laminate.bores if bore.chamber == chamber.name]
     if laminate.nets:
-        # Chambers of nets have no bores: they go through the holes that are drawn.
+        # Chambers of nets go through all holes that are drawn, not through bores alone.
         inner = laminate.tpe_layers[1:-1]
         axes = [_middle(hole) for layer in inner for hole in layer.profile.holes]
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]

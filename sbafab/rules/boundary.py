@@ -397,8 +397,12 @@ def _union(regions: tuple[Region, ...]) -> Region:
 
 
 def pin_openings(laminate: Laminate) -> Region:
-    """The openings of bores, lumen and tooling holes, as wide as a hole may be for its pin."""
-    places = [(bore.centre, bore.diameter) for bore in laminate.bores]
+    """The openings of bores, lumen and tooling holes, as wide as a hole may be for its pin.
+
+    With nets no pin stands in a bore.
+    """
+    bores = laminate.bores if not laminate.nets else ()
+    places = [(bore.centre, bore.diameter) for bore in bores]
     places += [(pin.centre, pin.hole) for pin in laminate.pins]
     if laminate.lumen is not None:
         places.append(((0.0, 0.0), laminate.lumen))

@@ -21,25 +21,40 @@ from sbafab.rules.rule import Explanation, Rule
 
 
 class Channel(NamedTuple):
-    """A channel and one layer of every pattern that it must be open in."""
+    """A channel and one layer of every pattern that it must be open in.
+
+    ``has_axis``: all openings lie about one axis, as a pin or a tube stands in it.
+    """
 
     name: str
     centre: Point
     diameter: float
     layers: tuple[Layer, ...]
+    has_axis: bool = True
 
 
 def channels(laminate: Laminate) -> list[Channel]:
-    """Bores, from above the first base to below the cap, and the lumen, through every layer."""
-    chamber_gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
+    """Bores, through the balloons of their chamber, and the lumen, through every layer.
+
+    Where nets say what is joined, a bore is the holes that films have at its place: masks go on
+    over them, and a film without one may be passed elsewhere.
+    """
+    gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
+    spans = {
+        chamber.name: [gap for number, gap in enumerate(gaps, start=1) if chamber.is_in(number)]
+        for chamber in laminate.chambers
+    }
     passages = []
-    if laminate.bores and chamber_gaps:
-        bottom, top = chamber_gaps[0].below.index, chamber_gaps[-1].above.index
-        bored = _distinct(layer for layer in laminate.layers if bottom < layer.index < top)
-        passages = [
-            Channel(f"bore of {bore.chamber}", bore.centre, bore.diameter, bored)
-            for bore in laminate.bores
-        ]
+    for bore in laminate.bores if gaps else ():
+        span = spans.get(bore.chamber) or gaps
+        bottom, top = span[0].below.index, span[-1].above.index
+        within = [layer for layer in laminate.layers if bottom < layer.index < top]
+        if laminate.nets:
+            films = (layer for layer in within if not layer.is_mask)
+            within = [film for film in films if not film.profile.contains(bore.centre)]
+        if within:
+            name, bored = f"bore of {bore.chamber}", _distinct(within)
+            passages.append(Channel(name, bore.centre, bore.diameter, bored, not laminate.nets))
     if laminate.lumen is not None:
         layers = _distinct(laminate.layers)
         passages.append(Channel("lumen", (0.0, 0.0), laminate.lumen, layers))

@@ -277,7 +277,7 @@ class _Reading:
                 width = 0.0 if opening is None else _across(graph.openings[opening])
                 rows.append(_Terminal(member, member, beside, port.at, width, False, layers))
                 continue
-            holding = self._holding(port.at, [layers])
+            holding = self._holding(port.at, layers)
             rows.append(_Terminal(member, member, holding, port.at, 0.0, True, layers))
         for number, inlet in enumerate(laminate.inlets):
             if inlet.chamber == member:
@@ -287,24 +287,24 @@ class _Reading:
                 rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
         gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
         for chamber in laminate.chambers:
-            faces = [
-                (gap.below.index, gap.above.index)
-                for balloon, gap in enumerate(gaps, start=1)
-                if chamber.is_in(balloon)
-            ]
-            for centre in chamber.centres if chamber.name == member else ():
-                holding = self._holding(centre, faces)
+            balloons = [n for n in range(1, len(gaps) + 1) if chamber.is_in(n)]
+            for balloon in balloons if chamber.name == member else ():
+                layers = (gaps[balloon - 1].below.index, gaps[balloon - 1].above.index)
                 label = f"the pocket of {member}"
-                rows.append(_Terminal(member, label, holding, centre, 0.0, True, ()))
+                label += f" in balloon {balloon}" if len(balloons) > 1 else ""
+                rows += [
+                    _Terminal(member, label, self._holding(p, layers), p, 0.0, True, layers)
+                    for p in chamber.centres
+                ]
         return rows
 
-    def _holding(self, p: Point, faces: Sequence[tuple[int, int]]) -> tuple[int, ...]:
-        """The cavities between any of these pairs of layers that hold a point."""
+    def _holding(self, p: Point, layers: tuple[int, int]) -> tuple[int, ...]:
+        """The cavities between a pair of layers that hold a point."""
         return tuple(
             number
             for number, cavity in enumerate(self.cavities)
             for gap in [self.interface(cavity.interface)]
-            if (gap.below.index, gap.above.index) in faces
+            if (gap.below.index, gap.above.index) == layers
             and not cavity.is_open_film
             and cavity.region.contains(p)
         )

@@ -62,7 +62,7 @@ RULE = Rule(
 
 def _off_axis(laminate: Laminate) -> Iterator[_Departure]:
     for channel in channels(laminate):
-        for layer in channel.layers:
+        for layer in channel.layers if channel.has_axis else ():
             centre = _opening_centre(layer, channel)
             if centre is not None:
                 yield _Departure(

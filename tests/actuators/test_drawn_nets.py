@@ -144,6 +144,126 @@ def test_nets_alone_catches_it(
     assert math.dist((x, y), place) <= 1
 
 
+TWO_BALLOONS = """
+# A chamber with a pocket in two balloons, joined by its bore, and another in the upper one.
+name = "two"
+family = "drawn"
+layers = [
+  {role = "base", shape = "film"},
+  {role = "chamber-mask", shape = "low"},
+  {role = "wall", shape = "bored"},
+  {role = "chamber-mask", shape = "high", pieces = 2},
+  {role = "cap", shape = "film"},
+]
+chambers = [
+  {name = "a", balloons = [1, 2], centres = [[0, 0]], mouth = [-20, 0], angle = 180, width = 2.4},
+  {name = "b", balloons = [2], centres = [[10, 0]], mouth = [20, 0], angle = 0, width = 2.4},
+]
+
+[nets]
+a = ["a"]
+b = ["b"]
+
+[bore]
+diameter = 2
+
+[shapes]
+film = {polygon = [[-20, -8], [20, -8], [20, 8], [-20, 8]]}
+bore = {disc = 2}
+bored = {difference = ["film", "bore"]}
+pocket = {polygon = [[-4, -3], [4, -3], [4, 3], [-4, 3]]}
+to-left = {slot = [[0, 0], [-21, 0]], width = 2.4}
+to-right = {slot = [[10, 0], [21, 0]], width = 2.4}
+low = {union = ["pocket", "to-left"]}
+high = {union = ["pocket", "to-right"]}
+across = {slot = [[0, 0], [21, 0]], width = 2.4}
+foreign = {union = ["pocket", "across"]}
+"""
+
+
+def two_balloons(scale: float, by: Point) -> dict[str, Any]:
+    """The chamber of two balloons, all of it so many times as large and moved."""
+    data = tomllib.loads(TWO_BALLOONS)
+
+    def placed(p: list[float]) -> list[float]:
+        return [scale * p[0] + by[0], scale * p[1] + by[1]]
+
+    for shape in data["shapes"].values():
+        shape |= {
+            key: [placed(p) for p in shape[key]] for key in shape.keys() & {"polygon", "slot"}
+        }
+        shape |= {key: scale * shape[key] for key in shape.keys() & {"disc", "width"}}
+    data["shapes"]["bore"]["at"] = [*by]
+    for chamber in data["chambers"]:
+        chamber["centres"] = [placed(p) for p in chamber["centres"]]
+        chamber |= {"mouth": placed(chamber["mouth"]), "width": scale * chamber["width"]}
+    data["bore"]["diameter"] *= scale
+    return data
+
+
+SCALED = pytest.mark.parametrize(("scale", "by"), [(1.0, (0, 0)), (2.5, (7, -3)), (0.9, (-31, 12))])
+
+
+@SCALED
+def test_a_chamber_of_two_balloons_passes_with_nets(
+    tmp_path: Path, scale: float, by: Point
+) -> None:
+    laminate = drawn(tmp_path, two_balloons(scale, by))
+    (bore,) = laminate.bores
+    assert (bore.chamber, bore.centre, bore.diameter) == ("a", by, 2 * scale)
+    # Masks go on over it, so that no pin stands in it.
+    assert laminate.pins == ()
+    assert failures(laminate) == []
+
+
+@SCALED
+def test_a_chamber_lies_in_its_net_in_each_of_its_balloons(
+    tmp_path: Path, scale: float, by: Point
+) -> None:
+    data = two_balloons(scale, by)
+    data["layers"][3] = {"role": "chamber-mask", "shape": "foreign"}
+    data["layers"][2]["shape"] = "film"
+    failed = failures(drawn(tmp_path, data))
+    opened, shorted = (finding for finding in failed if finding.rule == "nets")
+    assert opened.message.startswith("net a is open: the pocket of a in balloon 2 is not joined to")
+    assert shorted.message.startswith("nets a and b are joined at interface 2")
+    # With no pocket at all there it is an open alone.
+    data["layers"][3]["shape"] = "to-right"
+    messages = [f.message for f in failures(drawn(tmp_path, data)) if f.rule == "nets"]
+    assert [message.split(" (")[0] for message in messages] == [
+        "net a is open: the pocket of a in balloon 2 lies in no void"
+    ]
+
+
+@SCALED
+def test_a_bore_counts_with_nets_too(tmp_path: Path, scale: float, by: Point) -> None:
+    """Its hole is 0.3 of what the bore asks for; nets alone would pass it."""
+    data = two_balloons(scale, by)
+    data["shapes"]["bore"]["disc"] = 0.6 * scale
+    (clear,) = failures(drawn(tmp_path, data))
+    assert clear.rule == "channel-clear"
+    assert clear.measured == pytest.approx(0.6 * scale)
+    # Off the chamber's place it is a hole like others.
+    data["shapes"]["bore"]["at"][1] += 2 * scale
+    assert failures(drawn(tmp_path, data)) == []
+
+
+def test_a_bore_goes_through_the_balloons_of_its_chamber_alone(tmp_path: Path) -> None:
+    data = two_balloons(1.0, (0, 0))
+    del data["nets"]
+    for number in (1, 3):
+        name = data["layers"][number]["shape"]
+        data["layers"][number]["shape"] = f"{name}-bored"
+        data["shapes"][f"{name}-bored"] = {"difference": [name, "bore"]}
+    data["layers"][4:] = [
+        {"role": "wall", "shape": "film"},
+        {"role": "chamber-mask", "shape": "to-right"},
+        {"role": "cap", "shape": "film"},
+    ]
+    data["chambers"].append(data["chambers"][1] | {"name": "c", "balloons": [3]})
+    assert failures(drawn(tmp_path, data)) == []
+
+
 def with_member(net: str, member: str) -> Callable[[dict[str, Any]], None]:
     return lambda data: data["nets"][net].append(member)
 

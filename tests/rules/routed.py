@@ -206,7 +206,9 @@ def laminate_of(routes: Routes) -> Laminate:
         if name not in routes.mouths
     )
     chambers = tuple(
-        Chamber(name, ((1.5 - MARGIN, xy(routes.ports[name])[1]),)) for name in routes.mouths
+        Chamber(name, ((1.5 - MARGIN, xy(p)[1]),), (p[0] + 1,))
+        for name in routes.mouths
+        for p in [routes.ports[name]]
     )
     inlets = tuple(
         Inlet(name, (-MARGIN, xy(routes.ports[name])[1]), (-1.0, 0.0), routes.width, 1.0, 0.3)

@@ -231,7 +231,7 @@ def test_sealing_leaves_the_voids_to_nets() -> None:
 
 def test_a_chamber_of_no_net_must_reach_its_own_pocket() -> None:
     laminate = laminate_of(straight())
-    lost = Chamber("lost", ((2.0, 6.0),))
+    lost = Chamber("lost", ((2.0, 6.0),), (1,))
     faults = connectivity(replace(laminate, chambers=(lost,)), LIMITS).faults
     assert [(fault.kind, fault.nets) for fault in faults] == [("open", ("lost",))]
 
@@ -267,7 +267,8 @@ def test_an_inlet_that_is_cut_off_is_told_from_its_pocket() -> None:
     cut = replace(laminate, layers=tuple(layers), nets=nets)
     (fault,) = [each for each in connectivity(cut, LIMITS).faults if each.kind == "open"]
     assert fault.message.startswith(
-        "net chamber1 is open: the pocket of chamber1 is not joined to the inlet of chamber1; "
+        "net chamber1 is open: the inlet of chamber1 is not joined to the pocket of chamber1 in "
+        "balloon 1 and the pocket of chamber1 in balloon 2 and "
     )
 
 
