@@ -52,7 +52,7 @@ HELP = """Find the best design that meets requirements.
 
 Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
 miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
-height H with units, such as force@12.5mm@50kPa:
+height H with units, such as force@12.5mm@50kPa or force@50%@50kPa:
 
 \b
 {quantities}

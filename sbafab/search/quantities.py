@@ -32,6 +32,7 @@ from sbafab.models.elastic import (
     moved_stack,
     refuse_stretched,
     shut_stiffness,
+    stroke_at,
     time_to_fill,
 )
 from sbafab.models.figures import Factors
@@ -81,7 +82,7 @@ QUANTITIES = (
     QuantityName("stroke@P", "mm", "free stroke at P kPa, elastic balloon"),
     QuantityName("reference_stroke", "mm", "what the paper measured, scaled"),
     QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P"),
-    QuantityName("force@H@P", "N", "blocked at the stroke H mm, at P kPa"),
+    QuantityName("force@H@P", "N", "blocked at the stroke H mm or %, at P kPa"),
     QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
     QuantityName("time", "s", "to 10 kPa with water at --flow"),
     QuantityName("contraction", "mm", "free, of a drawn pouch motor"),
@@ -132,14 +133,15 @@ AS_DRAWN = ("overall_diameter", "outline_diameter", "width", "length", "lumen", 
 """Quantities of the drawing and its tolerances; all other names are predicted."""
 HOW = (
     'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@2chambers@5kPa", '
-    '"force@12.5mm@50kPa" or chamber.diameter'
+    '"force@12.5mm@50kPa", "force@50%@50kPa" or chamber.diameter'
 )
 
 
 @dataclass(frozen=True)
 class RequestedQuantity:
-    """A quantity by name or dotted key; with its pressure in kPa, a force with its stroke in mm, a
-    bend with the number of its pressurised chambers, a time with its flow in ml/min.
+    """A quantity by name or dotted key; with its pressure in kPa, a force with its stroke in mm or
+    as a share of the reference stroke, a bend with the number of its pressurised chambers, a time
+    with its flow in ml/min.
     """
 
     name: str
@@ -148,10 +150,12 @@ class RequestedQuantity:
     stroke: float | None = None
     chambers: int = 1
     flow: float | None = None
+    share: float | None = None
 
     @property
     def label(self) -> str:
         at = f"@{self.stroke:g}mm" if self.stroke is not None else ""
+        at += f"@{100 * self.share:g}%" if self.share is not None else ""
         at += f"@{self.chambers}chambers" if self.chambers > 1 else ""
         at += f"@{self.kpa:g}kPa" if self.kpa is not None else ""
         return f"{self.name}{at}{f'@{self.flow:g}ml/min' if self.flow is not None else ''}"
@@ -194,6 +198,7 @@ def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
 def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -> RequestedQuantity:
     pressure: float | None = None
     stroke: float | None = None
+    share: float | None = None
     chambers = 1
     for place in places:
         count = _CHAMBERS.fullmatch(place)
@@ -212,19 +217,21 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
                 f"{f' or {place}mm' if name == 'force' else ''}"
             )
         try:
-            stroke = millimetres(place)
-        except ValueError:
-            raise DesignError(
-                f"{shown(text)}: {shown(place)} is neither a pressure nor a length; {HOW}"
-            ) from None
-    if (name == "force") != (stroke is not None):
+            if place.endswith("%"):
+                share = _share(place)
+            else:
+                stroke = millimetres(place)
+        except ValueError as error:
+            problem = error if place.endswith("%") else "is neither a pressure nor a length"
+            raise DesignError(f"{shown(text)}: {shown(place)} {problem}; {HOW}") from None
+    if (stroke, share).count(None) != (1 if name == "force" else 2):
         raise DesignError(
-            f"{shown(text)}: a force needs a stroke, and only a force takes one; {HOW}"
+            f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
         )
     if pressure is None:
         pressure = USUAL_KPA if kpa is None else kpa
     force(pressure, 0.0)
-    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke, chambers)
+    return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke, chambers, share=share)
 
 
 def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQuantity:
@@ -376,7 +383,18 @@ class Subject:
             return self._bend(quantity.chambers, kpa)
         if quantity.name == "lateral_stiffness":
             return shut_stiffness(self._stack, kpa)[0]
-        return self._force(quantity.stroke or 0.0, kpa)
+        return self._force(self._stroke_of(quantity), kpa)
+
+    def _stroke_of(self, quantity: RequestedQuantity) -> float:
+        """Return the stroke in mm at which a force is blocked; a share of it is what it is in
+        ``predict``. Raises DesignError for a share where there is no reference stroke.
+        """
+        if not quantity.share:
+            return quantity.stroke or 0.0
+        reference = self._actuator.known_stroke
+        if isinstance(self.design.form.pockets, Slots):
+            return quantity.share * reference
+        return stroke_at(self._actuator, quantity.share)
 
     @cached_property
     def factors(self) -> Factors:
@@ -412,8 +430,12 @@ class Subject:
         if self.uncertainty is None or group is None:
             return None
 
+        is_force = quantity.name == "force" and self.value(quantity, lambda: math.nan) > 0
+
         def value_at(factors: Factors) -> float:
-            return self._at(factors).value(quantity, lambda: math.nan)
+            value = self._at(factors).value(quantity, lambda: math.nan)
+            # Below 0 a force is how far it is from one, to search by.
+            return max(value, 0.0) if is_force else value
 
         delay = DELAYS["water"] if quantity.name == "time" else ""
         return self.uncertainty.interval_of(group, value_at, share, delay)[1]
@@ -490,7 +512,7 @@ class Subject:
         if quantity.name in names:
             return names[quantity.name], ELASTIC_STACK
         # Of the three heights at which forces were measured the nearest.
-        share = (quantity.stroke or 0.0) / self._actuator.reference_stroke
+        share = self._stroke_of(quantity) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))
         where = f"at {100 * near:g} % of the reference stroke" if near else "flat"
         return f"blocked force {at}, {where}", ELASTIC_STACK

@@ -35,6 +35,8 @@ def _value(text: str, name: str = "1dof-5mm", **tables: Any) -> float:
         ("stroke@0.1MPa", RequestedQuantity("stroke", "mm", 100.0)),
         ("force@12.5mm@50kPa", RequestedQuantity("force", "N", 50.0, 12.5)),
         ("force@50 kPa@0.5 in", RequestedQuantity("force", "N", 50.0, 12.7)),
+        ("force@50%", RequestedQuantity("force", "N", 10.0, share=0.5)),
+        ("force@ 12.5 % @50kPa", RequestedQuantity("force", "N", 50.0, share=0.125)),
         ("bend@2chambers@5kPa", RequestedQuantity("bend", "deg", 5.0, chambers=2)),
         ("lateral-stiffness@5kPa", RequestedQuantity("lateral_stiffness", "N/mm", 5.0)),
         ("time", RequestedQuantity("time", "s", flow=35.0)),
@@ -60,7 +62,10 @@ def test_a_quantity_is_read(text: str, found: RequestedQuantity) -> None:
         ("time@5kPa", "a time takes one flow, such as time@35ml/min"),
         ("time@0ml/min", "must be from"),
         ("bend@5mm", "only a force takes one"),
-        ("force@50kPa", "a force needs a stroke"),
+        ("force@50%@5mm", "needs one stroke"),
+        ("force@150%", "must be a share from 0 to 1"),
+        ("stroke@50%", "only a force takes one"),
+        ("force@50kPa", "a force needs one stroke"),
         ("stroke@5mm@50kPa", "only a force takes one"),
         ("stroke@50 apples", "neither a pressure nor a length"),
         ("stroke@500kPa", "367"),
@@ -160,6 +165,7 @@ def test_each_figure_is_the_one_of_predict(diameter: float) -> None:
     height = 0.25 * (full - said.value("deflated height"))
     force = said.value("blocked force at 8 kPa, at 25 % of the reference stroke", "elastic stack")
     assert value(f"force@{height!r}mm@8kPa") == pytest.approx(force, rel=1e-7)
+    assert value("force@25%@8kPa") == pytest.approx(force, rel=1e-7)
     assert value("height") == said.value("deflated height")
 
 
@@ -173,6 +179,7 @@ def test_each_interval_is_the_one_of_predict() -> None:
         "height": "deflated height",
         "bend@2chambers@8kPa": "bend at 8 kPa in 2 chambers, the others empty",
         "lateral_stiffness@8kPa": "lateral tip stiffness at 8 kPa, chambers shut",
+        "force@75%@8kPa": "blocked force at 8 kPa, at 75 % of the reference stroke",
         "time@20ml/min": "time to 10 kPa at the pump, water at 20 ml/min in all",
     }
     for text, name in names.items():
@@ -197,6 +204,18 @@ def test_diameters_round_a_tube_are_those_of_predict() -> None:
     for name in ("deflated_diameter", "reached_diameter", "inflated_diameter"):
         found = said.value(name.replace("_", " "))
         assert _value(name, "radial-15mm") == pytest.approx(found, rel=1e-12)
+
+
+def test_a_force_at_a_share_of_the_stroke_is_that_of_predict_round_a_tube_too() -> None:
+    said = sbafab.predict("radial-15mm", pressures_kpa=20)
+    (force, *_) = (
+        f for f in said.figures if f.name.endswith("20 kPa, at 25 % of the reference stroke")
+    )
+    assert _value("force@25%@20kPa", "radial-15mm") == pytest.approx(force.value, rel=1e-12)
+    film = {"product": "TPU", "thickness": 0.1, "modulus": 20, "poisson": 0.45}
+    with pytest.raises(DesignError, match="reference stroke: "):
+        _value("force@25%@20kPa", films={"tpe": film})
+    assert _value("force@0%@20kPa", films={"tpe": film}) > 0
 
 
 def test_a_lone_chamber_does_not_bend() -> None:
