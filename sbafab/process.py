@@ -1,4 +1,4 @@
-"""Settings of a process that runs a command, its processors, and the type of progress."""
+"""Settings of a process that runs a command, its threads, and the type of progress."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import atexit
 import gc
 import os
 from collections.abc import Callable
+from contextlib import ContextDecorator
+from functools import cache
+from threading import Lock
+from typing import Any
 
 YOUNG = 200_000
 """Objects before a garbage collection: a run keeps most of its objects and has few cycles, and
@@ -22,6 +26,42 @@ def prepare() -> None:
     gc.set_threshold(YOUNG, *gc.get_threshold()[1:])
     # A last collection when the process ends would take 0.05 s or more.
     atexit.register(gc.freeze)
+
+
+class OneBlasThread(ContextDecorator):
+    """Linear algebra on one thread, in this process, while any thread of it is in here.
+
+    As decorator or context manager, of which one may be in another. Our matrices are small: more
+    threads wait for each other, a hundredfold where they are more than processors. What the
+    caller had set holds again afterwards.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._depth = Lock(), 0
+        self._limit: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._limit = _thread_pools().limit(limits=1, user_api="blas")
+            self._depth += 1
+
+    def __exit__(self, *error: object) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0:
+                self._limit.restore_original_limits()
+
+
+@cache
+def _thread_pools() -> Any:
+    """Return the thread pools of numpy's linear algebra, which has been loaded by then."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+one_blas_thread = OneBlasThread()
 
 
 def processors() -> int:

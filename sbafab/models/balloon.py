@@ -37,6 +37,7 @@ from sbafab.models.film_elements import (
     strain,
 )
 from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
+from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -582,6 +583,7 @@ TwoFilms = tuple["Balloon", "Balloon"]
 Loads = tuple["BalloonLoad", "BalloonLoad"]
 
 
+@one_blas_thread
 def inflate_two_films(films: TwoFilms, load: BalloonLoad) -> Shapes:
     """Return the shapes under a load; ``r`` and ``z`` are those of the film that stretches more
     easily.

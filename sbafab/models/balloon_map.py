@@ -22,6 +22,7 @@ import numpy as np
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes
 from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
+from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -364,6 +365,7 @@ def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
+@one_blas_thread
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
     top = HEADROOM * highest(balloon, most_pressure)

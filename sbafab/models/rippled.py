@@ -19,6 +19,7 @@ from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
 from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
+from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -198,6 +199,7 @@ def _between(
 
 
 @lru_cache(maxsize=64)
+@one_blas_thread
 def wave_states(balloon: Balloon) -> FilmStates:
     """Return free balloons with waves in step with the rim at pressures all over their range; none
     where there are no such waves.
@@ -265,6 +267,7 @@ def resolves_waves(balloon: Balloon) -> bool:
     return usual and balloon.mate is None and balloon.pocket >= WIDE * balloon.ring
 
 
+@one_blas_thread
 def rippled(balloon: Balloon, pressure: ArrayLike, waves: int | None = None) -> Rippled:
     """Return free balloons at pressures in kPa, all with as many ``waves`` round the rim; else with
     those of least energy where ripples are well grown.

@@ -27,6 +27,7 @@ from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
 from sbafab.models.reach import P0
 from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion
 from sbafab.models.stack_poses import NO_LOAD, Pose
+from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -97,6 +98,7 @@ class StackBatch:
 
     stack: Stack
 
+    @one_blas_thread
     def poses(
         self, pressures: ArrayLike, near: BatchPoses | None = None, **load: Any
     ) -> BatchPoses:
@@ -133,6 +135,7 @@ class StackBatch:
         tips, none = self.tips(freedoms), np.zeros(len(asked))
         return BatchPoses(asked, self.every_level(freedoms), volumes.T, tips, none)
 
+    @one_blas_thread
     def reach(self, tips: ArrayLike, most_pressure: float | None = None, **load: Any) -> BatchPoses:
         """Return poses whose tips stand at places (N, 3) in mm, those that ``Stack.reach`` finds
         one by one, with pressures from 0 to ``most_pressure`` in kPa.
@@ -394,6 +397,7 @@ class BatchMotion:
             each = freedoms.transpose(2, 0, 1)
         return BatchPoses(self.pressures, each, volumes.T, self.tips, np.zeros(len(self.times)))
 
+    @one_blas_thread
     def step(self, dt: float, pressures: ArrayLike) -> None:
         """Move on by ``dt`` s with pressures (N, chambers) in kPa at the valves. Raises
         DesignError as ``Motion.step`` does, for the first state that has no pose.

@@ -42,3 +42,75 @@ def test_a_caller_with_arguments_of_its_own_keeps_its_process() -> None:
     threshold, *variables = settings_after("sbafab.cli", '["--version"]')
     assert int(threshold) < YOUNG
     assert variables == ["None", "None"]
+
+
+SOLVES = """
+import numpy as np, threadpoolctl, sbafab
+from sbafab.process import one_blas_thread
+
+def threads():
+    return [pool["num_threads"] for pool in threadpoolctl.threadpool_info()]
+
+{code}
+"""
+
+
+def printed(code: str) -> list[str]:
+    """What a fresh interpreter prints in whose environment nobody limits threads."""
+    free = {name: value for name, value in os.environ.items() if "NUM_THREADS" not in name}
+    command = [sys.executable, "-c", SOLVES.format(code=code)]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, env=free)
+    return run.stdout.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("solver", "call"),
+    [
+        # The fit of a map, films with waves, two unlike films, and many stacks at once.
+        ("np.linalg.qr", "sbafab.predict('3dof-15mm')"),
+        ("sbafab.models.rippled.equilibrium", "rippled.rippled(Balloon(pocket=5.0), 8.0)"),
+        ("np.linalg.pinv", "inflate(Balloon(mate=Balloon(thickness=0.1)), 8.0)"),
+        (
+            "sbafab.models.stack_batch.descended",
+            "StackBatch(sbafab.stack('1dof-5mm')).poses([[8]])",
+        ),
+    ],
+)
+def test_models_are_solved_on_one_thread_and_the_caller_keeps_its_own(
+    solver: str, call: str
+) -> None:
+    module, _, name = solver.rpartition(".")
+    lines = printed(
+        f"""
+from sbafab.models import rippled, stack_batch
+from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.stack_batch import StackBatch
+solve, within = {solver}, set()
+
+def watched(*arguments, **options):
+    within.add(tuple(threads()))
+    if len(within | {{(1,)}}) > 1:
+        raise SystemExit(f"{{within}} threads")
+    return solve(*arguments, **options)
+
+{module}.{name} = watched
+threadpoolctl.threadpool_limits(8)
+{call}
+print(*within)
+print(*threads())
+"""
+    )
+    assert lines == ["(1,)", "8"]
+
+
+def test_threads_come_back_when_the_last_of_overlapping_solves_ends() -> None:
+    code = """
+threadpoolctl.threadpool_limits(8)
+one_blas_thread.__enter__()
+one_blas_thread.__enter__()
+one_blas_thread.__exit__()
+print(*threads())
+one_blas_thread.__exit__()
+print(*threads())
+"""
+    assert printed(code) == ["1", "8"]
