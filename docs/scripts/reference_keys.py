@@ -7,7 +7,7 @@ from typing import Any
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.explain import Key, design_keys
+from sbafab.cli.explain import DesignKey, design_keys
 
 HEAD = """# Keys of a design file
 
@@ -24,7 +24,7 @@ def page(schema: Mapping[str, Any] | None = None) -> str:
     """Return the whole page, as MyST Markdown: a table for each section."""
     parts = [HEAD]
     rows = design_keys(schema or actuators.schema(Assembly))
-    by_section: dict[str, list[Key]] = {}
+    by_section: dict[str, list[DesignKey]] = {}
     for row in rows:
         section = row.key.partition(".")[0] if "." in row.key else "keys outside sections"
         by_section.setdefault(section, []).append(row)

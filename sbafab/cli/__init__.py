@@ -93,7 +93,7 @@ EXTRAS = {
     "mujoco": ("mujoco", "simulate --with mujoco"),
     "optuna": ("optuna", "find --optuna"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
-    "python": ("trimesh", "meshes for trimesh, meshio and PyVista"),
+    "python": ("meshio", "meshes for meshio and PyVista"),
     "quality": ("scipy", "record --charts, record --gauge"),
     "scan": ("skimage", "sbafab inspect"),
     "studio": ("starlette", "sbafab studio"),

@@ -18,7 +18,7 @@ NAMED = "NAME"
 """In a key, a name that the design file chooses, as that of a film or a shape."""
 
 
-class Key(NamedTuple):
+class DesignKey(NamedTuple):
     """A key of design files, as one or several families have it; texts as a person reads them."""
 
     key: str
@@ -111,7 +111,7 @@ def explainable_names() -> list[str]:
     return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES)]
 
 
-def design_keys(schema: Mapping[str, Any] | None = None) -> list[Key]:
+def design_keys(schema: Mapping[str, Any] | None = None) -> list[DesignKey]:
     """Return every key of design files from their JSON schema, in the order of the file.
 
     A key that two families have alike stands once, with both names.
@@ -120,7 +120,7 @@ def design_keys(schema: Mapping[str, Any] | None = None) -> list[Key]:
     from sbafab.assemblies.records import Assembly
 
     schema = schema or actuators.schema(Assembly)
-    families: dict[Key, list[str]] = {}
+    families: dict[DesignKey, list[str]] = {}
     for reference in schema["oneOf"]:
         record = _resolved(reference, schema)
         name = record["properties"]["family"]["const"]
@@ -129,7 +129,7 @@ def design_keys(schema: Mapping[str, Any] | None = None) -> list[Key]:
     return [row._replace(families=tuple(names)) for row, names in families.items()]
 
 
-def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> Iterator[Key]:
+def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> Iterator[DesignKey]:
     """Yield the keys of a table and of the tables below it."""
     for key, value in record.get("properties", {}).items():
         tables = list(_tables(value, schema))
@@ -140,7 +140,7 @@ def _keys(prefix: str, record: Mapping[str, Any], schema: Mapping[str, Any]) -> 
             constant = "const" in value
             default = "required" if constant else _default(value)
             allowed = value["const"] if constant and key != "family" else _allowed(value)
-            yield Key(f"{prefix}{key}", meaning, default, allowed)
+            yield DesignKey(f"{prefix}{key}", meaning, default, allowed)
 
 
 def _tables(value: Any, schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
-from sbafab.cli.explain import Key
+from sbafab.cli.explain import DesignKey
 from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
@@ -332,7 +332,7 @@ def _inspection() -> dict[str, Any]:
 def _explain() -> dict[str, Any]:
     schema = {"const": ids.EXPLAIN_SCHEMA}
     rule = of(Explanation, schema=schema, rule=TEXT)
-    keys = table(schema=schema, keys=array(of(Key)))
+    keys = table(schema=schema, keys=array(of(DesignKey)))
     return {"oneOf": [rule, keys, table(schema=schema, quantities=array(of(QuantityName)))]}
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.formats.registry import MESH_FORMATS
-from sbafab.meshing.formats.stl import write_stl
+from sbafab.meshing.formats.surfaces import write_stl
 from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import tube_wrap, wrapped

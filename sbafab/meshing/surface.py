@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sbafab.errors import DesignError
 from sbafab.geometry.cache import cached_attribute
 
 if TYPE_CHECKING:
@@ -37,12 +36,9 @@ class Surface:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def trimesh(self) -> trimesh.Trimesh:
-        """The surface for trimesh (extra "python"). Raises DesignError where it is missing."""
-        try:
-            import trimesh
-        except ImportError as error:
-            hint = 'add it with pip install "sbafab[python]"'
-            raise DesignError(f"trimesh is not installed; {hint}") from error
+        """Return the surface for trimesh, its points and faces in the same order."""
+        import trimesh
+
         return trimesh.Trimesh(self.points, self.faces, process=False)
 
 

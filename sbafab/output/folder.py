@@ -11,7 +11,7 @@ from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
 from sbafab.assemblies.shapes import colours, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
-from sbafab.meshing.formats.glb import Node, write_scene
+from sbafab.meshing.formats.surfaces import Node, write_scene
 from sbafab.output.artefacts import (
     FINDINGS,
     TRAVELLER,

@@ -11,14 +11,13 @@ import csv
 import json
 import math
 import re
-import struct
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, NamedTuple
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 from pydantic import BaseModel
 
@@ -662,7 +661,9 @@ def bodies(path: Path) -> list[MeshBody]:
     readers = {".stl": _stl, ".3mf": _3mf, ".glb": _glb}
     try:
         return readers[path.suffix](path)
-    except (ValueError, LookupError, TypeError, struct.error, BadZipFile) as error:
+    except OutputError:
+        raise
+    except Exception as error:  # readers of libraries raise anything on a damaged file
         raise OutputError(f"no sound mesh: {error}") from error
 
 
@@ -732,19 +733,15 @@ def _unmatched_point(
 
 def _stl(path: Path) -> list[MeshBody]:
     import numpy as np
+    from trimesh.exchange.stl import load_stl_binary
 
-    data = path.read_bytes()
-    (count,) = struct.unpack_from("<I", data, 80)
-    if len(data) != 84 + 50 * count or not count:
-        raise OutputError("its length is not that of its triangles")
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
-    rows = np.frombuffer(data, kind, offset=84)
-    points, faces = np.unique(rows["corners"].reshape(-1, 3), axis=0, return_inverse=True)
-    surface = Surface(points.astype(np.float64), faces.reshape(-1, 3).astype(np.int64))
+    with path.open("rb") as file:
+        mesh = load_stl_binary(file)
+    points, faces = np.unique(mesh["vertices"], axis=0, return_inverse=True)
+    surface = Surface(points.astype(np.float64), faces.reshape(-1, 3))
     edges = surface.points[surface.faces]
     normal = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
-    against = np.einsum("ij,ij->i", normal, rows["normal"].astype(np.float64))
-    if (against < 0).any():
+    if (np.einsum("ij,ij->i", normal, mesh["face_normals"]) < 0).any():
         raise OutputError("a triangle's normal points inward")
     return [MeshBody(surface, "")]
 
@@ -765,31 +762,15 @@ def _3mf(path: Path) -> list[MeshBody]:
 
 def _glb(path: Path) -> list[MeshBody]:
     import numpy as np
+    import trimesh
 
-    data = path.read_bytes()
-    magic, _, total, size, kind = struct.unpack_from("<4sII I4s", data)
-    if magic != b"glTF" or kind != b"JSON" or total != len(data):
-        raise OutputError("no binary glTF")
-    document: dict[str, Any] = json.loads(data[20 : 20 + size])
-    start = 28 + size
+    scene = trimesh.load_scene(path, process=False)
     mesh_bodies = []
-    for node in document["nodes"]:
-        (primitive,) = document["meshes"][node["mesh"]]["primitives"]
-        arrays = []
-        for number, kind in (
-            (primitive["attributes"]["POSITION"], "<f4"),
-            (primitive["indices"], "<u4"),
-        ):
-            accessor = document["accessors"][number]
-            view = document["bufferViews"][accessor["bufferView"]]
-            begin = start + view.get("byteOffset", 0)
-            arrays.append(
-                np.frombuffer(data[begin : begin + view["byteLength"]], kind).reshape(-1, 3)
-            )
-        material = document["materials"][primitive["material"]]
-        surface = Surface(arrays[0].astype(np.float64), arrays[1].astype(np.int64))
-        attributes = {key: value for key, value in node.items() if key != "mesh"}
-        mesh_bodies.append(
-            MeshBody(surface, json.dumps([attributes, material, document["scenes"]]))
-        )
+    for node in sorted(scene.graph.nodes_geometry):
+        transform, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        surface = Surface(np.array(mesh.vertices), np.array(mesh.faces))
+        material = mesh.visual.material
+        paint = [material.name, *map(str, (material.baseColorFactor, material.roughnessFactor))]
+        mesh_bodies.append(MeshBody(surface, json.dumps([node, transform.tolist(), paint])))
     return mesh_bodies

@@ -1,4 +1,4 @@
-"""The mesh formats: each is one file of this folder and one row here."""
+"""The mesh formats, a row each."""
 
 from __future__ import annotations
 
@@ -7,12 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sbafab.meshing.conforming.mesh import Mesh
-from sbafab.meshing.formats.glb import write_glb
 from sbafab.meshing.formats.inp import write_inp
 from sbafab.meshing.formats.msh import write_msh
-from sbafab.meshing.formats.obj import write_obj
-from sbafab.meshing.formats.ply import write_ply
-from sbafab.meshing.formats.stl import write_stl
+from sbafab.meshing.formats.surfaces import write_glb, write_obj, write_ply, write_stl
 from sbafab.meshing.formats.three_mf import write_3mf
 from sbafab.meshing.formats.vtk import write_vtk
 from sbafab.meshing.formats.vtu import write_cavity_vtu, write_vtu
