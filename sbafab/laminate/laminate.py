@@ -206,6 +206,16 @@ class Inlet:
     length: float
     tube_diameter: float
 
+    def depth(self, p: Point) -> float:
+        """Return how far a point lies inside the mouth's line, mm."""
+        (x, y), (dx, dy) = self.mouth, self.direction
+        return (x - p[0]) * dx + (y - p[1]) * dy
+
+    def offset(self, p: Point) -> float:
+        """Return how far a point lies beside the mouth's middle, mm, positive to the right."""
+        (x, y), (dx, dy) = self.mouth, self.direction
+        return (p[0] - x) * dy - (p[1] - y) * dx
+
 
 @dataclass(frozen=True)
 class Pin:

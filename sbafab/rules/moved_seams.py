@@ -32,6 +32,9 @@ def straying(laminate: Laminate, tolerances: Tolerances) -> str | None:
 def moved_seams(laminate: Laminate, tolerances: Tolerances) -> Iterator[Laminate]:
     """Yield the laminate with its seams off their paths: all one way, and some against the rest."""
     seams = laminate.seams
+    most = max((tolerances.of_seam(seam.tool) for seam in seams), default=0.0)
+    # A mouth between seams lies where they do.
+    inlets = tuple(replace(inlet, width=inlet.width + 2 * most) for inlet in laminate.inlets)
     against = [{n} for n in range(len(seams))]
     if len(seams) > MOST_SINGLE:
         against = [set(range(0, len(seams), 2))]
@@ -43,7 +46,7 @@ def moved_seams(laminate: Laminate, tolerances: Tolerances) -> Iterator[Laminate
                 for n, seam in enumerate(seams)
                 if (off := tolerances.of_seam(seam.tool)) >= 0
             ]
-            yield replace(laminate, seams=tuple(moved))
+            yield replace(laminate, seams=tuple(moved), inlets=inlets)
 
 
 def _moved_seam(seam: Seam, by: Point) -> Seam:

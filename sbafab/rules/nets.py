@@ -7,7 +7,7 @@ with the nets. A design that declares no nets gets no finding.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -36,7 +36,16 @@ from sbafab.rules.void_axes import (
     blind_ends,
     shortest_way,
 )
-from sbafab.rules.voids import OUTSIDE, Cavity, Void, VoidGraph, cavities, void_graph
+from sbafab.rules.voids import (
+    OUTSIDE,
+    Cavity,
+    Void,
+    VoidGraph,
+    cavities,
+    mouth_of,
+    past_mouth,
+    void_graph,
+)
 
 NAME = "nets"
 NETLIST = "netlist"
@@ -229,7 +238,10 @@ def _missing(name: str, file: str, names: Iterable[str]) -> str:
 
 
 class _Terminal(NamedTuple):
-    """A place that a port or chamber stands for, and the cavities of which one must be its own."""
+    """A place that a port or chamber stands for, and the cavities of which one must be its own.
+
+    ``layers`` are those that it lies between; none for an inlet.
+    """
 
     member: str
     label: str
@@ -281,7 +293,7 @@ class _Reading:
             rows.append(_Terminal(member, member, holding, port.at, 0.0, True, layers))
         for number, inlet in enumerate(laminate.inlets):
             if inlet.chamber == member:
-                mouths = graph.mouths.get(number, ())
+                mouths = graph.joins.get(mouth_of(number), {})
                 beside = tuple(sorted({self.cavity_of[void] for void in mouths}))
                 label = f"the inlet of {member}"
                 rows.append(_Terminal(member, label, beside, inlet.mouth, inlet.width, False, ()))
@@ -395,12 +407,13 @@ class _Reading:
         """Yield the parts that several nets share, a fault for each further net."""
         for part, names in self.owners.items():
             for name in names[1:]:
-                number, p = self._bridge(part, names[0], name)
+                shared = self._shared_mouth(part, names[0], name)
+                number, p, why = shared or self._bridge(part, names[0], name)
                 gap = self.interface(self.cavities[number].interface)
                 message = (
-                    f"nets {names[0]} and {name} are joined at interface {gap.index} ({at(p)}); "
-                    "bond the films between them, or close the hole"
+                    f"nets {names[0]} and {name} are joined at interface {gap.index} ({at(p)})"
                 )
+                message += why
                 yield NetFault("short", (names[0], name), gap.index, gap.layer_indices, p, message)
 
     def leaks(self) -> Iterable[NetFault]:
@@ -412,10 +425,9 @@ class _Reading:
             interface = None if void.kind == "opening" else void.level
             layers = (void.level,) if interface is None else self.interface(interface).layer_indices
             where = f"layer {void.level}" if interface is None else f"interface {interface}"
-            message = (
-                f"net {names[0]} reaches the outside at {where} ({at(p)}); close the opening, or "
-                "make it a port"
-            )
+            message = f"net {names[0]} reaches the outside at {where} ({at(p)})"
+            wide = past_mouth(self.laminate, void.level, p) if void.kind == "pocket" else None
+            message += f": {wide}" if wide else "; close the opening, or make it a port"
             yield NetFault("leak", names, interface, layers, p, message)
 
     def dead_ends(self, ratio: float) -> Iterable[NetFault]:
@@ -488,18 +500,20 @@ class _Reading:
     # Places.
 
     def _ways_on(self, number: int) -> list[Terminal]:
-        """The ports and vias of a cavity, and where it reaches the outside."""
+        """The ports, mouths and vias of a cavity, and where it reaches the outside."""
         rows = [
             Terminal(row.at, row.width, row.is_port)
             for name in self.owners.get(self.part(number), ())
             for row, part in self.homes[name].items()
-            if number in row.cavities and part == self.part(number)
+            if number in row.cavities and part == self.part(number) and row.layers
         ]
         tubes = set(self.graph.holes.values())
         for void in self.cavities[number].voids:
             for there, p in self.graph.joins.get(void, {}).items():
                 if there == OUTSIDE:
                     rows.append(Terminal(p, 0.0, False))
+                elif there.kind == "mouth":
+                    rows.append(Terminal(p, self.laminate.inlets[there.level].width, False))
                 elif there.kind == "opening" and there not in tubes:
                     beyond = [v for v in self.graph.joins[there] if self.cavity_of.get(v) != number]
                     if beyond:
@@ -537,7 +551,31 @@ class _Reading:
             return _Cut(0.0, 0.0, cavity.interface, _middle(cavity.region), True)
         return min(cuts, key=lambda cut: (cut.cost, cut.interface))
 
-    def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point]:
+    def _shared_mouth(self, part: int, first: str, second: str) -> tuple[int, Point, str] | None:
+        """The cavity of the second net and the place in it where a mouth alone joins two nets."""
+        walled = _parts(self.graph, ("outside", "mouth"))
+        firsts, seconds = (
+            {
+                numbers.pop()
+                for row, home in self.homes[name].items()
+                if home == part
+                and len(numbers := {walled[self.cavities[n].voids[0]] for n in row.cavities}) == 1
+            }
+            for name in (first, second)
+        )
+        mouths = [(v, voids) for v, voids in self.graph.joins.items() if v.kind == "mouth"]
+        for mouth, voids in mouths if not firsts & seconds else ():
+            own = [void for void in voids if walled[void] in seconds]
+            if own and len(own) < len(voids):
+                chamber = self.laminate.inlets[mouth.level].chamber
+                why = (
+                    f": both open into the mouth of {chamber}; lead one of them elsewhere, or "
+                    "state a narrower mouth"
+                )
+                return self.cavity_of[own[0]], voids[own[0]], why
+        return None
+
+    def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point, str]:
         """The cavity and the place in it where two nets of one part are joined.
 
         The ways between the ports of each net are its own; the bridge is the middle of the shortest
@@ -562,17 +600,25 @@ class _Reading:
         shared = [node for node in trees[0] if node in trees[1]]
         way = shared or shortest_way(axes, links, trees[0], trees[1])
         place, sample = way[len(way) // 2]
-        return numbers[place], axes[place].centre(sample)
+        why = "; bond the films between them, or close the hole"
+        return numbers[place], axes[place].centre(sample), why
 
     def _links(
         self, numbers: Sequence[int], axes: Sequence[VoidAxis]
     ) -> dict[AxisNode, list[AxisNode]]:
-        """The nodes on both sides of every via between these cavities."""
+        """The nodes on both sides of every via or mouth between these cavities."""
         links: dict[AxisNode, list[AxisNode]] = {}
-        for opening in self.graph.openings:
-            beside = [n for n in self._beside(opening) if n in numbers]
-            p = _middle(self.graph.openings[opening])
-            nodes = [(numbers.index(n), axes[numbers.index(n)].nearest(p)) for n in beside]
+        for via, voids in self.graph.joins.items():
+            if via.kind not in ("opening", "mouth"):
+                continue
+            beside = {
+                self.cavity_of[void]: p for void, p in voids.items() if void in self.cavity_of
+            }
+            nodes = [
+                (numbers.index(n), axes[numbers.index(n)].nearest(p))
+                for n, p in sorted(beside.items())
+                if n in numbers
+            ]
             for node in nodes:
                 links.setdefault(node, []).extend(other for other in nodes if other != node)
         return links
@@ -615,14 +661,14 @@ def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
     return cuts
 
 
-def _parts(graph: VoidGraph) -> dict[Void, int]:
-    """Return the number of the part that every void belongs to; the outside joins none."""
+def _parts(graph: VoidGraph, walls: Collection[str] = ("outside",)) -> dict[Void, int]:
+    """Return the number of the part that every void belongs to; what is a wall joins none."""
     parts: dict[Void, int] = {}
     for void in [*graph.pieces, *graph.gaps, *graph.openings]:
         if void not in parts:
             number = len(parts)
-            for reached in graph.reached([void]):
-                if reached != OUTSIDE:
+            for reached in graph.reached([void], walls):
+                if reached.kind not in walls:
                     parts[reached] = number
     return parts
 

@@ -18,7 +18,15 @@ from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.moved_seams import STEADIER, moved_seams, straying
 from sbafab.rules.rule import Explanation, Rule
-from sbafab.rules.voids import OUTSIDE, Void, VoidGraph, chambers_by_level, void_graph
+from sbafab.rules.voids import (
+    OUTSIDE,
+    Void,
+    VoidGraph,
+    chambers_by_level,
+    mouth_of,
+    past_mouth,
+    void_graph,
+)
 
 NAME = "sealing"
 
@@ -199,7 +207,7 @@ def _wrong_reaches(
     offences: dict[Void, _Offence] = {}
     fed: dict[Void, str] = {}
     for number, inlet in enumerate(laminate.inlets):
-        came = graph.reached(graph.mouths.get(number, ()))
+        came = graph.reached([mouth_of(number)])
         for void in came:
             if void in owners:
                 fed[void] = inlet.chamber
@@ -231,7 +239,10 @@ def _foreign(
 ) -> _Offence:
     whose = " and ".join(sorted(names)) or "no chamber"
     before = came[void]
-    p = graph.joins[before][void] if before is not None else _somewhere(graph.pieces[void])
+    assert before is not None
+    p = graph.joins[before][void]
+    if before.kind == "mouth" and len(graph.joins[before]) == 1:
+        p = _somewhere(graph.pieces[void])
     message = (
         f"the inlet of {inlet} feeds a pocket of {whose} at chamber interface {void.level} "
         f"({at(p)}); separate them by a bond there"
@@ -286,6 +297,9 @@ def _leak(
         f"{chamber.name} leaks {outlet} ({at(p)}), from its pocket at chamber interface "
         f"{pocket.level}; {remedy}"
     )
+    wide = past_mouth(laminate, interface, p) if last.kind == "pocket" else None
+    if wide is not None:
+        message = f"{chamber.name} leaks {outlet} ({at(p)}): {wide}"
     return pocket, _Offence(message, interface, p)
 
 

@@ -21,17 +21,18 @@ from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region, polygon, strip
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
-from sbafab.rules.boundary import edges_along, outward_reach
+from sbafab.rules.boundary import outward_reach
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.voids import PAST_MOUTH, mouth_openings
 
 NAME = "tube-fit"
 BOND = "the bond beside the strip"
 MOUTH = "the mouth"
-UNLIKE = 0.05
-"""mm by which a strip may be wider or narrower than its inlet states; ours."""
+UNLIKE = 2 * PAST_MOUTH
+"""mm by which a strip may be wider or narrower than its inlet states."""
 ROOM = 1e-9
 """mm by which what is straight, parallel or at the mouth may be off for rounding."""
 
@@ -193,14 +194,10 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         if interface.kind != "chamber":
             continue
         needed = _needed(inlet, interface)
-        mouth = [
-            edge
-            for edge in edges_along(interface.unbonded, interface.contact)
-            if _depth(inlet, edge.start) ** 2 + _depth(inlet, edge.end) ** 2 < TOLERANCE**2
-            and abs(_offset(inlet, edge.at(0.5))) < inlet.width / 2
-        ]
-        if mouth:
-            width = sum([edge.length for edge in mouth], 0.0)
+        openings = mouth_openings(inlet, interface)
+        if openings:
+            # A tube goes into one opening; bond between two of them holds it out of both.
+            width = max(high - low for low, high in openings)
             cut = max(0.0, width - _lost(interface, limits))
             remedy = _wider(needed + _lost(interface, limits))
             opening = _Fit(inlet, interface, MOUTH, cut, needed, inlet.mouth, remedy, width)
@@ -261,22 +258,22 @@ def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | No
             continue
         if not isinstance(edge, Line):
             return None
-        near, far = sorted((_depth(inlet, edge.start), _depth(inlet, edge.end)))
+        near, far = sorted((inlet.depth(edge.start), inlet.depth(edge.end)))
         if far > ROOM:
-            aside = abs(_offset(inlet, edge.start) - _offset(inlet, edge.end))
+            aside = abs(inlet.offset(edge.start) - inlet.offset(edge.end))
             if abs(near) > ROOM or far < inlet.length + ROOM or aside > ROOM:
                 return None
             sides.append(edge)
     if len(sides) != 2:
         return None
     # The inlet's direction leads outward along the one that has the strip on its left.
-    out, back = sorted(sides, key=lambda edge: _depth(inlet, edge.end))
-    right, left = _offset(inlet, out.end), _offset(inlet, back.start)
-    if max(_depth(inlet, out.end), _depth(inlet, back.start)) > ROOM or not left < right:
+    out, back = sorted(sides, key=lambda edge: inlet.depth(edge.end))
+    right, left = inlet.offset(out.end), inlet.offset(back.start)
+    if max(inlet.depth(out.end), inlet.depth(back.start)) > ROOM or not left < right:
         return None
     if max(right, -left) > inlet.width - ROOM:
         return None
-    (inner,) = (edge for edge in beside.edges if _depth(inlet, edge.at(0.5)) > inlet.length - ROOM)
+    (inner,) = (edge for edge in beside.edges if inlet.depth(edge.at(0.5)) > inlet.length - ROOM)
     crossed = []
     for edge in (out, back):
         # In the order, and so with the rounding, in which booleans ask where edges meet.
@@ -338,16 +335,5 @@ def _margin(fit: _Fit) -> float:
 
 def _is_side(edge: Edge, inlet: Inlet) -> bool:
     """Return True if an edge of the run is one of the strip's sides, not an end of the run."""
-    depth = _depth(inlet, edge.at(0.5))
+    depth = inlet.depth(edge.at(0.5))
     return TOLERANCE < depth < inlet.length - TOLERANCE
-
-
-def _depth(inlet: Inlet, p: Point) -> float:
-    """Depth of ``p`` inside the mouth, mm."""
-    dx, dy = inlet.direction
-    return (inlet.mouth[0] - p[0]) * dx + (inlet.mouth[1] - p[1]) * dy
-
-
-def _offset(inlet: Inlet, p: Point) -> float:
-    dx, dy = inlet.direction
-    return (p[0] - inlet.mouth[0]) * dy - (p[1] - inlet.mouth[1]) * dx

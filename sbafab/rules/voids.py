@@ -8,7 +8,7 @@ nothing and are not in it.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
@@ -26,12 +26,17 @@ from sbafab.rules.limits import TOLERANCE
 
 INSET: Final = 1e-5
 """mm from an edge at which a point surely lies on one side of it."""
+PAST_MOUTH: Final = 0.025
+"""mm by which an opening may reach past either end of its mouth; ours."""
 
 
 class Void(NamedTuple):
-    """A node: ``level`` is an interface's index, or a layer's for an opening."""
+    """A node: ``level`` is an interface's index, or a layer's for an opening.
 
-    kind: Literal["outside", "pocket", "separator", "gap", "opening"]
+    The ``level`` of a mouth is its inlet's place in ``laminate.inlets``.
+    """
+
+    kind: Literal["outside", "pocket", "separator", "gap", "opening", "mouth"]
     level: int = 0
     piece: int = 0
 
@@ -41,7 +46,7 @@ OUTSIDE = Void("outside")
 
 @dataclass
 class VoidGraph:
-    """Voids, the points at which they join, and the voids that inlets and holes open into."""
+    """Voids, the points at which they join, and the openings that tubes fill."""
 
     pieces: dict[Void, Region] = field(default_factory=dict)
     """The unbonded pieces of every interface."""
@@ -50,8 +55,6 @@ class VoidGraph:
     openings: dict[Void, Region] = field(default_factory=dict)
     """The holes of films."""
     joins: dict[Void, dict[Void, Point]] = field(default_factory=dict)
-    mouths: dict[int, list[Void]] = field(default_factory=dict)
-    """By the inlet's place in ``laminate.inlets``."""
     holes: dict[str, Void] = field(default_factory=dict)
     """Openings of the outer films that a port's tube fills, by its name."""
 
@@ -59,16 +62,18 @@ class VoidGraph:
         self.joins.setdefault(a, {}).setdefault(b, p)
         self.joins.setdefault(b, {}).setdefault(a, p)
 
-    def reached(self, starts: Iterable[Void]) -> dict[Void, Void | None]:
+    def reached(
+        self, starts: Iterable[Void], walls: Collection[str] = ("outside",)
+    ) -> dict[Void, Void | None]:
         """Return every void joined to ``starts`` with its predecessor, nearest first.
 
-        The outside is entered but not passed through.
+        Voids of the kinds that are ``walls`` are entered but not passed through.
         """
         came: dict[Void, Void | None] = dict.fromkeys(starts)
         queue = deque(came)
         while queue:
             here = queue.popleft()
-            if here == OUTSIDE:
+            if here.kind in walls:
                 continue
             for there in self.joins.get(here, {}):
                 if there not in came:
@@ -82,7 +87,7 @@ class _Gap(NamedTuple):
 
     unbonded: tuple[Region, ...]
     missing: tuple[Region, ...]
-    touching: tuple[tuple[int, int, Point], ...]
+    touching: tuple[tuple[int, int, Edge], ...]
     outside: int
 
 
@@ -179,7 +184,7 @@ def _gap(
 ) -> _Gap:
     pieces = unbonded.pieces
     missing = _around(contact, frame).pieces
-    touching: list[tuple[int, int, Point]] = []
+    touching: list[tuple[int, int, Edge]] = []
     # Where no contours touch, one side of a circle is one void as far as edges go on along it.
     goes_on = not (_touches_itself(unbonded) or _touches_itself(contact))
     before: Edge | None = None
@@ -192,14 +197,14 @@ def _gap(
         if not (goes_on and _follows(before, edge)):
             home = _holding(missing, beside(edge, -INSET))
             number = _bounded(pieces, p)
-        touching.append((number, home, p))
+        touching.append((number, home, edge))
         before = edge
     touching.sort(key=lambda entry: entry[0])
     outside = _outside(missing, frame)
     # Inlets open to the outside; of any other two voids it counts that they join, and first where.
-    joins: dict[tuple[int, int, Point | None], tuple[int, int, Point]] = {}
-    for number, home, p in touching:
-        joins.setdefault((number, home, p if home == outside else None), (number, home, p))
+    joins: dict[tuple[int, int, Edge | None], tuple[int, int, Edge]] = {}
+    for number, home, edge in touching:
+        joins.setdefault((number, home, edge if home == outside else None), (number, home, edge))
     return _Gap(pieces, missing, tuple(joins.values()), outside)
 
 
@@ -258,18 +263,14 @@ def _add_gap(
 ) -> None:
     voids = [_unbonded(interface, number) for number in range(len(gap.unbonded))]
     graph.pieces.update(zip(voids, gap.unbonded, strict=True))
-    for number, home, p in gap.touching:
-        inlet = None
-        if home == gap.outside:
-            # Where a film is folded it goes on from one layer to the other.
-            if any(distance_to(fold, p) <= TOLERANCE for fold in folds):
-                continue
-            if interface.kind == "chamber":
-                inlet = _inlet_at(p, inlets)
-        if inlet is None:
+    for number, home, edge in gap.touching:
+        p = edge.at(0.5)
+        if home != gap.outside:
             graph.join(voids[number], missing[home], p)
-        else:
-            graph.mouths.setdefault(inlet, []).append(voids[number])
+        # Where a film is folded it goes on from one layer to the other.
+        elif not any(distance_to(fold, p) <= TOLERANCE for fold in folds):
+            for void, there in _outlets(edge, inlets):
+                graph.join(voids[number], void, there)
 
 
 def _folds_of(interface: Interface, laminate: Laminate) -> list[Line]:
@@ -278,13 +279,79 @@ def _folds_of(interface: Interface, laminate: Laminate) -> list[Line]:
     return [Line(*fold.line) for fold in laminate.folds if {fold.lower, fold.upper} == layers]
 
 
-def _inlet_at(p: Point, inlets: Mapping[int, Inlet]) -> int | None:
+# Mouths: the stretch of the films' outline, square to an inlet's direction, that its tube closes.
+# A void that opens along it opens into the inlet; what opens beyond its ends leaks.
+
+
+def mouth_of(inlet: int) -> Void:
+    """Return the mouth of an inlet by its place in ``laminate.inlets``."""
+    return Void("mouth", inlet)
+
+
+def _outlets(edge: Edge, inlets: Mapping[int, Inlet]) -> Iterator[tuple[Void, Point]]:
+    """Yield the mouths that an edge of the outline lies in, and the outside for what lies in none.
+
+    Each with the middle of its stretch.
+    """
+    covered = []
     for number, inlet in inlets.items():
-        dx, dy = p[0] - inlet.mouth[0], p[1] - inlet.mouth[1]
-        along = dx * inlet.direction[0] + dy * inlet.direction[1]
-        across = dx * inlet.direction[1] - dy * inlet.direction[0]
-        if abs(along) <= TOLERANCE and abs(across) <= inlet.width / 2 + TOLERANCE:
-            return number
+        span = _share_at(edge, inlet, inlet.width / 2)
+        if span is not None and (span[1] - span[0]) * edge.length > TOLERANCE:
+            yield mouth_of(number), edge.at(sum(span) / 2)
+            covered.append(_share_at(edge, inlet, inlet.width / 2 + PAST_MOUTH) or span)
+    done = 0.0
+    for low, high in [*sorted(covered), (1.0, 1.0)]:
+        if (low - done) * edge.length > TOLERANCE or not covered:
+            yield OUTSIDE, edge.at((done + low) / 2)
+        done = max(done, high)
+
+
+def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | None:
+    """Return the part of an edge on a mouth's line within ``reach`` mm of the mouth's middle.
+
+    As shares of the edge's length; None where there is none.
+    """
+    start, end = inlet.offset(edge.start), inlet.offset(edge.end)
+    if not isinstance(edge, Line) or start == end:
+        return None
+    low, high = sorted((side - start) / (end - start) for side in (-reach, reach))
+    low, high = max(0.0, low), min(1.0, high)
+    if low >= high or any(abs(inlet.depth(edge.at(t))) > TOLERANCE for t in (low, high)):
+        return None
+    return low, high
+
+
+def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, float]]:
+    """Return where voids of an interface open at an inlet's mouth, from end to end.
+
+    Offsets from the mouth's middle in mm; an opening may reach past the mouth.
+    """
+    spans = sorted(
+        sorted((inlet.offset(edge.start), inlet.offset(edge.end)))
+        for edge in edges_along(interface.unbonded, interface.contact)
+        if _share_at(edge, inlet, inlet.width / 2)
+    )
+    openings: list[tuple[float, float]] = []
+    for low, high in spans:
+        if openings and low <= openings[-1][1] + TOLERANCE:
+            openings[-1] = openings[-1][0], max(high, openings[-1][1])
+        else:
+            openings.append((low, high))
+    return openings
+
+
+def past_mouth(laminate: Laminate, level: int, p: Point) -> str | None:
+    """Return in words how the opening of a mouth reaches past it at a place; None for no mouth."""
+    interface = laminate.interfaces[level - 1]
+    for inlet in laminate.inlets if interface.kind == "chamber" else ():
+        for low, high in mouth_openings(inlet, interface):
+            if abs(inlet.depth(p)) <= TOLERANCE and low <= inlet.offset(p) <= high:
+                return (
+                    f"the opening there is {high - low:.3f} mm wide and reaches "
+                    f"{max(high, -low) - inlet.width / 2:.3f} mm past the end of the mouth of "
+                    f"{inlet.chamber}, which is {inlet.width:.3f} mm wide; make the opening "
+                    "narrower, or state its width and its middle"
+                )
     return None
 
 

@@ -295,7 +295,7 @@ def _plug(chamber: dict[str, Any]) -> BaseGeometry:
     x, y = chamber["mouth"]
     angle = math.radians(chamber["angle"])
     across = -math.sin(angle), math.cos(angle)
-    half = chamber["width"] / 2 + 0.3
+    half = chamber["width"] / 2 + 0.02
     ends = [(x + side * half * across[0], y + side * half * across[1]) for side in (-1, 1)]
     return LineString(ends).buffer(WALL, cap_style="flat")
 

@@ -253,7 +253,12 @@ def test_tube_fit_of_a_mouth_off_its_place(good: Good, spoil: Spoil) -> None:
     found = only(tube_fit.check(Measures(shifted, LIMITS)))
     assert found.measured == pytest.approx(0.15)
     assert (found.where.interface, found.where.layers) == (1, (1, 2, 3))
-    assert only(sealing.check(Measures(shifted, LIMITS))).verdict == "pass"
+    # The mouth ends 0.8 off its middle, the strip 1.4.
+    leak = only(sealing.check(Measures(shifted, LIMITS)))
+    assert (leak.verdict, leak.where.interface, leak.where.x) == ("fail", 1, 8.25)
+    assert (
+        "1.600 mm wide and reaches 0.600 mm past the end of the mouth of chamber1" in leak.message
+    )
 
 
 def test_tube_fit_without_inlets(good: Good) -> None:
@@ -271,7 +276,7 @@ def test_tube_fit_without_inlets(good: Good) -> None:
 
 
 def test_a_strip_that_opens_beside_its_inlet_is_no_mouth(good: Good, spoil: Spoil) -> None:
-    """Moved by 0.9, its end lies about 0.825 from the inlet's axis, outside the tube's 0.8."""
+    """Moved by 1.62, its end lies 0.82 and more from the inlet's axis, outside the tube's 0.8."""
     laminate = good(*ONE)
     (inlet,) = laminate.inlets
     (x, y), (dx, dy) = inlet.mouth, inlet.direction
@@ -280,7 +285,7 @@ def test_a_strip_that_opens_beside_its_inlet_is_no_mouth(good: Good, spoil: Spoi
         return x - depth * dx - off * dy, y - depth * dy + off * dx
 
     run = strip(at(inlet.length, 0.0), at(-5.0, 0.0), inlet.width)
-    aside = strip(at(inlet.length, 0.9), at(-5.0, 0.9), inlet.width)
+    aside = strip(at(inlet.length, 1.62), at(-5.0, 1.62), inlet.width)
     mask = (laminate.layer(2).profile - run) | aside
     (found,) = tube_fit.check(Measures(spoil(laminate, 2, mask), LIMITS))
     assert (found.verdict, found.measured) == ("fail", 0.0)

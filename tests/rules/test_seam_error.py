@@ -103,4 +103,4 @@ def test_a_mouth_that_a_seam_closes_when_it_strays_opens_its_net() -> None:
         settings = {"registration__seam_error": error, "nets": {"a": ["pouch"]}}
         joined, moved, *_ = findings(NETS, **settings)
         assert (joined.verdict, moved.verdict) == ("pass", verdict)
-    assert "net a is open: " in moved.message
+    assert "net a " in moved.message
