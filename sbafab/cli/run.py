@@ -55,7 +55,7 @@ def run_request(
     with shown_progress(request.as_json) as progress:
         run = generate(wanted, progress)
     for name, reason in run.left_out:
-        print_error(f"no input files for {name}: {reason}")
+        print_error(f"left out: {name}. {reason}")
     finish(run, request, as_json or run_json, show or print_run)
 
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
+from sbafab.errors import OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.formats.registry import MESH_FORMATS
 from sbafab.meshing.formats.surfaces import write_stl
 from sbafab.meshing.solid import SAGITTA, cavity, sealed, solid
 from sbafab.meshing.surface import Surface
-from sbafab.meshing.wrap import tube_wrap, wrapped
+from sbafab.meshing.wrap import TubeWrap, tube_wrap, wrapped
 
 MeshKind = Literal["solid", "cavity", "volume", "shell", "skin"]
 Writer = Callable[[Surface, Path, str], None]
+_SurfaceFiles = tuple[list[tuple[str, Writer]], MeshKind, str | None, Callable[[], Surface]]
 
 
 @dataclass(frozen=True)
@@ -40,47 +43,60 @@ def write_meshes(
     folder: Path,
     sagitta: float = SAGITTA,
     progress: Callable[[int, int], None] | None = None,
-) -> list[MeshFile]:
+) -> tuple[list[MeshFile], list[tuple[str, str]]]:
     """Write ``mesh/solid.stl``, ``.3mf``, ``.glb`` and ``mesh/cavity_<chamber>.stl``, all flat.
 
     A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
     ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
-    ``progress`` is called with the numbers of files done and of all files. Raises OutputError if a
-    surface is open or its volume is not the sum of area x thickness.
+    ``progress`` is called with the numbers of files done and of all files. Return the files
+    written, and those left out, each with the reason: a surface that is open, or whose volume is
+    not the sum of area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
-    shapes = 1 if laminate.tube is None else 2
-    total = shapes * (sum(bool(row.solid) for row in MESH_FORMATS) + len(laminate.chambers))
+    surfaces = _surfaces(laminate, sagitta)
     written: list[MeshFile] = []
-    for mesh, surface, write in _meshes(laminate, sagitta):
-        write(surface, folder / mesh.file, laminate.bonded_materials)
-        written.append(mesh)
-        if progress is not None:
-            progress(len(written), total)
-    return written
+    left_out: list[tuple[str, str]] = []
+    total = sum(len(rows) for rows, *_ in surfaces)
+    for rows, kind, chamber, make in surfaces:
+        try:
+            surface = make()
+        except OutputError as error:
+            left_out += [(file, str(error)) for file, _ in rows]
+            continue
+        for file, write in rows:
+            write(surface, folder / file, laminate.bonded_materials)
+            written.append(MeshFile(file, kind, chamber, 0.0, surface.volume, len(surface.faces)))
+            if progress is not None:
+                progress(len(written), total)
+    return written, left_out
 
 
-def _meshes(laminate: Laminate, sagitta: float) -> Iterator[tuple[MeshFile, Surface, Writer]]:
+def _surfaces(laminate: Laminate, sagitta: float) -> list[_SurfaceFiles]:
+    """Return each surface's files with their writers, its kind and chamber, and what makes it."""
     wrap = tube_wrap(laminate)
-    shapes = {"": solid(laminate, sagitta)}
-    if wrap is not None:
-        around = wrapped(solid(laminate, sagitta, wrap.cuts), wrap)
-        shapes["_wrapped"] = sealed("the solid round its tube", around)
-    for row in MESH_FORMATS:
-        if row.solid is not None:
-            for suffix, surface in shapes.items():
-                file = f"mesh/solid{suffix}.{row.ending}"
-                yield _described(file, "solid", None, surface), surface, row.solid
+
+    def of_solid(suffix: str) -> list[tuple[str, Writer]]:
+        rows = ((row.ending, row.solid) for row in MESH_FORMATS)
+        return [(f"mesh/solid{suffix}.{ending}", write) for ending, write in rows if write]
+
+    def round_tube(name: str, flat: Callable[..., Surface], wrap: TubeWrap) -> Surface:
+        return sealed(f"{name} round its tube", wrapped(flat(sagitta, wrap.cuts), wrap))
+
+    shapes: dict[str | None, tuple[str, Callable[..., Surface]]] = {
+        None: ("the solid", partial(solid, laminate))
+    }
     for chamber in laminate.chambers:
-        file = f"mesh/cavity_{chamber.name}.stl"
-        surface = cavity(laminate, chamber, sagitta)
-        yield _described(file, "cavity", chamber.name, surface), surface, write_stl
+        name = f"the cavity of chamber {chamber.name}"
+        shapes[chamber.name] = (name, partial(cavity, laminate, chamber))
+    found: list[_SurfaceFiles] = []
+    for chamber_name, (name, flat) in shapes.items():
+        kind: MeshKind = "solid" if chamber_name is None else "cavity"
+        ways: dict[str, Callable[[], Surface]] = {"": partial(flat, sagitta)}
         if wrap is not None:
-            file = f"mesh/cavity_{chamber.name}_wrapped.stl"
-            around = wrapped(cavity(laminate, chamber, sagitta, wrap.cuts), wrap)
-            sealed(f"the cavity of {chamber.name} round its tube", around)
-            yield _described(file, "cavity", chamber.name, around), around, write_stl
-
-
-def _described(file: str, kind: MeshKind, chamber: str | None, surface: Surface) -> MeshFile:
-    return MeshFile(file, kind, chamber, 0.0, surface.volume, len(surface.faces))
+            ways["_wrapped"] = partial(round_tube, name, flat, wrap)
+        for suffix, make in ways.items():
+            rows = of_solid(suffix)
+            if chamber_name is not None:
+                rows = [(f"mesh/cavity_{chamber_name}{suffix}.stl", write_stl)]
+            found.append((rows, kind, chamber_name, make))
+    return found

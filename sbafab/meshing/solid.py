@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, facets
-from sbafab.geometry.edges import Point
+from sbafab.geometry.edges import SAME, Point
 from sbafab.geometry.region import Region, rectangle, strip, union
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.meshing.surface import Surface, open_edges
@@ -197,7 +197,7 @@ def closed_surface(
     if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
         raise OutputError(
             f"The mesh of {name} holds {surface.volume:.4f} mm3 where its films add up to "
-            f"{expected:.4f} mm3; ask for a smaller sagitta than {sagitta:g} mm."
+            f"{expected:.4f} mm3."
         )
     return surface
 
@@ -277,11 +277,14 @@ FOLD_WIDTH = 0.5
 
 
 def parted(laminate: Laminate) -> Laminate:
-    """Return the laminate with ``MASKLESS_GAP`` in each gap that has a chamber and no mask."""
+    """Return the laminate with ``MASKLESS_GAP`` in each gap whose films stay apart without a mask.
+
+    Seams bond such films; all else of the gap is open, between two balloons as in a chamber.
+    """
     opened = {
         interface.above.index
         for interface in laminate.interfaces
-        if interface.kind == "chamber" and not interface.masks and not interface.gap
+        if not interface.masks and abs(interface.gap) < SAME and not interface.unbonded.is_empty
     }
     layers, lift = [], 0.0
     for layer in laminate.layers:
@@ -386,10 +389,15 @@ def _pocket(
     """The unbonded pieces round the centres, open where a channel runs through them."""
     strips = folded_strips(laminate, interface)
     void = interface.unbonded if strips.is_empty else interface.unbonded - strips
+    # Where a seam goes round a pocket, what lies outside the seam goes round the pocket too.
+    innermost = {
+        min(round_it, key=lambda piece: piece.outers[0].area)
+        for centre in centres
+        if (round_it := [p for p in void.pieces if p.outers[0].winding(centre) != 0])
+    }
     for piece in void.pieces:
-        (outer,) = piece.outers
-        if any(outer.winding(centre) != 0 for centre in centres):
-            yield outer
+        if piece in innermost:
+            yield piece.outers[0]
             for hole in piece.holes:
                 on_axis = [axis for axis in axes if hole.winding(axis) != 0]
                 if not on_axis or interface.bond.contains(on_axis[0]):

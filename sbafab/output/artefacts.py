@@ -75,8 +75,8 @@ class DesignFolder:
     """A design's folder while it is written from its plan.
 
     ``sheets`` are the film sheets of its parts, ``has_pages``: whether findings and a traveller
-    belong into it. Writers add the ``meshes`` they wrote, and to ``left_out`` the simulators that
-    got no input, with the reason.
+    belong into it. Writers add the ``meshes`` they wrote, and to ``left_out`` the meshes and
+    the inputs of simulators that could not be, with the reason.
     """
 
     plan: DesignPlan
@@ -270,7 +270,9 @@ def _seams(folder: DesignFolder) -> bytes | None:
 
 def _write_meshes(folder: DesignFolder) -> None:
     progress = partial(folder.progress, "meshes")
-    folder.meshes += write_meshes(folder.laminate, folder.path, progress=progress)
+    written, left_out = write_meshes(folder.laminate, folder.path, progress=progress)
+    folder.meshes += written
+    folder.left_out += left_out
     conforming = folder.plan.conforming
     if conforming is not None:
         # Conforming meshes take the extra "mesh".
@@ -354,7 +356,7 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
             # The meshes of CalculiX take an extra, which may be missing.
             reason = str(error)
     if reason is not None:
-        folder.left_out.append((name, reason))
+        folder.left_out.append((f"input files for {name}", reason))
 
 
 # Pages, findings and the design.

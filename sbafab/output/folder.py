@@ -37,7 +37,7 @@ PICTURE = "preview/assembled.png"
 class WrittenFolder:
     """The ``index`` (manifest) of a written folder without its files' hashes.
 
-    ``left_out``: names of simulators that got no input, with the reason.
+    ``left_out``: meshes and simulators' inputs that could not be, with the reason.
     """
 
     index: dict[str, Any]
@@ -56,6 +56,7 @@ def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
         folder = DesignFolder(first, sheets, path, progress)
         return WrittenFolder(write_design(folder), tuple(folder.left_out))
     from_below = _from_below(sheets)
+    left_out: list[tuple[str, str]] = []
     for each in plan.designs:
         subfolder = path / each.checked.design.name
         subfolder.mkdir()
@@ -63,11 +64,12 @@ def write_folder(plan: Plan, path: Path, progress: Progress) -> WrittenFolder:
         folder = DesignFolder(each, from_below, subfolder, progress, job.assembled is None)
         # The folder above has the sheets; a design's own is one without.
         close_folder(subfolder, {**write_design(folder), "sheets": []})
+        left_out += [(f"{subfolder.name}/{name}", reason) for name, reason in folder.left_out]
     designs = [each.checked.design for each in plan.designs]
     index = job_manifest(job.schema, job.name, plan.settings, designs, sheets)
     if job.assembled is not None:
         index = _write_assembly(plan, job.assembled, sheets, index, path, progress)
-    return WrittenFolder(index)
+    return WrittenFolder(index, tuple(left_out))
 
 
 def write_design(folder: DesignFolder) -> dict[str, Any]:

@@ -25,7 +25,7 @@ def radial() -> Laminate:
 
 
 def test_the_solid_lies_round_its_tube(radial: Laminate, tmp_path: Path) -> None:
-    written = {mesh.file: mesh for mesh in write_meshes(radial, tmp_path)}
+    written = {mesh.file: mesh for mesh in write_meshes(radial, tmp_path)[0]}
     solid = trimesh.load(tmp_path / "mesh/solid_wrapped.stl")
     assert isinstance(solid, trimesh.Trimesh)
     assert solid.is_watertight

@@ -13,7 +13,9 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.identity import design_sha256
+from sbafab.errors import OutputError
 from sbafab.laminate.laminate_file import read_laminate
+from sbafab.meshing import mesh_files
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output import artefacts
 from sbafab.runs.check_folder import check_folder
@@ -155,6 +157,23 @@ def test_a_run_that_dies_half_way_leaves_the_old_output(
         generate(RunRequest(load_design("1dof-5mm", ["bond.width=0.8"]), tmp_path))
     assert hashes(run.folder) == before
     assert sorted(os.listdir(tmp_path)) == [".1dof-5mm.lock", "1dof-5mm"]
+
+
+def test_a_mesh_that_fails_is_left_out_by_name_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = hashes(generate(RunRequest(load_design("1dof-5mm"), tmp_path / "whole")).folder)
+
+    def fails(*_: object) -> None:
+        raise OutputError("the mesh of the cavity is not closed")
+
+    monkeypatch.setattr(mesh_files, "cavity", fails)
+    run = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
+    name = "mesh/cavity_chamber1.stl"
+    assert run.left_out == ((name, "the mesh of the cavity is not closed"),)
+    rest = {file: value for file, value in whole.items() if file not in (name, "manifest.json")}
+    assert {k: v for k, v in hashes(run.folder).items() if k != "manifest.json"} == rest
+    assert all(finding.verdict != "fail" for finding in check_folder(run.folder))
 
 
 @pytest.mark.parametrize(
