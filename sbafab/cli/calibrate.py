@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from sbafab.calibration.fit import Fit, HeldOutPoint, calibration_text, fit
-from sbafab.cli.options import json_option
+from sbafab.cli.options import folder_option, json_option
 from sbafab.cli.printing import print_json, print_verdict
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import shown
@@ -32,14 +32,7 @@ from sbafab.results.evidence import load_source
     metavar="NAME",
     help="Name of the calibration, and of its file, NAME.toml.",
 )
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path(),
-    metavar="FOLDER",
-    help="Folder of the file.  [default: this one]",
-)
+@folder_option("Folder in which NAME.toml is written.")
 @json_option
 def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) -> None:
     """Fit the models to measurements.

@@ -10,18 +10,26 @@ import click
 
 from sbafab.actuators import load_design
 from sbafab.cli.exit import RULE_FAILED, print_error
-from sbafab.cli.options import flow_option, json_option, refuse_options, set_option
+from sbafab.cli.options import (
+    design_file,
+    file_option,
+    flow_option,
+    folder_option,
+    json_option,
+    set_option,
+)
 from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
 from sbafab.output.schema_ids import FIND_SCHEMA
 from sbafab.search.find import (
+    FOUND,
     FindRequest,
     FoundDesign,
-    found_file,
     found_toml,
     free_keys,
+    refuse_existing,
     write_found,
 )
 from sbafab.search.find import find as search
@@ -129,21 +137,8 @@ def _sure(ctx: click.Context, param: click.Parameter, text: str | None) -> float
     metavar="URL",
     help="Database of Optuna, to resume the search from, e.g. sqlite:///search.db.",
 )
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, readable=False),
-    default=Path(),
-    show_default="this folder",
-    metavar="OUT",
-    help="Folder in which found.toml is written.",
-)
-@click.option(
-    "--to",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Write FILE, which ends in .toml, instead of found.toml; its stem names the design.",
-)
+@folder_option(f"Folder in which {FOUND} is written.")
+@file_option(FOUND)
 @set_option
 @json_option
 @_with_quantities
@@ -151,7 +146,10 @@ def find(source: str | None, **options: Any) -> None:
     if options["storage"] is not None and not options["optuna"]:
         raise click.UsageError("--storage goes with --optuna; add it")
     requests = _requests(source, options)
-    target = found_file(_file_or_folder(options["to"], options["out"]))
+    target = design_file(options["to"], options["out"], FOUND)
+    refuse_existing(target)
+    if any(_counts_tabs(request) for request in requests.values()):
+        click.echo(f"note: {TABS_HINT}", err=True)
     try:
         with shown_progress(options["as_json"]) as progress:
             origin, result = _best_result(requests, progress)
@@ -161,7 +159,8 @@ def find(source: str | None, **options: Any) -> None:
         raise
     if result.holds:
         write_found(
-            found_toml(origin, options["assignments"], name_of(target) or origin, result), target
+            found_toml(origin, options["assignments"], name_of(target) or origin, result, target),
+            target,
         )
     if options["as_json"]:
         print_json(as_json(result, origin, target))
@@ -169,16 +168,6 @@ def find(source: str | None, **options: Any) -> None:
         print_result(result, origin, target)
     if not result.holds:
         click.get_current_context().exit(RULE_FAILED)
-
-
-def _file_or_folder(to: Path | None, out: Path) -> Path:
-    """Return the file of --to, or -o, which until version 0.2 may still be a file."""
-    if to is None:
-        return out
-    refuse_options("names a folder and --to a file; leave one out", "out")
-    if to.suffix.lower() != ".toml":
-        raise click.BadParameter(f"{to} must end in .toml", param_hint="--to")
-    return to
 
 
 def _requests(source: str | None, options: dict[str, Any]) -> dict[str, FindRequest]:
@@ -246,9 +235,16 @@ def _family_templates() -> list[str]:
 
 
 TABS_HINT = (
-    "overall_diameter includes the inlet tabs: use outline_diameter if they may stand out, or add "
+    "overall_diameter counts the inlet tabs; use outline_diameter if they may stand out, or add "
     "--free inlet.tab_length=3:5:0.5"
 )
+
+
+def _counts_tabs(request: FindRequest) -> bool:
+    """Return True if a search limits the diameter with tabs, and may not shorten these."""
+    names = [requirement.quantity.name for requirement in request.requirements]
+    free = [free.key for free in free_keys(request)]
+    return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
 def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
@@ -385,15 +381,7 @@ def _print_ends(result: FoundDesign) -> None:
 
 
 def _print_miss(result: FoundDesign) -> None:
-    """Print hints and the verdict of a search without success."""
-    missed = {
-        requirement.quantity.name
-        for requirement in result.problem.requirements
-        if not requirement.holds(result.best.judged(requirement))
-    }
-    is_free = any(free.key == "inlet.tab_length" for free in result.free)
-    if "overall_diameter" in missed and not is_free:
-        print_line(TABS_HINT)
+    """Print the verdict of a search without success."""
     _print_more_tries(result)
     print_line(
         f"Search failed: none of {result.tries} designs meets all requirements; nothing was "

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from sbafab.cli.options import json_option
+from sbafab.cli.options import design_file, file_option, folder_option, json_option
 from sbafab.cli.printing import print_json
 from sbafab.importing.sources import import_source
 from sbafab.importing.write import default_file, write_imported
@@ -15,17 +15,10 @@ from sbafab.importing.write import default_file, write_imported
 
 @click.command("import")
 @click.argument("source", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--out",
-    "file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="The design file to write; its drawings come to lie in a folder beside it.  "
-    "[default: NAME.toml]",
-)
+@folder_option("Folder in which NAME.toml and a folder of its drawings are written.")
+@file_option("NAME.toml")
 @json_option
-def import_(source: Path, file: Path | None, as_json: bool) -> None:
+def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
     """Write a design of drawn layers from other files.
 
     SOURCE is a folder of drawings with a table layers.csv, an output folder, a laminate.json, a
@@ -33,7 +26,8 @@ def import_(source: Path, file: Path | None, as_json: bool) -> None:
     over is named.
     """
     name, imported = import_source(source)
-    written = write_imported(imported, file or default_file(imported), source.name)
+    file = design_file(to, out, default_file(imported).name)
+    written = write_imported(imported, file, source.name)
     laminate = written.laminate
     if as_json:
         print_json(

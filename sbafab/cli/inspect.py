@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sbafab.cli.options import LENGTH, finite, json_option
+from sbafab.cli.options import LENGTH, finite, folder_option, json_option
 from sbafab.cli.printing import print_facts, print_json, print_verdict
 from sbafab.errors import DesignError
 
@@ -45,15 +45,7 @@ MOST_LINES = 20
     show_default=True,
     help="What the film lies on: darker or lighter than film.",
 )
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=Path("inspection"),
-    show_default=True,
-    metavar="OUT",
-    help="Folder of the files.",
-)
+@folder_option("Folder of the files.", "inspection")
 @json_option
 def inspect(  # noqa: PLR0913, PLR0917 - one an option
     folder: Path,
@@ -117,9 +109,8 @@ def _reference(
 def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
     """Write picture, result, entry and table of sizes; return their paths."""
     from sbafab.inspection.inspection import drawing, history, sizes_csv
-    from sbafab.output.swap import refuse_file_as_folder, replace_text
+    from sbafab.output.swap import replace_text
 
-    refuse_file_as_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
     result = json.dumps(inspection.as_dict(), indent=1, ensure_ascii=False) + "\n"

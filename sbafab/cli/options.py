@@ -256,25 +256,57 @@ WAIVE_HELP = {
 WAIVE_CUT = "Write the cut files although this rule fails; they will state it. Repeatable."
 
 
-def _refuse_file(_: click.Context, __: click.Parameter, out: Path) -> Path:
-    """Raises OutputError before anything is computed for a folder that is a file."""
+def _refuse_file(ctx: click.Context, _: click.Parameter, out: Path) -> Path:
+    """Raises BadParameter for the name of a design file, and OutputError for a folder that is a
+    file, before anything is computed.
+    """
     # Help and completion do without it.
     from sbafab.output.swap import refuse_file_as_folder
 
     refuse_file_as_folder(out)
+    if out.suffix.lower() == ".toml":
+        has_file = any("--to" in param.opts for param in ctx.command.params)
+        mend = f"; write --to {out} for a file" if has_file else ""
+        raise click.BadParameter(f"{str(out)!r} is a file's name, and -o takes a folder{mend}")
     return out
 
 
-out_option = click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path, readable=False),
-    default=Path("out"),
-    show_default=True,
-    callback=_refuse_file,
-    metavar="OUT",
-    help="Folder in which OUT/<name>/ is written.",
-)
+def folder_option(words: str, default: str = ".") -> Callable[[Command], Command]:
+    """Return ``-o``, the folder that a command writes into."""
+    return click.option(
+        "-o",
+        "--out",
+        type=click.Path(path_type=Path, readable=False),
+        default=Path(default),
+        show_default="this folder" if default == "." else True,
+        callback=_refuse_file,
+        metavar="OUT",
+        help=words,
+    )
+
+
+out_option = folder_option("Folder in which OUT/<name>/ is written.", "out")
+
+
+def file_option(name: str) -> Callable[[Command], Command]:
+    """Return ``--to``, the design file to write instead of the one called ``name``."""
+    return click.option(
+        "--to",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE",
+        help=f"Write FILE, which ends in .toml, instead of {name}; its stem names the design.",
+    )
+
+
+def design_file(to: Path | None, out: Path, name: str) -> Path:
+    """Return the file of ``--to``, else the one called ``name`` in the folder of ``-o``."""
+    if to is None:
+        return out / name
+    refuse_options("names a folder and --to a file; leave one out", "out")
+    if to.suffix.lower() != ".toml":
+        raise click.BadParameter(f"{to} must end in .toml", param_hint="--to")
+    return to
+
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 

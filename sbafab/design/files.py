@@ -132,7 +132,8 @@ def _unknown_key(
     table = ".".join(where[:-1])
     own = next(_tables_at(record, where[:-1]), None)
     siblings = [f"{table}.{key}".lstrip(".") for key in _keys(own)] if own else []
-    near = _nearest(where[-1], siblings, 0.6)
+    # A key without its table; else one that is misspelt.
+    near = _nearest(field, paths, 1.0) or _nearest(where[-1], siblings, 0.6)
     # A key cut short is one of its own table, not one of another that is spelled alike.
     if near is None and not any(path.startswith(field) for path in siblings):
         near = _nearest(where[-1], paths, 0.75)
@@ -143,10 +144,13 @@ def _unknown_key(
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
-    """The path whose last part is most like ``key``."""
-    leaves = {path.split(".")[-1]: path for path in paths}
+    """Return three paths whose last part is most like ``key``, in words, the pockets' first."""
+    leaves: dict[str, list[str]] = {}
+    for path in sorted(paths, key=lambda path: not path.startswith("chamber.")):
+        leaves.setdefault(path.split(".")[-1], []).append(path)
     near = difflib.get_close_matches(key, leaves, 1, cutoff)
-    return leaves[near[0]] if near else None
+    *others, last = leaves[near[0]][:3] if near else [""]
+    return f"{', '.join(others)} or {last}" if others else last or None
 
 
 def _keys(record: type[BaseModel]) -> dict[str, FieldInfo]:

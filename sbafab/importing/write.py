@@ -36,7 +36,9 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
     folder = file.with_name(f"{file.stem}{FOLDER}")
     for path in (file, folder) if imported.drawings else (file,):
         if path.exists():
-            raise OutputError(f"{path} is there already; move it, or choose another file with -o")
+            raise OutputError(
+                f"{path} is there already; move it, or name another place with -o or --to"
+            )
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=file.parent, prefix=f".{file.stem}.") as name:
@@ -60,7 +62,7 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
                 raise
     except OSError as error:
         raise OutputError(
-            f"{file} cannot be written: {error.strerror or error}; choose another place with -o"
+            f"{file} cannot be written: {error.strerror or error}; choose another folder with -o"
         ) from None
     return Written(file, *_built(file))
 

@@ -8,6 +8,7 @@ the best. The result says which constraints bind, and can be written as a design
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -16,17 +17,8 @@ from typing import Any
 
 import tomli_w
 
-from sbafab.design.files import (
-    KIT,
-    OUTLINE,
-    changed_keys,
-    design_path,
-    kit_names,
-    override,
-    read_toml,
-    shown,
-    suggest_from_user_folder,
-)
+from sbafab.design.files import KIT, Change, design_path, kit_names, override, read_toml, shown
+from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
@@ -495,33 +487,22 @@ FOUND = "found.toml"
 """The file in a folder that ``-o`` names."""
 
 
-def found_file(out: Path) -> Path:
-    """Return the file that ``-o`` asks for: itself where it ends in .toml, else one in the folder.
-
-    Raises DesignError where no file can come to be: nobody's design is overwritten.
-    """
-    is_file = out.suffix.lower() == ".toml"
-    if is_file and not out.parent.is_dir():
-        raise DesignError(f"{out.parent} is no folder; make it first, or name another with -o")
-    if not is_file and out.exists() and not out.is_dir():
-        raise DesignError(f"{out} is a file; name a folder with -o, or a .toml file with --to")
-    target = out if is_file else out / FOUND
+def refuse_existing(target: Path) -> None:
+    """Raises OutputError for a file that exists: nobody's design is overwritten."""
     if target.exists():
-        raise DesignError(
+        raise OutputError(
             f"{target} exists and is not overwritten; name another folder with -o or file with "
             "--to, or remove it first"
         )
-    return target
 
 
 def found_toml(
-    source: str | Path, assignments: Sequence[str], name: str, result: FoundDesign
+    source: str | Path, assignments: Sequence[str], name: str, result: FoundDesign, target: Path
 ) -> str:
-    """Return the design file of a result, its figures as comments."""
-    path = design_path(source)
-    data = override(read_toml(path), [*assignments, dict(result.best.values), {"name": name}])
-    suggest_from_user_folder(data, assignments)
-    _from_anywhere(data, path.parent, set(changed_keys(assignments)))
+    """Return the text of the design file ``target`` of a result, its figures as comments."""
+    changes: list[Change] = [*assignments, dict(result.best.values), {"name": name}]
+    data = override(read_toml(design_path(source)), changes)
+    data = override(data, [_paths_beside(target, data, result.problem.design)])
     first = {key: value for key, value in data.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in data.items() if isinstance(value, dict)}
     limits = []
@@ -545,15 +526,21 @@ def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
     return f"; 90 % interval {shown_interval(interval)}"
 
 
-def _from_anywhere(data: dict[str, Any], folder: Path, assigned: set[str]) -> None:
-    """Make paths of the starting file absolute: the new file may lie elsewhere."""
-    chamber: Any = data.get("chamber")
-    if OUTLINE not in assigned and isinstance(chamber, Mapping) and "outline" in chamber:
-        chamber = dict(chamber)
-        chamber["outline"] = str((folder / str(chamber["outline"])).absolute())
-        data["chamber"] = chamber
-    if KIT not in assigned and KIT in data and data[KIT] not in kit_names():
-        data[KIT] = str((folder / str(data[KIT])).absolute())
+def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict[str, str]:
+    """Return the paths of a design's drawings, kit and calibration, by key, from the folder of
+    ``target`` on, so that this can be moved together with them.
+    """
+    files = {**design.drawings}
+    if KIT in data and design.kit not in kit_names():
+        files[KIT] = kit_path(design.kit, design.folder)
+    calibration = design.folder / design.models.calibration
+    if "calibration" in data.get("models", {}) and calibration.is_file():
+        files["models.calibration"] = calibration
+    folder = target.absolute().parent.resolve()
+    return {
+        key: Path(os.path.relpath(file.parent.resolve() / file.name, folder)).as_posix()
+        for key, file in files.items()
+    }
 
 
 def write_found(text: str, target: Path) -> None:

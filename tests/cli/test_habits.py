@@ -14,7 +14,7 @@ from click.shell_completion import ShellComplete
 import sbafab
 from sbafab.actuators import records
 from sbafab.assemblies.checks import CHECKS
-from sbafab.cli import app, main
+from sbafab.cli import COMMANDS, app, main
 from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.explain import design_keys
 from sbafab.cli.printing import limit_text
@@ -371,3 +371,24 @@ def test_a_found_design_goes_to_a_folder_or_a_toml_file(
     code, out, err = run(["find", "1dof-5mm", "--max", "mass=1", *arguments], capsys)
     assert (code, out) == (2, "")
     assert reason in err
+
+
+WRITING = [
+    name for name, command in COMMANDS.items() if any("-o" in p.opts for p in command.params)
+]
+
+
+@pytest.mark.parametrize("name", WRITING)
+def test_an_output_is_a_folder_everywhere(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine")
+    places = {tmp_path / "tip.toml": "is a file's name, and -o takes a folder"}
+    places[tmp_path / "file"] = "is a file, not a folder; choose a folder with -o"
+    for place, reason in places.items():
+        code, out, err = run([name, "1dof-5mm", "1dof-10mm", "-o", str(place)], capsys)
+        assert (code, out) == (2, "")
+        assert reason in err
+    has_file = any("--to" in param.opts for param in COMMANDS[name].params)
+    code, _, err = run([name, "1dof-5mm", "-o", "tip.toml"], capsys)
+    assert ("--to tip.toml" in err) == has_file

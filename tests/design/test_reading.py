@@ -59,6 +59,8 @@ def test_not_a_length(text: object) -> None:
         (["chamber.diametr=5"], "did you mean chamber.diameter?"),
         (["stack.ballons=5"], "did you mean stack.balloons?"),
         (["balloons=5"], "did you mean stack.balloons?"),
+        (["diameter=6"], "did you mean chamber.diameter, bore.diameter or fits.diameter?"),
+        (["modulus=9"], "did you mean films.tpe.modulus?"),
         (["films.tpe.xyzzy=1"], "known here: films.tpe.product"),
         (["films.tpu.melting_pont=9"], "did you mean films.tpu.melting_point?"),
         (["tube.outer_diameter=15"], 'it belongs to "radial"'),

@@ -188,7 +188,10 @@ def test_the_command_writes_a_design_and_says_what_is_not_carried(
     assert Path("1dof-5mm-drawings", FILE).read_bytes() == (folder / FILE).read_bytes()
     again = importing(folder)
     assert again.exit_code == 2
-    assert "1dof-5mm.toml is there already; move it, or choose another file with -o" in again.output
+    assert (
+        "1dof-5mm.toml is there already; move it, or name another place with -o or --to"
+        in again.output
+    )
 
 
 def broken(folder: Path, spoil: Any) -> Path:

@@ -77,7 +77,7 @@ def test_layers_drawn_in_inkscape_become_cut_files_and_a_traveller(
     source: Path, tmp_path: Path
 ) -> None:
     design = tmp_path / "outside.toml"
-    assert "3 layers in 2 patterns" in run("import", source, "-o", design)
+    assert "3 layers in 2 patterns" in run("import", source, "--to", design)
     run("generate", design, "-o", tmp_path / "out", "--set", "rules.yield_builds=100")
     folder = tmp_path / "out" / "outside"
     layers = json.loads((folder / "manifest.json").read_text())["layers"]
@@ -99,7 +99,7 @@ def test_librecad_prints_the_cut_files_as_inkscape_drew_them(
     name: str, source: Path, tmp_path: Path
 ) -> None:
     design = tmp_path / "outside.toml"
-    run("import", source, "-o", design)
+    run("import", source, "--to", design)
     run("cut", design, "-o", tmp_path / "out", "--set", "rules.yield_builds=100")
     (cut,) = (tmp_path / "out" / "outside" / "layers").glob(
         "001_*.dxf" if name == "film" else "002_*.dxf"

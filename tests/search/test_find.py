@@ -145,7 +145,7 @@ def test_the_same_search_finds_the_same() -> None:
 
 def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--max", "outline_diameter=4", "--tries", "4", "-o", str(target)]
+    asked = ["find", "1dof-5mm", "--max", "outline_diameter=4", "--tries", "4", "--to", str(target)]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 1
     assert "Nearest miss: chamber.diameter = 2.6" in ended.output
@@ -190,19 +190,46 @@ def test_what_cannot_be_asked_is_said_before_anything_else(
     """Also before the file that is there, which is another problem."""
     target = tmp_path / "found.toml"
     target.write_text("mine")
-    ended = CliRunner().invoke(app, ["find", "1dof-5mm", *asked, "-o", str(target)])
+    ended = CliRunner().invoke(app, ["find", "1dof-5mm", *asked, "--to", str(target)])
     assert ended.exit_code == 2
     assert said in " ".join(ended.output.split())
     assert target.read_text() == "mine"
 
 
-def test_a_file_in_no_folder_is_refused_before_the_search(tmp_path: Path) -> None:
-    target = tmp_path / "none" / "found.toml"
-    asked = ["find", "1dof-5mm", "--min", "stroke=5", "-v", "-o", str(target)]
+def test_a_file_that_exists_is_refused_before_the_search(tmp_path: Path) -> None:
+    target = tmp_path / "found.toml"
+    target.write_text("mine")
+    asked = ["find", "1dof-5mm", "--min", "stroke=5", "-v", "--to", str(target)]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 2
-    assert "is no folder" in ended.output
+    assert "exists and is not overwritten" in ended.output
     assert "trying designs" not in ended.output
+
+
+def test_paths_of_a_found_design_start_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kit named on the command line, and one beside the design: both move with the folder."""
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    for name in ("mine.toml", "other.toml"):
+        assert CliRunner().invoke(app, ["new", "kit", str(lab / name)]).exit_code == 0
+    (lab / "tip.toml").write_text('kit = "mine.toml"\n' + sbafab.template("1dof-5mm"))
+    monkeypatch.chdir(tmp_path)
+    asked = ["find", "lab/tip.toml", "--max", "mass=1", "--tries", "4", "--free"]
+    asked += ["chamber.diameter=4:5:1", "--set", "stack.balloons=2"]
+    for more, folder, kit in (
+        ([], "lab/new", "../mine.toml"),
+        ([], "lab", "mine.toml"),
+        (["--set", "kit=lab/other.toml"], "found", "../lab/other.toml"),
+    ):
+        ended = CliRunner().invoke(app, [*asked, *more, "-o", folder])
+        assert ended.exit_code == 0, ended.output
+        assert f'kit = "{kit}"' in Path(folder, "found.toml").read_text()
+    (tmp_path / "moved").mkdir()
+    lab.rename(tmp_path / "moved" / "lab")
+    for name in ("lab/found.toml", "lab/new/found.toml"):
+        assert sbafab.load(tmp_path / "moved" / name).stack.balloons == 2
 
 
 def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
@@ -217,7 +244,7 @@ def test_a_folder_gets_found_toml(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     ended = CliRunner().invoke(app, [*asked[:-1], str(tmp_path / "file")])
     assert ended.exit_code == 2
-    assert "is a file; name a folder with -o" in ended.output
+    assert "is a file, not a folder; choose a folder with -o" in ended.output
 
 
 TAPER = ["--set", "chamber.diameter=[8, 7, 6]", "--set", "stack.balloons=3"]
@@ -233,7 +260,7 @@ def test_a_taper_is_scaled_as_a_whole(tmp_path: Path) -> None:
         "reference_stroke=4",
         "--tries",
         "200",
-        "-o",
+        "--to",
         str(target),
     ]
     ended = CliRunner().invoke(app, asked)
@@ -258,12 +285,12 @@ def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> Non
     """The elastic balloon rises by 20 mm where in proportion to what was measured it is 14."""
     target = tmp_path / "found.toml"
     asked = ["find", "1dof-5mm", "--min", "reference_stroke=20", "--max", "outline_diameter=8"]
-    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
+    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
     assert ended.exit_code == 0, ended.output
     assert sbafab.predict(target).value("reference stroke") >= 20
     target.unlink()
     asked[3] = "stroke@10kPa=20"
-    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "-o", str(target)])
+    ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
     assert ended.exit_code == 0, repr(ended.exception) + ended.output
     assert sbafab.predict(target).value("reference stroke") < 20
 
@@ -294,7 +321,7 @@ def test_the_help_lists_every_quantity_with_its_unit() -> None:
 
 def test_a_file_with_a_space_in_its_name_names_a_design_that_loads(tmp_path: Path) -> None:
     target = tmp_path / "my file.toml"
-    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "-o", str(target)]
+    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "--to", str(target)]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 0, ended.output
     assert sbafab.load(target).name == "my-file"
@@ -372,7 +399,7 @@ def test_a_bound_is_shown_beside_its_median(tmp_path: Path) -> None:
 def test_a_force_where_nothing_rises_is_none(tmp_path: Path) -> None:
     asked = ["find", "1dof-5mm", "--min", "force@200mm@1kPa=1", "--tries", "6"]
     asked += ["--free", "chamber.diameter=5:5.1:0.1"]
-    ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
+    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
     assert "force@200mm@1kPa none, it does not rise that far; at least 1 N: MISSED" in ended.output
 
@@ -452,7 +479,7 @@ def test_rules_are_asked_of_few_designs(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
     target = tmp_path / "found.toml"
-    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "-o", str(target)]
+    asked = ["find", "1dof-5mm", "--max", "mass=1", "--tries", "6", "--to", str(target)]
     ended = CliRunner().invoke(app, [*asked, "--set", "stack.balloons=4"])
     assert ended.exit_code == 0, ended.output
     assert "stack.balloons" not in ended.output.partition("from 1dof-5mm")[0]
@@ -469,9 +496,13 @@ def test_a_key_that_is_set_stays(tmp_path: Path) -> None:
 def test_tabs_in_the_way_are_named(tmp_path: Path) -> None:
     """Two tabs of 5 mm, or three, leave nothing within 10."""
     asked = ["find", "3dof-15mm", "--max", "overall_diameter=10", "--tries", "8"]
-    ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "found.toml")])
+    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "found.toml")])
     assert ended.exit_code == 1
-    assert "overall_diameter includes the inlet tabs" in ended.output
+    first, *rest = ended.stderr.splitlines()
+    assert first.startswith("note: overall_diameter counts the inlet tabs; use outline_diameter")
+    assert "inlet tabs" not in " ".join([*rest, ended.stdout])
+    freed = ["--free", "inlet.tab_length=3:5:0.5", "--to", str(tmp_path / "found.toml")]
+    assert "inlet tabs" not in CliRunner().invoke(app, [*asked, *freed]).output
 
 
 def test_keys_are_freed_and_fixed_by_name() -> None:

@@ -43,7 +43,7 @@ def test_what_others_have_built_is_found_and_generates(case: str, tmp_path: Path
     target = tmp_path / f"{case}.toml"
     # The manifest has the sizes of films that are not pressed yet.
     drawn = ["--set", "models.calibration=none"]
-    arguments = ["find", template, *asked, *drawn, "-o", str(target), "--json"]
+    arguments = ["find", template, *asked, *drawn, "--to", str(target), "--json"]
     ended = CliRunner().invoke(app, arguments)
     assert ended.exit_code == 0, ended.output
     told = json.loads(ended.output)

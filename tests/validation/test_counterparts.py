@@ -274,7 +274,7 @@ def test_find_prints_and_writes_them(tmp_path: Path) -> None:
     asked += ["--min", "force@4mm@50kPa=1", "--max", "height=3"]
     asked += ["--set", "stack.balloons=15", "--free", "chamber.diameter=5:5:1"]
     asked += ["--set", UNCALIBRATED]
-    asked += ["-o", str(tmp_path / "tip.toml")]
+    asked += ["--to", str(tmp_path / "tip.toml")]
     ended = CliRunner().invoke(app, asked)
     assert ended.exit_code == 0, ended.output
     text = (tmp_path / "tip.toml").read_text(encoding="utf-8")
@@ -295,7 +295,7 @@ def test_find_prints_and_writes_them(tmp_path: Path) -> None:
 def test_find_leaves_out_what_is_near_once_calibrated(tmp_path: Path) -> None:
     asked = ["find", "3dof-15mm", "--min", "bend@10kPa=50", "--max", "height=3"]
     asked += ["--set", "stack.balloons=15", "--free", "chamber.diameter=5:5:1"]
-    ended = CliRunner().invoke(app, [*asked, "-o", str(tmp_path / "tip.toml")])
+    ended = CliRunner().invoke(app, [*asked, "--to", str(tmp_path / "tip.toml")])
     assert ended.exit_code == 0, ended.output
     assert "the paper measured" not in ended.output
     assert "the paper measured" not in (tmp_path / "tip.toml").read_text(encoding="utf-8")
