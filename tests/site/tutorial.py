@@ -74,12 +74,17 @@ def _run(commands: str, folder: Path, environment: dict[str, str]) -> str:
 
 
 def _change(text: str, folder: Path) -> None:
-    """Makes the change that a ``diff`` block shows: its file, the old line, the new line."""
-    head, old, new = text.splitlines()
+    """Make the changes that a ``diff`` block shows: its file, then old lines, each run followed by
+    the lines that take its place.
+    """
+    head, _, body = text.partition("\n")
     path = folder / head.removeprefix("--- ")
-    before = path.read_text(encoding="utf-8")
-    assert before.count(old[1:]) == 1, f"{old[1:]!r} in {path}"
-    path.write_text(before.replace(old[1:], new[1:]), encoding="utf-8")
+    content = path.read_text(encoding="utf-8")
+    for old, new in re.findall(r"((?:^-.*\n)+)((?:^\+.*\n)+)", body, re.MULTILINE):
+        before, after = (re.sub(r"^[-+]", "", run, flags=re.MULTILINE) for run in (old, new))
+        assert content.count(before.rstrip("\n")) == 1, before
+        content = content.replace(before.rstrip("\n"), after.rstrip("\n"))
+    path.write_text(content, encoding="utf-8")
 
 
 def _compare(expected: str, said: str) -> None:
