@@ -1,25 +1,41 @@
-"""Charts as SVG for screen and print: a thin wrapper over matplotlib.
+"""Charts as SVG for screen and print, in mm.
 
 Colours are told apart by the colour blind (Okabe and Ito), dashes and markers tell lines apart in
-grey. Text stays text. The same data give the same bytes with the same matplotlib.
+grey. The key stands below the axes, where it covers nothing. Text stays text.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
+from sbafab.geometry.region import coord
 from sbafab.models.figures import Relation
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from sbafab.reports import drawing as draw
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-DASHES = ("solid", (0, (6, 2)), (0, (1.5, 1.5)), (0, (7, 2, 1.5, 2)), (0, (3, 1.5)), (0, (10, 3)))
-MARKERS = "osD^vP"
-PANEL = (4.6, 3.9)
-"""Width and height of a panel in inches."""
+DASHES = ("", "3.8 1.3", "0.95 0.95", "4.4 1.3 0.95 1.3", "1.9 0.95", "6.4 1.9")
+MARKERS = (
+    "M-.8 0a.8 .8 0 1 0 1.6 0a.8 .8 0 1 0-1.6 0z",
+    "M-.7-.7h1.4v1.4h-1.4z",
+    "M0-1L1 0L0 1L-1 0z",
+    "M-.3-.9h.6v.6h.6v.6h-.6v.6h-.6v-.6h-.6v-.6h.6z",
+    "M0-.9L.9.7H-.9z",
+    "M0 .9L.9-.7H-.9z",
+)
+"""Round the place of a measured point."""
+REFERENCE, GRID = "#555555", "#dddddd"
+AXES = 88.0, 64.0
+"""Width and height of a panel's axes."""
+HEAD, FOOT, RIM = 16.0, 12.0, 6.0
+"""Titles above the axes, numbers and label below them, and the rim right of them."""
+ROW, SIGN = 4.4, 11.0
+"""Height of a row of the key, and length of the piece of curve in it."""
+MOST_STEPS = 8
+"""Steps between the numbers at an axis."""
+MARGIN = 0.05
+"""Share of the values' range by which an axis goes on."""
 STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "sbafab",
@@ -31,11 +47,12 @@ STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
-    "grid.color": "#dddddd",
+    "grid.color": GRID,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
     "legend.fontsize": 8.0,
 }
+"""Settings of matplotlib, for charts and pages that it draws."""
 PLAIN: dict[str, Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
@@ -67,85 +84,188 @@ class Panel(NamedTuple):
     curves: Sequence[ChartCurve]
     points: Sequence[ChartPoints] = ()
     from_zero: bool = True
-    """Axes begin at 0 where nothing is negative."""
+    """Axes begin at 0 where nothing is negative: lengths of bars and slopes then mean something."""
 
 
 def chart_svg(title: str, panels: Sequence[Panel]) -> str:
-    """The panels beside each other, under one title."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
-
-    with rc_context(STYLE):
-        width, height = PANEL
-        figure = Figure(figsize=(width * len(panels), height), layout="constrained")
-        FigureCanvasSVG(figure)
-        figure.suptitle(_plain(title), fontsize=11, fontweight="bold", x=0.02, ha="left")
-        row = figure.subplots(1, len(panels), squeeze=False)[0]
-        for place, (axes, panel) in enumerate(zip(row, panels, strict=True), start=1):
-            _draw(axes, panel, place)
-        written = io.StringIO()
-        figure.savefig(written, format="svg", metadata=PLAIN)
-    return written.getvalue()
+    """Return the panels beside each other, under one title."""
+    elements, end, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
+    for place, panel in enumerate(panels, start=1):
+        plot = _plot(panel, end)
+        elements += [*_axes(plot, place), *_curves(plot, place), *_points(plot, place)]
+        rows = list(_key(panel))
+        elements += [_key_row(plot, number, row) for number, row in enumerate(rows)]
+        words = max((draw.text_width(row.label, draw.SMALL) for row in rows), default=0.0)
+        end = plot.left + max(AXES[0], SIGN + 2 + words) + RIM
+        height = max(height, HEAD + AXES[1] + FOOT + ROW * len(rows) + 1)
+    return draw.document(end, height, title, elements)
 
 
-def _draw(axes: Axes, panel: Panel, place: int) -> None:
-    """Draws panel number ``place``; its curves are groups called ``curve<place>.<number>``."""
-    axes.set_title(_plain(panel.title), loc="left")
-    axes.set_xlabel(_plain(panel.x_label))
-    axes.set_ylabel(_plain(panel.y_label))
+class _Scale(NamedTuple):
+    """An axis: the values at its ends, and those that numbers stand at with their texts."""
+
+    low: float
+    high: float
+    ticks: Sequence[tuple[float, str]]
+
+    def share(self, value: float) -> float:
+        """Return the place of a value, 0 at the low end and 1 at the high one."""
+        return (value - self.low) / (self.high - self.low)
+
+
+class _Plot(NamedTuple):
+    """A panel that begins at ``begin`` on the page and its axes at ``left``, and their scales."""
+
+    panel: Panel
+    begin: float
+    left: float
+    x: _Scale
+    y: _Scale
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        """Return the place of values on the page."""
+        wide, high = AXES
+        return self.left + wide * self.x.share(x), HEAD + high * (1 - self.y.share(y))
+
+
+def _plot(panel: Panel, begin: float) -> _Plot:
+    """Return the plot of a panel; the wider the numbers, the further right its axes."""
+    items: list[ChartCurve | ChartPoints] = [*panel.curves, *panel.points]
+    ends = [
+        y + sign * error
+        for points in panel.points
+        for y, error in zip(points.y, points.error, strict=True)
+        for sign in (-1, 1)
+    ]
+    x = _scale([value for item in items for value in item.x], panel.from_zero)
+    y = _scale([*(value for item in items for value in item.y), *ends], panel.from_zero)
+    numbers = max(draw.text_width(text) for _, text in y.ticks)
+    return _Plot(panel, begin, begin + draw.TEXT + 6 + numbers, x, y)
+
+
+def _scale(values: Iterable[float], from_zero: bool) -> _Scale:
+    """Return the axis of values, those that are no finite numbers left out."""
+    finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
+    low, high = min(finite), max(finite)
+    over = MARGIN * ((high - low) or abs(high) or 1.0)
+    low, high = 0.0 if from_zero and low >= 0 else low - over, high + over
+    least = (high - low) / MOST_STEPS
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(each * power for each in (1, 2, 2.5, 5, 10) if each * power >= least * (1 - 1e-9))
+    # A number at the end of an axis is not lost to rounding.
+    counts = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
+    return _Scale(low, high, [(count * step, _number(count * step)) for count in counts])
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _axes(plot: _Plot, place: int) -> Iterator[str]:
+    """Yield grid, numbers, titles and labels; a tick's group is ``xtick<place>.<number>``."""
+    left, right, bottom = plot.left, plot.left + AXES[0], HEAD + AXES[1]
+    for number, (value, text) in enumerate(plot.x.ticks, start=1):
+        x, _ = plot.at(value, plot.y.low)
+        grid = draw.line([(x, bottom), (x, HEAD)], colour=GRID)
+        words = draw.text((x, bottom + 4.2), text, anchor="middle")
+        yield f'<g id="xtick{place}.{number}">{grid}{words}</g>'
+    for number, (value, text) in enumerate(plot.y.ticks, start=1):
+        _, y = plot.at(plot.x.low, value)
+        grid = draw.line([(left, y), (right, y)], colour=GRID)
+        words = draw.text((left - 1.5, y + 1.0), text, anchor="end")
+        yield f'<g id="ytick{place}.{number}">{grid}{words}</g>'
+    yield draw.line([(left, HEAD), (left, bottom), (right, bottom)], width=0.25)
+    panel, middle = plot.panel, (left + right) / 2
+    yield draw.text((left, HEAD - 3.0), panel.title, size=3.5)
+    yield draw.text((middle, bottom + 9.0), panel.x_label, anchor="middle")
+    at = plot.begin + draw.TEXT + 1, HEAD + AXES[1] / 2
+    yield draw.text(at, panel.y_label, anchor="middle", turned=True)
+
+
+def _pens(panel: Panel) -> Iterator[tuple[str, str]]:
+    """Yield the colour of each curve, and the attributes that draw it."""
     drawn = 0
-    for number, curve in enumerate(panel.curves, start=1):
-        pen: dict[str, Any] = {"color": "#555555", "ls": (0, (2, 2)), "lw": 1.0}
+    for curve in panel.curves:
+        colour, dashes, width = REFERENCE, "0.7 0.7", "0.35"
         if not curve.is_reference:
-            pen = {"color": COLOURS[drawn % len(COLOURS)], "ls": DASHES[drawn % len(DASHES)]}
-            pen |= {"lw": 1.8, "marker": "o" if curve.dotted else None, "ms": 3.0}
-            drawn += 1
-        label = _plain(curve.label) or "_nolegend_"
-        axes.plot(curve.x, curve.y, label=label, gid=f"curve{place}.{number}", **pen)
-    for number, points in enumerate(panel.points):
-        axes.errorbar(
-            points.x,
-            points.y,
-            yerr=points.error if any(points.error) else None,
-            fmt=MARKERS[number % len(MARKERS)],
-            color="black",
-            mfc="white",
-            ms=4.5,
-            capsize=4,
-            clip_on=False,
-            label=_plain(points.label),
-            zorder=5,
-        )
-    if panel.from_zero:
-        _begin_at_zero(axes, panel)
-    if any(item.label for item in _items(panel)):
-        axes.legend(loc="best")
+            colour, dashes = COLOURS[drawn % len(COLOURS)], DASHES[drawn % len(DASHES)]
+            drawn, width = drawn + 1, "0.6"
+        dashed = f' stroke-dasharray="{dashes}"' if dashes else ""
+        pen = f'fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"'
+        yield colour, f"{pen}{dashed}"
 
 
-def _begin_at_zero(axes: Axes, panel: Panel) -> None:
-    """Axes begin at 0 where nothing is negative: lengths of bars and slopes then mean something."""
-    items = _items(panel)
-    if min((min(item.x) for item in items), default=0.0) >= 0:
-        axes.set_xlim(left=0.0)
-    if min((min(item.y) for item in items), default=0.0) >= 0:
-        axes.set_ylim(bottom=0.0)
+def _curves(plot: _Plot, place: int) -> Iterator[str]:
+    """Yield each curve of panel number ``place`` as a group ``curve<place>.<number>``."""
+    pairs = zip(plot.panel.curves, _pens(plot.panel), strict=True)
+    for number, (curve, (colour, pen)) in enumerate(pairs, start=1):
+        data, dots, command = "", "", "M"
+        for x, y in zip(curve.x, curve.y, strict=True):
+            if not (math.isfinite(x) and math.isfinite(y)):
+                command = "M"
+                continue
+            across, down = map(coord, plot.at(x, y))
+            data += f"{command}{across} {down}"
+            command = "L"
+            if curve.dotted:
+                dots += f'<circle cx="{across}" cy="{down}" r="0.55" fill="{colour}"/>'
+        yield f'<g id="curve{place}.{number}"><path d="{data}" {pen}/>{dots}</g>'
 
 
-def _items(panel: Panel) -> list[ChartCurve | ChartPoints]:
-    return [*panel.curves, *panel.points]
+def _points(plot: _Plot, place: int) -> Iterator[str]:
+    """Yield measured points of panel number ``place`` as groups ``points<place>.<number>``."""
+    for number, points in enumerate(plot.panel.points, start=1):
+        bars, marks = "", ""
+        for x, y, error in zip(points.x, points.y, points.error, strict=True):
+            if error:
+                (across, low), (_, high) = plot.at(x, y - error), plot.at(x, y + error)
+                bars += draw.line([(across, low), (across, high)], colour="#000000", width=0.3)
+                for end in (low, high):
+                    cap = [(across - 1.2, end), (across + 1.2, end)]
+                    marks += draw.line(cap, colour="#000000", width=0.3)
+            marks += _marker(number, plot.at(x, y))
+        yield f'<g id="points{place}.{number}"><g class="errors">{bars}</g>{marks}</g>'
 
 
-def _plain(text: str) -> str:
-    """Text in which a dollar is a dollar and not the start of a formula."""
-    return text.replace("$", r"\$")
+def _marker(number: int, at: tuple[float, float]) -> str:
+    x, y = map(coord, at)
+    shape = MARKERS[(number - 1) % len(MARKERS)]
+    pen = 'fill="#ffffff" stroke="#000000" stroke-width="0.3"'
+    return f'<path d="{shape}" transform="translate({x} {y})" {pen}/>'
+
+
+class _KeyRow(NamedTuple):
+    """A label with the pen of its curve, or without one the number of its points."""
+
+    label: str
+    pen: str
+    number: int = 0
+
+
+def _key(panel: Panel) -> Iterator[_KeyRow]:
+    for curve, (_, pen) in zip(panel.curves, _pens(panel), strict=True):
+        if curve.label:
+            yield _KeyRow(curve.label, pen)
+    for number, points in enumerate(panel.points, start=1):
+        if points.label:
+            yield _KeyRow(points.label, "", number)
+
+
+def _key_row(plot: _Plot, number: int, row: _KeyRow) -> str:
+    """Return a row of the key: a piece of the curve or a marker, and the label."""
+    x, y = plot.left, HEAD + AXES[1] + FOOT + ROW * (number + 0.5)
+    if row.pen:
+        sign = f'<path d="M{coord(x)} {coord(y)}h{SIGN:g}" {row.pen}/>'
+    else:
+        sign = _marker(row.number, (x + SIGN / 2, y))
+    return sign + draw.text((x + SIGN + 2, y + 0.9), row.label, size=draw.SMALL)
 
 
 # A predicted relation as a chart, with what the paper measured.
 
 
 def relation_svg(name: str, relation: Relation) -> str:
-    """The chart of a relation of the design called ``name``."""
+    """Return the chart of a relation of the design called ``name``."""
     curves = [ChartCurve(line.label, line.x, line.y, line.model is None) for line in relation.lines]
     points = [ChartPoints(p.label, p.x, p.y, p.error) for p in relation.points]
     panel = Panel(relation.title, relation.x_label, relation.y_label, curves, points)

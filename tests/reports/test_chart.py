@@ -1,13 +1,15 @@
-"""Charts: the numbers lie where the axes say, the same bytes every time, nothing global changed."""
+"""Charts: the numbers lie where the axes say, and the key beside them."""
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 
 import pytest
 
 import sbafab
 from sbafab.reports.charts import COLOURS, ChartCurve, ChartPoints, Panel, chart_svg, relation_svg
+from sbafab.reports.drawing import SMALL, text_width
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -22,19 +24,19 @@ def group(svg: str, name: str) -> ET.Element:
 
 
 def ends(element: ET.Element) -> list[tuple[float, float]]:
-    path = element.find(f"{SVG}path")
+    """The points of the first path in it."""
+    path = element.find(f".//{SVG}path")
     assert path is not None
-    numbers = [float(part) for part in path.attrib["d"].split() if part not in "MLz"]
-    return list(zip(numbers[::2], numbers[1::2], strict=True))
+    return [(float(x), float(y)) for x, y in re.findall(r"[ML](\S+?) ([^ML]+)", path.attrib["d"])]
 
 
 def tick_places(svg: str, axis: str) -> dict[float, float]:
-    """Where each tick of the first panel stands, by the number at it."""
+    """Where the grid's line of each number of the first panel stands."""
     found = {}
     for g in ET.fromstring(svg).iter(f"{SVG}g"):
-        if g.get("id", "").startswith(f"{axis}tick"):
-            text, use = next(g.iter(f"{SVG}text")), next(g.iter(f"{SVG}use"))
-            found[float(text.text or "")] = float(use.attrib[axis])
+        if g.get("id", "").startswith(f"{axis}tick1."):
+            number = next(g.iter(f"{SVG}text")).text or ""
+            found[float(number.replace("\N{MINUS SIGN}", "-"))] = ends(g)[0]["xy".index(axis)]
     return found
 
 
@@ -49,9 +51,9 @@ def test_curve_lies_where_the_ticks_say() -> None:
 def test_axes_begin_at_zero_unless_something_is_negative() -> None:
     positive = chart_svg("t", [Panel("", "x", "y", [ChartCurve("", [1.0, 4.0], [1.0, 3.0])])])
     assert min(tick_places(positive, "y")) == 0
-    below = Panel("", "x", "y", [ChartCurve("", [1.0, 4.0], [-1.0, 3.0])])
-    # Matplotlib writes a minus sign, not a hyphen.
-    assert any(text.startswith("\N{MINUS SIGN}") for text in texts(chart_svg("t", [below])))
+    below = chart_svg("t", [Panel("", "x", "y", [ChartCurve("", [1.0, 4.0], [-1.0, 3.0])])])
+    assert min(tick_places(below, "y")) == -1
+    assert any(text.startswith("\N{MINUS SIGN}") for text in texts(below))
 
 
 def test_title_labels_and_key_are_text_as_given() -> None:
@@ -70,7 +72,7 @@ def test_curves_differ_in_colour_and_in_dashes() -> None:
     for n in range(1, 7):
         path = group(svg, f"curve1.{n}").find(f"{SVG}path")
         assert path is not None
-        styles.append(dict(part.split(": ") for part in path.attrib["style"].split("; ")))
+        styles.append(path.attrib)
     assert [style["stroke"] for style in styles] == list(COLOURS[:6])
     assert len({style.get("stroke-dasharray") for style in styles}) == 6
 
@@ -80,27 +82,54 @@ def test_error_bars_are_as_long_as_the_errors() -> None:
     svg = chart_svg("t", [panel])
     up = tick_places(svg, "y")
     scale = (up[0.0] - up[10.0]) / 10
-    bars = next(
-        g for g in ET.fromstring(svg).iter(f"{SVG}g") if "LineCollection" in g.get("id", "")
-    )
+    bars = group(svg, "points1.1").find(f"{SVG}g")
+    assert bars is not None
     lengths = []
     for path in bars.iter(f"{SVG}path"):
-        numbers = [float(part) for part in path.attrib["d"].split() if part not in "ML"]
-        lengths.append(abs(numbers[1] - numbers[3]) / scale)
+        (_, low), (_, high) = (map(float, end.split()) for end in path.attrib["d"][1:].split("L"))
+        lengths.append(abs(high - low) / scale)
     assert lengths == pytest.approx([2.0, 4.0], rel=1e-4)
 
 
-def test_same_bytes_no_date_no_version_and_no_setting_left_behind() -> None:
-    import matplotlib
+def test_key_covers_nothing_and_has_room() -> None:
+    label = "elastic stack, one chamber to 10 kPa, " * 3
+    curves = [ChartCurve(label, [0.0, 1.0], [0.0, 1.0]), ChartCurve("b", [0.0, 1.0], [1.0, 0.0])]
+    svg = chart_svg("t", [Panel("p", "x", "y", curves)])
+    page = ET.fromstring(svg)
+    wide, high = (float(size) for size in page.attrib["viewBox"].split()[2:])
+    key = [text for text in page.iter(f"{SVG}text") if text.text in (label, "b")]
+    lowest = max(y for _, y in (*ends(group(svg, "curve1.1")), *ends(group(svg, "curve1.2"))))
+    assert len(key) == 2
+    assert all(lowest < float(text.attrib["y"]) < high for text in key)
+    assert float(key[0].attrib["x"]) + text_width(label, SMALL) < wide
 
-    before = dict(matplotlib.rcParams)
-    relation = sbafab.predict("1dof-5mm").relations[0]
-    first = relation_svg("1dof-5mm", relation)
-    assert relation_svg("1dof-5mm", relation) == first
-    assert dict(matplotlib.rcParams) == before
-    assert "Matplotlib" not in first
-    assert "<dc:date>" not in first
-    assert matplotlib.__version__ not in first
+
+@pytest.mark.parametrize(
+    ("low", "high", "numbers"),
+    [
+        # By hand: 1, 2, 2.5 or 5 times a power of ten, in at most 8 steps of the axis.
+        (0.0, 5.0, [0, 1, 2, 3, 4, 5]),
+        (0.0, 17.5, [0, 2.5, 5, 7.5, 10, 12.5, 15, 17.5]),
+        (-0.001, 0.002, [-0.001, -0.0005, 0, 0.0005, 0.001, 0.0015, 0.002]),
+        (0.0, 1.5e5, [0, 2e4, 4e4, 6e4, 8e4, 1e5, 1.2e5, 1.4e5]),
+    ],
+)
+def test_numbers_at_an_axis_are_round(low: float, high: float, numbers: list[float]) -> None:
+    svg = chart_svg("t", [Panel("p", "x", "y", [ChartCurve("", [0.0, 1.0], [low, high])])])
+    assert sorted(tick_places(svg, "y")) == pytest.approx(numbers)
+
+
+def test_curve_of_equal_values_and_one_with_a_gap_are_drawn() -> None:
+    curves = [
+        ChartCurve("", [5.0, 5.0], [7.0, 7.0]),
+        ChartCurve("", [1.0, 2.0, 3.0, 4.0], [1.0, float("nan"), 3.0, 4.0]),
+    ]
+    svg = chart_svg("t", [Panel("p", "x", "y", curves)])
+    assert len(ends(group(svg, "curve1.1"))) == 2
+    path = group(svg, "curve1.2").find(f"{SVG}path")
+    assert path is not None
+    assert path.attrib["d"].count("M") == 2
+    assert "nan" not in svg
 
 
 def test_paper_s_points_are_drawn_where_it_measured() -> None:
