@@ -18,15 +18,15 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.on_demand import np
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
-from sbafab.laminate.films import Film
 from sbafab.laminate.joints import Net
-from sbafab.laminate.laminate import Interface, Laminate, Layer
+from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.laminate.netlist import Netlist, compare
 from sbafab.rules.boundary import without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
 from sbafab.rules.measures import Measures
 from sbafab.rules.moved_seams import STEADIER, moved_seams, straying
+from sbafab.rules.opening_pressure import hardest_place
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.void_axes import (
     AxisNode,
@@ -72,7 +72,7 @@ class NetFault:
 
 @dataclass(frozen=True)
 class NarrowPlace:
-    """The narrowest place of a net's voids in one interface, and the pressure that opens it there.
+    """The place of a net's voids in one interface that is hardest to open, and its pressure.
 
     ``pressure`` in kPa is None where no film has elastic constants.
     """
@@ -482,13 +482,14 @@ class _Reading:
     # Widths.
 
     def narrow(self) -> Iterable[NarrowPlace]:
-        """Yield the narrowest place of every cavity of a net."""
+        """Yield the place of every cavity of a net that is hardest to open."""
         for number, cavity in enumerate(self.cavities):
             names = self.owners.get(self.part(number), ())
-            width = self._width(number) if names and not cavity.is_open_film else None
-            if width is not None:
-                pressure = opening_pressure(self.laminate, cavity.interface, width)
-                yield NarrowPlace(names[0], cavity.interface, width, pressure)
+            if names and not cavity.is_open_film:
+                gap = self.interface(cavity.interface)
+                place = hardest_place(self.laminate, gap, cavity.region)
+                if place is not None:
+                    yield NarrowPlace(names[0], cavity.interface, *place)
 
     def _width(self, number: int) -> Width | None:
         return least_width(self.cavities[number].region, 0.0)
@@ -689,64 +690,6 @@ def _labels(home: Mapping[_Terminal, int | None], part: int) -> str:
     away = {row.member for row, number in home.items() if number != part}
     labels = (row.label if row.member in away else row.member for row in here)
     return " and ".join(dict.fromkeys(labels))
-
-
-# Channels that close: narrower than their films can lift.
-#
-# A channel between films bonded at both sides is a long plate clamped at its edges. Under a
-# pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The
-# first term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed.,
-# Sec. 3: d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by
-# 8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open where d is
-# the thickness of the film beside it. Films bonded behind that film there stiffen it.
-
-
-BENDING = 32.0
-STRETCHING = 64.0 / 3.0
-
-
-def opening_pressure(laminate: Laminate, interface: int, width: Width) -> float | None:
-    """Return the kPa at which either film of a channel lifts by its thickness at a place.
-
-    None where no film of either side has elastic constants. A model, not measured.
-    """
-    gap = laminate.interfaces[interface - 1]
-    if width.value <= 0:
-        return math.inf
-    sides = [
-        _lifting_pressure(_bonded_films(laminate, gap, width.middle, step), width.value)
-        for step in (-1, 1)
-    ]
-    known = [pressure for pressure in sides if pressure is not None]
-    return min(known, default=None)
-
-
-def _lifting_pressure(films: Sequence[Film], width: float) -> float | None:
-    """Return the kPa at which a stack of bonded films lifts by the thickness of the first one."""
-    moduli = [
-        1000 * film.elastic[0] / (1 - film.elastic[1] ** 2)
-        for film in films
-        if film.elastic is not None
-    ]
-    if len(moduli) < len(films):
-        return None
-    lift, thickness = films[0].thickness, sum(film.thickness for film in films)
-    stiffness = BENDING * thickness**3 * lift + STRETCHING * thickness * lift**3
-    return max(moduli) * stiffness / width**4
-
-
-def _bonded_films(laminate: Laminate, gap: Interface, p: Point, step: int) -> list[Film]:
-    """The film beside a void on its upper (+1) or lower (-1) side, and those bonded behind it."""
-    layer: Layer = gap.above if step > 0 else gap.below
-    films = [layer.film]
-    number = gap.index - 1 + step
-    while 0 <= number < len(laminate.interfaces):
-        behind = laminate.interfaces[number]
-        if not behind.bond.contains(p):
-            break
-        films.append((behind.above if step > 0 else behind.below).film)
-        number += step
-    return films
 
 
 def _openings(

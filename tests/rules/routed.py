@@ -27,7 +27,11 @@ MARGIN = 3.0
 POCKET = 1.6
 """Radius of a pocket, mm."""
 OVERHANG = 0.5
+CENTRE = 1.5 - MARGIN
+"""x of a point in the channel from a mouth."""
 PIXEL = 0.1
+PAST = 0.03
+"""mm that an opening may reach past its mouth."""
 
 Place = tuple[int, int, int]
 """Interface from 0, column, row."""
@@ -59,6 +63,10 @@ class Routes:
     less: list[tuple[int, Region]] = field(default_factory=list)
     holes: list[tuple[int, Point]] = field(default_factory=list)
     """Holes in a film, from 0 at the bottom, beside the vias."""
+    stated: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Where the middle of a mouth is stated along the edge, and its width, where not as drawn."""
+    named: dict[str, int] = field(default_factory=dict)
+    """Interfaces, from 0, in which a port with a mouth is named besides its own."""
 
 
 def xy(place: Sequence[int]) -> Point:
@@ -194,6 +202,12 @@ def laminate_of(routes: Routes) -> Laminate:
         mask = mask_of(routes, number)
         if number < routes.interfaces and not mask.is_empty:
             add("chamber-mask", mask)
+    masked = [layer.index for layer in layers if layer.role == "chamber-mask"]
+    balloon = {
+        level: masked.index(faces[level] + 1) + 1
+        for level in range(routes.interfaces)
+        if faces[level] + 1 in masked
+    }
     ports = tuple(
         Port(
             name,
@@ -205,20 +219,19 @@ def laminate_of(routes: Routes) -> Laminate:
         for name, place in routes.ports.items()
         if name not in routes.mouths
     )
-    chambers = tuple(
-        Chamber(name, ((1.5 - MARGIN, xy(p)[1]),), (p[0] + 1,))
-        for name in routes.mouths
-        for p in [routes.ports[name]]
-    )
-    inlets = tuple(
-        Inlet(name, (-MARGIN, xy(routes.ports[name])[1]), (-1.0, 0.0), routes.width, 1.0, 0.3)
-        for name in routes.mouths
-    )
+    chambers = []
+    inlets = []
+    for name in routes.mouths:
+        level, y = routes.ports[name][0], xy(routes.ports[name])[1]
+        levels = sorted({level, routes.named.get(name, level)})
+        chambers.append(Chamber(name, ((CENTRE, y),), tuple(balloon[n] for n in levels)))
+        middle, width = routes.stated.get(name, (y, routes.width))
+        inlets.append(Inlet(name, (-MARGIN, middle), (-1.0, 0.0), width, 1.0, 0.3))
     return replace(
         pouch,
         layers=tuple(layers),
-        chambers=chambers,
-        inlets=inlets,
+        chambers=tuple(chambers),
+        inlets=tuple(inlets),
         bores=(),
         balloons=routes.interfaces,
         ports=ports,
@@ -380,6 +393,58 @@ def leak(routes: Routes, random: Random) -> Planted | None:
     return Planted("leak", (a[0] + 1,), disc(edge, 0.1), routes)
 
 
+def wide_mouth(routes: Routes, random: Random) -> Planted | None:
+    """An opening that goes on past the end of its mouth, or a mouth stated beside its opening."""
+    if not routes.mouths:
+        return None
+    port = random.choice(routes.mouths)
+    level, y = routes.ports[port][0], xy(routes.ports[port])[1]
+    side, more = random.choice((-1, 1)), random.uniform(0.15, 0.7)
+    end = y + side * routes.width / 2
+    if random.random() < 0.5:
+        routes.more.append((level, strip((-MARGIN - OVERHANG, end), (CENTRE, end), 2 * more)))
+        end += side * more
+    else:
+        routes.stated[port] = y - side * more, routes.width
+    return Planted("leak", (level + 1,), disc((-MARGIN, end), more), routes)
+
+
+def shared_mouth(routes: Routes, random: Random) -> Planted | None:
+    """A mouth stated so wide that the channel of another net opens into it, too."""
+    beside = [
+        (port, place)
+        for port in routes.mouths
+        for place, net in sorted(routes.nodes.items())
+        if place[:2] == (routes.ports[port][0], 0) and net != routes.nodes[routes.ports[port]]
+    ]
+    if not beside:
+        return None
+    port, place = random.choice(beside)
+    own, y = xy(routes.ports[port])[1], xy(place)[1]
+    routes.more.append((place[0], strip((-MARGIN - OVERHANG, y), xy(place), routes.width)))
+    routes.stated[port] = (own + y) / 2, abs(own - y) + routes.width
+    edge = rectangle((-MARGIN - 0.1, min(own, y)), (-MARGIN + 0.1, max(own, y)))
+    return Planted("short", (place[0] + 1,), edge, routes)
+
+
+def foreign_balloon(routes: Routes, random: Random) -> Planted | None:
+    """A port with a mouth that is named in one more interface, where another net lies."""
+    over = [
+        (port, place)
+        for port in routes.mouths
+        for place, net in sorted(routes.nodes.items())
+        if place[1:] == routes.ports[port][1:] and net != routes.nodes[routes.ports[port]]
+    ]
+    if not over:
+        return None
+    port, place = random.choice(over)
+    shape = strip((CENTRE - 0.5, xy(place)[1]), xy(place), routes.width)
+    routes.more.append((place[0], shape))
+    routes.named[port] = place[0]
+    near = shape | disc(xy(place), PITCH)
+    return Planted("short", (place[0] + 1,), near, routes)
+
+
 def stray(routes: Routes, random: Random) -> Planted | None:
     columns, rows = routes.size
     free = [
@@ -417,6 +482,9 @@ FAULTS: Mapping[str, Callable[[Routes, Random], Planted | None]] = {
     "extra-via": extra_via,
     "stub": stub,
     "leak": leak,
+    "wide-mouth": wide_mouth,
+    "shared-mouth": shared_mouth,
+    "foreign-balloon": foreign_balloon,
     "stray": stray,
     "blind-hole": blind_hole,
 }
@@ -434,7 +502,7 @@ def groups_by_raster(laminate: Laminate) -> tuple[set[frozenset[str]], set[str]]
 
     A square of an interface is void where a mask lies or a film is missing; air goes on to the next
     square, and to the next interface where the film between has a hole. A tube fills its hole, and
-    the last square row before the left edge closes the mouth of an inlet.
+    closes the squares beside the left edge along its inlet's mouth, which it joins.
     """
     low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
     # Squares that begin at the edge of the sheet, with one row round it that is outside.
@@ -457,14 +525,23 @@ def groups_by_raster(laminate: Laminate) -> tuple[set[frozenset[str]], set[str]]
         voids.append(np.logical_or.reduce([here, *masks]) & ~outside)
     first = np.full(outside.shape, 0) + np.arange(outside.size).reshape(outside.shape) + 1
     labels = flood(voids, films, first)
-    leaves = set()
-    for void, label in zip(voids, labels, strict=True):
-        edge = np.zeros_like(void)
-        edge[1] = edge[-2] = edge[:, 1] = edge[:, -2] = True
-        for inlet in laminate.inlets:
-            near = np.abs(grid_y - inlet.mouth[1]) <= inlet.width / 2 + PIXEL
-            edge &= ~(near & (grid_x < low_x + 2 * PIXEL))
-        leaves |= set(label[edge & void].tolist())
+    rim = np.zeros_like(outside)
+    rim[1] = rim[-2] = rim[:, 1] = rim[:, -2] = True
+    rims = [rim & void for void in voids]
+    balloons = [n for n, gap in enumerate(laminate.interfaces) if gap.masks]
+    levels = {c.name: [balloons[b - 1] for b in c.balloons] for c in laminate.chambers}
+    homes: list[tuple[str, int, int, int]] = []
+    for inlet in laminate.inlets:
+        near = np.abs(grid_y - inlet.mouth[1]) <= inlet.width / 2 + PAST
+        near &= grid_x < low_x + PIXEL
+        met = [(n, *at) for n in levels[inlet.chamber] for at in np.argwhere(rims[n] & near)]
+        joined_labels = {labels[n][row, column] for n, row, column in met}
+        for label in labels:
+            label[np.isin(label, [*joined_labels])] = max(joined_labels, default=0)
+        for n in levels[inlet.chamber]:
+            rims[n] &= ~near
+        homes.append((inlet.chamber, *(met or [(0, 0, 0)])[0]))
+    leaves = set().union(*(label[edge].tolist() for label, edge in zip(labels, rims, strict=True)))
     for film, n in ((films[0], 0), (films[-1], len(voids) - 1)):
         open_squares = ~film & voids[n]
         for port in laminate.ports:
@@ -474,9 +551,10 @@ def groups_by_raster(laminate: Laminate) -> tuple[set[frozenset[str]], set[str]]
         leaves |= set(labels[n][open_squares].tolist())
     groups: dict[int, set[str]] = {}
     alone: set[frozenset[str]] = set()
-    for name, gap_number, (x, y) in places(laminate, level):
-        row, column = round((y - low_y) / PIXEL + 0.5), round((x - low_x) / PIXEL + 0.5)
-        label = int(labels[gap_number][row, column])
+    for name, n, (x, y) in places(laminate, level, levels):
+        homes.append((name, n, round((y - low_y) / PIXEL + 0.5), round((x - low_x) / PIXEL + 0.5)))
+    for name, n, row, column in homes:
+        label = int(labels[n][row, column])
         if label == 0:
             alone.add(frozenset({name}))
         else:
@@ -486,16 +564,15 @@ def groups_by_raster(laminate: Laminate) -> tuple[set[frozenset[str]], set[str]]
     return joined, outlets
 
 
-def places(laminate: Laminate, level: dict[int, int]) -> Iterator[tuple[str, int, Point]]:
-    """Every port: its name, its interface from 0, and its place."""
+def places(
+    laminate: Laminate, level: dict[int, int], levels: Mapping[str, Sequence[int]]
+) -> Iterator[tuple[str, int, Point]]:
+    """Every port and every pocket: its name, its interface from 0, and its place."""
     for port in laminate.ports:
         yield port.name, level[port.below], port.at
-    for inlet in laminate.inlets:
-        # The only interface with a strip at the mouth.
-        p = (inlet.mouth[0] + 0.5, inlet.mouth[1])
-        for number, gap in enumerate(laminate.interfaces):
-            if any(mask.profile.contains(p) for mask in gap.masks):
-                yield inlet.chamber, number, p
+    for chamber in laminate.chambers:
+        for number in levels[chamber.name]:
+            yield chamber.name, number, chamber.centres[0]
 
 
 def flood(

@@ -1,0 +1,183 @@
+"""Channels that close: the pressure that lifts the films of a void off each other.
+
+A channel between films bonded at both sides is a long plate clamped at its edges. Under a
+pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The
+first term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed.,
+Sec. 3: d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by
+8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open where d is
+the thickness of the film beside it. Films bonded behind that film there stiffen it, so that a wide
+place between many films may be harder to open than a narrow one between two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby, pairwise
+from typing import NamedTuple
+
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Edge, Line, Point, meeting_points
+from sbafab.geometry.facing_places import facing_places_of
+from sbafab.geometry.nearby import widened
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import TOUCH, Width, least_width
+from sbafab.laminate.films import Film
+from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.rules.boundary import without_slivers
+
+BENDING = 32.0
+STRETCHING = 64.0 / 3.0
+BESIDE = 1e-5
+"""mm aside of a place at which it surely lies on one side of the end of a bond behind it."""
+
+
+WIDEST = 3.0
+"""Times as wide as the narrowest are places that are looked at where films are not known."""
+
+
+class OpeningPlace(NamedTuple):
+    """A place of a channel, and the kPa that open it there; None where no film is known."""
+
+    width: Width
+    pressure: float | None
+
+
+def hardest_place(laminate: Laminate, interface: Interface, void: Region) -> OpeningPlace | None:
+    """Return the place of a void that takes most pressure to open; None if no edges face there.
+
+    Pressures are those at which either film lifts by its thickness; without elastic constants of
+    either it is the narrowest place. A model, not measured.
+    """
+    narrowest = least_width(void, 0.0)
+    if narrowest is None:
+        return None
+    sides = [_Side.of(laminate, interface, step, void) for step in (-1, 1)]
+    worst = OpeningPlace(narrowest, _pressure(sides, narrowest))
+    if worst.pressure is None or math.isinf(worst.pressure):
+        return worst
+
+    def most(width: float) -> float:
+        """The kPa that open a place of this width at most: with all films behind it bonded."""
+        loads = [side.lifting(len(side.films), width) for side in sides]
+        return min((load for load in loads if load is not None), default=math.inf)
+
+    # Pressures fall with the fourth power of the width: wider places are no harder to open.
+    harder = most(narrowest.value) / worst.pressure
+    slack = narrowest.value * ((harder**0.25 if math.isfinite(harder) else WIDEST) - 1)
+    if slack <= TOUCH:
+        return worst
+    bonded = [region for side in sides for region in side.bonded]
+    walls = _split(void, bonded, narrowest.value + slack)
+    (places,) = facing_places_of([(walls, slack, 0.0, narrowest)])
+    for place in places.value.argsort(kind="stable").tolist():
+        (x, y), (u, v) = places.start[:, place].tolist(), places.end[:, place].tolist()
+        width = Width(float(places.value[place]), (x, y), (u, v))
+        if most(width.value) <= worst.pressure:
+            break
+        pressure = _pressure(sides, width)
+        if pressure is None:
+            return OpeningPlace(width, None)
+        if pressure > worst.pressure:
+            worst = OpeningPlace(width, pressure)
+    return worst
+
+
+class _Side(NamedTuple):
+    """The films on one side of a void, outward, and the parts of it over which each next is bonded.
+
+    Each part lies in the one before.
+    """
+
+    films: tuple[Film, ...]
+    bonded: tuple[Region, ...]
+
+    @classmethod
+    def of(cls, laminate: Laminate, gap: Interface, step: int, void: Region) -> _Side:
+        films, bonded = [(gap.above if step > 0 else gap.below).film], []
+        number = gap.index - 1 + step
+        part = void
+        while 0 <= number < len(laminate.interfaces):
+            behind = laminate.interfaces[number]
+            part = without_slivers(part & behind.bond)
+            if part.is_empty:
+                break
+            bonded.append(part)
+            films.append((behind.above if step > 0 else behind.below).film)
+            number += step
+        return cls(tuple(films), tuple(bonded))
+
+    def lifting(self, count: int, width: float) -> float | None:
+        """Return the kPa at which the first films, bonded, lift by the thickness of the first."""
+        films = self.films[:count]
+        elastic = [film.elastic for film in films if film.elastic is not None]
+        if len(elastic) < count:
+            return None
+        plane = 1000 * max(modulus / (1 - poisson**2) for modulus, poisson in elastic)
+        lift, thickness = films[0].thickness, sum(film.thickness for film in films)
+        stiffness = BENDING * thickness**3 * lift + STRETCHING * thickness * lift**3
+        return plane * stiffness / width**4
+
+    def pressure(self, p: Point, q: Point) -> float | None:
+        """Return the kPa that lift this side somewhere between two walls.
+
+        At most what lifts the stiffest films there over the whole width, and what lifts any
+        stretch of softer ones between stiffer.
+        """
+        length = math.dist(p, q)
+        runs = list(self._runs(Line(p, q)))
+        loads = [self.lifting(count, share * length) for count, share in runs]
+        loads.append(self.lifting(max(count for count, _ in runs), length))
+        return min((load for load in loads if load is not None), default=None)
+
+    def _runs(self, across: Line) -> Iterator[tuple[int, float]]:
+        """Yield how many films are bonded along stretches of a line, with their shares of it."""
+        edges = (edge for part in self.bonded for edge in part.index.touching(across.bounds))
+        shares = sorted(across.parameter(m) for edge in edges for m in meeting_points(across, edge))
+        stretches = [
+            (self._bonded_at(across.at((low + high) / 2)), high - low)
+            for low, high in pairwise([0.0, *shares, 1.0])
+            if (high - low) * across.length > TOUCH
+        ]
+        for count, group in groupby(stretches, key=lambda stretch: stretch[0]):
+            yield count, sum(share for _, share in group)
+
+    def _bonded_at(self, p: Point) -> int:
+        outside = (n for n, part in enumerate(self.bonded, start=1) if not part.contains(p))
+        return next(outside, len(self.films))
+
+
+def _pressure(sides: Sequence[_Side], width: Width) -> float | None:
+    """Return the kPa that lift either side; the more of both where bonds behind it end."""
+    if width.value <= 0:
+        return math.inf
+    (x, y), (u, v) = width.start, width.end
+    dx, dy = BESIDE * (y - v) / width.value, BESIDE * (u - x) / width.value
+    pressures = []
+    for sign in (-1, 1):
+        p, q = (x + sign * dx, y + sign * dy), (u + sign * dx, v + sign * dy)
+        loads = [load for side in sides if (load := side.pressure(p, q)) is not None]
+        pressures += [min(loads)] if loads else []
+    return max(pressures, default=None)
+
+
+def _split(void: Region, parts: Sequence[Region], reach: float) -> Region:
+    """Return a void whose edges are cut where edges of parts of it within reach begin or turn."""
+    contours = []
+    for contour in void.contours:
+        edges: list[Edge] = []
+        for edge in contour.edges:
+            box = widened(edge.bounds, reach)
+            ends = [end for part in parts for end in part.index.touching(box)]
+            points = [
+                p for end in ends for p in (*meeting_points(edge, end), end.start, end.at(0.5))
+            ]
+            room = TOUCH / edge.length
+            shares = sorted(edge.parameter(edge.nearest(p)) for p in points)
+            kept = [
+                t for before, t in pairwise([0.0, *shares]) if t - before > room and t < 1 - room
+            ]
+            marks = [edge.start, *map(edge.at, kept), edge.end]
+            edges += [edge.part(a, b) for a, b in pairwise(marks)]
+        contours.append(Contour(tuple(edges)))
+    return Region(tuple(contours))
