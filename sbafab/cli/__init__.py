@@ -17,39 +17,51 @@ from sbafab.cli.exit import BAD_INPUT, exit_plainly, prepared_streams, print_err
 from sbafab.cli.progress import add_verbosity
 from sbafab.process import prepare
 
-SUMMARIES = {
-    "templates": "List the templates, a line each.",
-    "new": "Write a commented design file to start from.",
-    "import": "Write a design of drawn layers from other files.",
-    "generate": "Write everything: cut files, schedule, traveller, meshes.",
-    "check": "Run the rules on a design or on an output folder.",
-    "explain": "Explain a rule: criterion, reason, remedy.",
-    "cut": "Write the cut files: a DXF for each layer, and film sheets.",
-    "press": "Write the heat-press schedule.",
-    "mesh": "Write meshes: solid, cavities, volume and shell.",
-    "nest": "Cut several designs from the same film sheets.",
-    "stock": "Show what an output folder takes of what is in stock, and what is lacking.",
-    "kerf": "Compute the kerf from a filled coupon.csv.",
-    "recipe": "Take power and speed of a film from a filled testgrid.csv.",
-    "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",
-    "predict": "Predict size, stroke, force, time and bending.",
-    "map": "Map force and volume of the balloons.",
-    "picture": "Draw the inflated actuator as picture, animation or scene.",
-    "simulate": "Inflate a design in an installed simulator.",
-    "sweep": "Check and predict variants of a design.",
-    "find": "Find the best design that meets requirements.",
-    "compare": "Compare two designs: what differs, what each reaches.",
-    "record": "Record the results of builds, and report on them.",
-    "reproduce": "Compare predictions with measurements.",
-    "calibrate": "Fit the models to measurements.",
-    "studio": "Edit a design in the browser.",
-    "schema": "Print a JSON schema, by default that of design files.",
+GROUPS = {
+    "Design": {
+        "new": "Write a commented design file to start from, or list the templates.",
+        "import": "Write a design of drawn layers from other files.",
+        "studio": "Edit a design in the browser.",
+        "schema": "Print a JSON schema, by default that of design files.",
+    },
+    "Check": {
+        "check": "Run the rules on a design or on an output folder.",
+        "explain": "Explain a rule, a key of design files, or a quantity that find and predict know.",
+        "compare": "Compare two designs: what differs, what each reaches.",
+    },
+    "Make": {
+        "generate": "Write everything: cut files, schedule, traveller, meshes.",
+        "cut": "Write the cut files: a DXF for each layer, and film sheets.",
+        "press": "Write the heat-press schedule.",
+        "mesh": "Write meshes: solid, cavities, volume and shell.",
+        "nest": "Cut several designs from the same film sheets.",
+        "stock": "Show what an output folder takes of what is in stock, and what is lacking.",
+    },
+    "Predict": {
+        "predict": "Predict size, stroke, force, time and bending.",
+        "map": "Map force and volume of the balloons.",
+        "picture": "Draw the inflated actuator as picture, animation or scene.",
+        "simulate": "Inflate a design in an installed simulator.",
+    },
+    "Search": {
+        "find": "Find the best design that meets requirements.",
+        "sweep": "Check and predict variants of a design.",
+    },
+    "Measure": {
+        "kerf": "Compute the kerf from a filled coupon.csv.",
+        "recipe": "Take power and speed of a film from a filled testgrid.csv.",
+        "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",
+        "record": "Record the results of builds, and report on them.",
+        "reproduce": "Compare predictions with measurements.",
+        "calibrate": "Fit the models to measurements.",
+    },
 }
-"""The commands in the order a newcomer needs them, with the first line of their help.
+"""The commands in the order a newcomer needs them, in groups, with the first line of their help.
 
 A module has the name of its command. The summaries stand here so that ``sbafab --help`` and the
 completion of a command's name load no command.
 """
+SUMMARIES = {name: summary for group in GROUPS.values() for name, summary in group.items()}
 BUILTIN = {"map": "map_", "import": "import_"}
 """Functions that cannot have the name of their command; nor can a module be named ``import``."""
 
@@ -103,14 +115,16 @@ EXTRAS = {
 
 
 class CommandGroup(click.Group):
-    """A group that lists its commands in the order of SUMMARIES and suggests the nearest name."""
+    """A group that lists its commands in GROUPS and suggests the nearest name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(SUMMARIES.items()))
+        width = max(len(name) for name in SUMMARIES)
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(width), text) for name, text in group.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         names = [

@@ -865,7 +865,7 @@ FORMATS: Mapping[str, Format] = {
         ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained
     ),
     "templates": Format(
-        ids.TEMPLATES_SCHEMA, "what `templates --json` prints: a list, without id", _templates
+        ids.TEMPLATES_SCHEMA, "what `new --json` prints: a list, without id", _templates
     ),
     "error": Format(
         ERROR_SCHEMA, "what any command prints with `--json` when it ends in an error", _error

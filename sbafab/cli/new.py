@@ -9,7 +9,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from sbafab.cli.options import completions
+from sbafab.cli.options import completions, json_option
+from sbafab.cli.printing import print_json
 from sbafab.cutting.calibration import write_coupon
 from sbafab.cutting.power_grid import PowerGrid, write_grid
 from sbafab.design.files import template_summaries, write_new
@@ -21,21 +22,22 @@ from sbafab.version import GENERATOR
 COUPON = "coupon"
 KIT = "kit"
 TEST_GRID = "testgrid"
+OTHERS = {
+    COUPON: "the kerf's calibration piece",
+    TEST_GRID: "powers and speeds to try on a film",
+    KIT: "films, tubes, press, laser, limits",
+}
+"""What is no design, with a summary."""
 POWERS, SPEEDS = "10,20,30,40,50", "10,20,40,80,160"
 
 
 def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete the names of templates, "coupon", "testgrid" and "kit"."""
-    extra = {
-        COUPON: "the kerf's calibration piece",
-        TEST_GRID: "powers and speeds to try on a film",
-        KIT: "films, tubes, press, laser, limits",
-    }
-    return completions(typed, (template_summaries() | extra).items())
+    return completions(typed, (template_summaries() | OTHERS).items())
 
 
 @click.command()
-@click.argument("template", shell_complete=templates)
+@click.argument("template", required=False, shell_complete=templates)
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @click.option("--film", metavar="PRODUCT", help="testgrid: film.  [default: Stretchlon 200]")
 @click.option("--thickness", metavar="LENGTH", help="testgrid: its thickness.  [default: 0.038]")
@@ -43,10 +45,11 @@ def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[Co
 @click.option("--power", metavar="LIST", help=f"testgrid: powers in %.  [default: {POWERS}]")
 @click.option("--speed", metavar="LIST", help=f"testgrid: speeds in mm/s.  [default: {SPEEDS}]")
 @click.option("--passes", type=click.IntRange(1, 50), help="testgrid: passes.  [default: 1]")
-def new(template: str, file: Path | None, **grid: Any) -> None:
-    """Write a commented design file to start from.
+@json_option
+def new(template: str | None, file: Path | None, as_json: bool, **grid: Any) -> None:
+    """Write a commented design file to start from, or list the templates.
 
-    FILE is TEMPLATE.toml in this folder unless given.
+    Without TEMPLATE: list all, a line each. FILE is TEMPLATE.toml in this folder unless given.
 
     TEMPLATE "coupon" writes the calibration piece of the kerf, its picture and a table to fill in;
     FILE is then a folder, "coupon" unless given. TEMPLATE "kit" writes the films, tubes, press,
@@ -57,8 +60,13 @@ def new(template: str, file: Path | None, **grid: Any) -> None:
     powers and speeds are a start, not settings of your machine.
     """
     given = [name for name, value in grid.items() if value is not None]
+    if as_json and template is not None:
+        raise click.UsageError("--json lists the templates; leave TEMPLATE out")
     if given and template != TEST_GRID:
         raise click.UsageError(f"--{given[0]} goes with testgrid only; leave it out")
+    if template is None:
+        _list(as_json)
+        return
     if template == TEST_GRID:
         _test_grid(file or Path(TEST_GRID), grid)
         return
@@ -72,6 +80,18 @@ def new(template: str, file: Path | None, **grid: Any) -> None:
     written = write_new(template, file)
     path = shlex.quote(str(written))
     click.echo(f"{written} written. Edit it, then: sbafab generate {path}")
+
+
+def _list(as_json: bool) -> None:
+    """Print the designs that ship, and in words what else may be written."""
+    designs = template_summaries()
+    if as_json:
+        print_json([{"name": name, "summary": summary} for name, summary in designs.items()])
+        return
+    every = designs | OTHERS
+    width = max(map(len, every))
+    for name, summary in every.items():
+        click.echo(f"{name:<{width}}  {summary}")
 
 
 def _kit(file: Path) -> None:

@@ -128,7 +128,7 @@ def completions(typed: str, candidates: Iterable[tuple[str, str | None]]) -> lis
 
 def _keys() -> dict[str, object]:
     """Return the keys of all families that hold a value, with their annotations."""
-    # `sbafab templates` has options too, and needs no family.
+    # `sbafab new` has options too, and needs no family.
     from sbafab.actuators import records
 
     keys: dict[str, object] = {}

@@ -25,6 +25,19 @@ def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]
     assert "Usage: sbafab" in out
 
 
+def test_the_list_of_commands_is_in_groups(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(["--help"], capsys)
+    listed: dict[str, list[str]] = {}
+    for line in out.partition("Options:")[2].splitlines():
+        if line and not line.startswith(" "):
+            listed[line.rstrip(":")] = []
+        elif line[2:3].isalpha():
+            listed[list(listed)[-1]].append(line.split()[0])
+    groups = ("Design", "Check", "Make", "Predict", "Search", "Measure")
+    assert tuple(name for name in listed if name != "Not installed") == groups
+    assert sorted(name for group in groups for name in listed[group]) == sorted(COMMANDS)
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_list_of_commands_quotes_their_help(command: str) -> None:
     assert SUMMARIES[command] == COMMANDS[command].get_short_help_str(200)
@@ -163,9 +176,12 @@ def test_templates_schema_and_new(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, _ = run(["templates"], capsys)
+    code, out, _ = run(["new"], capsys)
     assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == template_names()
+    names = [line.split()[0] for line in out.splitlines()]
+    assert names == [*template_names(), "coupon", "testgrid", "kit"]
+    assert run(["new", "1dof-5mm", "--json"], capsys)[0] == 2
+    assert list(tmp_path.iterdir()) == []
     code, out, _ = run(["schema"], capsys)
     assert code == 0
     records = json.loads(out)["$defs"]

@@ -49,14 +49,14 @@ def test_help_loads_neither_geometry_nor_pydantic(arguments: list[str]) -> None:
 
 
 def test_a_command_loads_no_other_command() -> None:
-    loaded = modules_after("templates")
-    others = {f"sbafab.cli.{name}" for name in SUMMARIES if name != "templates"}
-    assert "sbafab.cli.templates" in loaded
+    loaded = modules_after("new")
+    others = {f"sbafab.cli.{name}" for name in SUMMARIES if name != "new"}
+    assert "sbafab.cli.new" in loaded
     assert not loaded & others
 
 
 def test_listing_the_templates_loads_no_heavy_library() -> None:
-    assert not modules_after("templates") & (HEAVY - {"rich"})
+    assert not modules_after("new") & (HEAVY - {"rich"})
 
 
 def test_geometry_laminate_and_rules_run_on_numpy_alone() -> None:

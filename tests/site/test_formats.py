@@ -51,7 +51,7 @@ def test_what_is_printed_is_of_its_schema(
         "mass",
         "--tries",
         "4",
-        "-o",
+        "--to",
         str(tmp_path / "found.toml"),
     ]
     hold("find", json.loads(run(["find", "1dof-5mm", *asked, "--json"], capsys)))
@@ -65,7 +65,7 @@ def test_what_is_printed_of_rules_and_templates_is_of_its_schema(
     for name in ("bond-width", "chamber.diameter", "chamber", "force"):
         hold("explain", json.loads(run(["explain", name, "--json"], capsys)))
     hold("explained", json.loads(run(["explain", "--json"], capsys)))
-    jsonschema.validate(json.loads(run(["templates", "--json"], capsys)), schema_of("templates"))
+    jsonschema.validate(json.loads(run(["new", "--json"], capsys)), schema_of("templates"))
 
 
 def test_what_is_printed_of_a_measured_coupon_is_of_its_schema(
