@@ -64,7 +64,7 @@ def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) ->
         if calibration.points
         else "one test alone, so that none could be left out"
     )
-    print_verdict(f"\n{name} calibrated: {judged}. Written to {path}")
+    print_verdict(f"\n{name} calibrated: {judged}. Written to {path}", path)
 
 
 def _check_name(name: str) -> None:

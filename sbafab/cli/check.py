@@ -27,6 +27,7 @@ from sbafab.cli.printing import (
     groups_of,
     notes_of,
     print_failed,
+    print_failure,
     print_findings,
     print_json,
     print_line,
@@ -164,10 +165,9 @@ def _print(outcome: CheckOutcome, advice: Advice | None, verbose: bool) -> None:
         print_wrapped(advice.sentence)
     failed = {finding.rule for finding in outcome.findings if finding.verdict == "fail"}
     if advice and failed == {YIELD_RULE} and not outcome.has_target:
-        print_wrapped(
+        print_failure(
             f"{outcome.name} failed: yield below the requested {advice.target:g}. Without "
-            "--target-yield all rules pass, and it may be cut",
-            "bold red",
+            "--target-yield all rules pass, and it may be cut"
         )
     elif failed:
         change = FILES if outcome.kind == "as-built" else "design"

@@ -74,7 +74,8 @@ def compare(
     figures = sum(pair.differs for pair in comparison.figures)
     print_verdict(
         f"{comparison.names[0]} and {comparison.names[1]} differ in {_counted(keys, 'key')}, "
-        f"{_counted(rules, 'rule')} and {_counted(figures, 'figure')}. Written to {folder}: {PAGE}"
+        f"{_counted(rules, 'rule')} and {_counted(figures, 'figure')}. Written to {folder}: {PAGE}",
+        folder,
     )
 
 

@@ -32,7 +32,7 @@ class DesignKey(NamedTuple):
 @click.argument("name", required=False, shell_complete=explainable)
 @json_option
 def explain(name: str | None, as_json: bool) -> None:
-    """Explain a rule, a key of design files, or a quantity that find and predict know.
+    """Explain a rule, a key of design files, or a quantity of find and predict.
 
     Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
     """

@@ -18,7 +18,14 @@ from sbafab.cli.options import (
     json_option,
     set_option,
 )
-from sbafab.cli.printing import print_json, print_line, print_verdict, print_wrapped
+from sbafab.cli.printing import (
+    print_failure,
+    print_json,
+    print_line,
+    print_note,
+    print_verdict,
+    print_wrapped,
+)
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
@@ -149,7 +156,7 @@ def find(source: str | None, **options: Any) -> None:
     target = design_file(options["to"], options["out"], FOUND)
     refuse_existing(target)
     if any(_counts_tabs(request) for request in requests.values()):
-        click.echo(f"note: {TABS_HINT}", err=True)
+        print_note(TABS_HINT)
     try:
         with shown_progress(options["as_json"]) as progress:
             origin, result = _best_result(requests, progress)
@@ -315,7 +322,9 @@ def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     _print_front(result)
     _print_more_tries(result)
     count = _counted_requirements(result)
-    print_verdict(f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}")
+    print_verdict(
+        f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}", target
+    )
 
 
 def _counted_requirements(result: FoundDesign) -> str:
@@ -383,10 +392,9 @@ def _print_ends(result: FoundDesign) -> None:
 def _print_miss(result: FoundDesign) -> None:
     """Print the verdict of a search without success."""
     _print_more_tries(result)
-    print_line(
+    print_failure(
         f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
-        "written. Relax a requirement, or vary more keys with --free KEY=LOW:HIGH:STEP",
-        "bold red",
+        "written. Relax a requirement, or vary more keys with --free KEY=LOW:HIGH:STEP"
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from sbafab.cli.options import design_file, file_option, folder_option, json_option
-from sbafab.cli.printing import print_json
+from sbafab.cli.printing import print_json, print_note, print_verdict
 from sbafab.importing.sources import import_source
 from sbafab.importing.write import default_file, write_imported
 
@@ -41,9 +41,10 @@ def import_(source: Path, out: Path, to: Path | None, as_json: bool) -> None:
         )
         return
     for remark in imported.remarks:
-        click.echo(f"note: {remark}", err=True)
+        print_note(remark)
     path = shlex.quote(str(written.file))
-    click.echo(
+    print_verdict(
         f"{written.file} written: {len(laminate.layers)} layers in {len(laminate.patterns)} "
-        f"patterns, from {name}. Next: sbafab generate {path}"
+        f"patterns, from {name}. Next: sbafab generate {path}",
+        written.file,
     )

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING
 import click
 
 from sbafab.cli.options import LENGTH, finite, folder_option, json_option
-from sbafab.cli.printing import print_facts, print_json, print_verdict
+from sbafab.cli.printing import (
+    print_facts,
+    print_failure,
+    print_json,
+    print_verdict,
+    print_written,
+)
 from sbafab.errors import DesignError
 
 if TYPE_CHECKING:
@@ -152,4 +158,6 @@ def print_inspection(inspection: Inspection, paths: list[Path]) -> None:
         click.echo(f"and {rest} more")
     click.echo(f"files: {', '.join(map(str, paths))}")
     sound = len(inspection.pieces) - len(inspection.amiss)
-    print_verdict(f"{sheet.name}: {sound} of {len(inspection.pieces)} pieces as drawn")
+    verdict = f"{sheet.name}: {sound} of {len(inspection.pieces)} pieces as drawn"
+    (print_failure if inspection.failed else print_verdict)(verdict)
+    print_written(paths[0].parent)

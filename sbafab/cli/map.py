@@ -11,6 +11,7 @@ from sbafab.actuators import load_design
 from sbafab.cli import options
 from sbafab.cli.options import PRESSURE, calibration_options, refuse_options, set_option
 from sbafab.cli.printing import print_verdict
+from sbafab.cli.progress import print_result
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.formulas import force
 from sbafab.models.intervals import factors_of
@@ -87,13 +88,13 @@ def map_(
     else:
         text = map_text(design.name, actuator, form, points)
     if to is None:
-        click.echo(text, nl=False)
+        print_result(text.removesuffix("\n"))
         return
     try:
         to.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{to} cannot be written: {error.strerror}") from None
-    print_verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}")
+    print_verdict(f"{design.name} mapped up to {pressure:g} kPa. Written to {to}", to)
 
 
 def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:

@@ -61,7 +61,7 @@ def print_job(job: Run) -> None:
         consequence = f"Nothing was written; {job.folder} is unchanged"
         print_failed(job.folder.name, findings, consequence, "designs")
     else:
-        print_passed(job.folder.name, groups_of(job.checked))
+        print_passed(job.folder.name, groups_of(job.checked), written=job.folder)
 
 
 def job_json(job: Run) -> dict[str, object]:

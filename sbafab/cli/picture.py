@@ -141,7 +141,7 @@ def picture(  # noqa: PLR0913, PLR0917 - one an option
 
 def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
     write_flat_picture(build(design), path, wish.width, wish.height)
-    print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}")
+    print_verdict(f"{design.name} drawn flat, since {WHY}. Written to {path}", path)
 
 
 def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
@@ -167,7 +167,8 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
     volumes = ", ".join(f"{volume:.0f}" for volume in pose.volumes)
     print_verdict(
         f"{design.name} drawn: {pressures} kPa, {volumes} ul, tip {pose.height:.2f} mm high, "
-        f"bent {pose.bend:.1f} degrees. Written to {path}"
+        f"bent {pose.bend:.1f} degrees. Written to {path}",
+        path,
     )
 
 

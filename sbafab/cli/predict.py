@@ -23,6 +23,7 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import (
     console,
+    print_failure,
     print_json,
     print_line,
     print_listed,
@@ -163,7 +164,8 @@ def predict(
             details = "" if verbose else " Details: -v"
             print_verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
-                f"validity. {_place(run)}{details}"
+                f"validity. {_place(run)}{details}",
+                None if run.occupied else run.folder,
             )
     if run.failed:
         print_error(
@@ -351,6 +353,6 @@ def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
         print_line(sentence)
     pressure = f"at {prediction.pressure_kpa:g} kPa"
     if prediction.touches:
-        print_line(f"{prediction.name} failed: inflated parts collide {pressure}", "bold red")
+        print_failure(f"{prediction.name} failed: inflated parts collide {pressure}")
     else:
         print_verdict(f"{prediction.name} predicted {pressure}: {len(prediction.figures)} figures")

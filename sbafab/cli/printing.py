@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from sbafab.cli.exit import print_error
+from sbafab.cli.progress import QUIET, is_requested, print_result
 from sbafab.rules.finding import Finding, Verdict, counted, decisive
 
 if TYPE_CHECKING:
@@ -90,7 +93,7 @@ COLOURS = {"pass": "green", "fail": "bold red", "waived": "yellow", "warn": "yel
 
 def print_json(value: object) -> None:
     """Print a value as indented JSON."""
-    click.echo(json.dumps(value, indent=1, ensure_ascii=False))
+    print_result(json.dumps(value, indent=1, ensure_ascii=False))
 
 
 def print_listed(label: str, phrases: Sequence[str]) -> None:
@@ -192,16 +195,39 @@ def _open_sentences(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]
             yield f"{finding.rule}: {finding.remedy or finding.message}", finding.verdict
 
 
-def print_verdict(sentence: str) -> None:
-    """Print the last line of a command that is done."""
+def print_verdict(sentence: str, written: Path | None = None) -> None:
+    """Print the last line of a command that is done; with -q what was ``written`` alone."""
     print_line(sentence, "bold")
+    print_written(written)
 
 
-def print_passed(name: str, groups: Sequence[Group], details: str = "") -> None:
+def print_written(path: Path | None) -> None:
+    """With -q: print the folder or file that a command wrote, if any."""
+    if is_requested(QUIET) and path is not None:
+        print_result(path)
+
+
+def print_failure(sentence: str) -> None:
+    """Print the last line of a command that failed; with -q on standard error."""
+    if is_requested(QUIET):
+        print_error(sentence.replace(NO_BREAK, " "))
+    else:
+        print_wrapped(sentence, "bold red")
+
+
+def print_note(text: str) -> None:
+    """Print a note on standard error, unless -q is given."""
+    if not is_requested(QUIET):
+        click.echo(f"note: {text}", err=True)
+
+
+def print_passed(
+    name: str, groups: Sequence[Group], details: str = "", written: Path | None = None
+) -> None:
     """Print the verdict of a design or assembly that passed; ``details``: the command for more."""
     more = f" Details: {details}" if details else ""
     counts = counted(*(group.findings for group in groups))
-    print_verdict(f"{name} passed: {counts}.{more}")
+    print_verdict(f"{name} passed: {counts}.{more}", written)
 
 
 def print_failed(name: str, findings: Iterable[Finding], consequence: str, change: str) -> None:
@@ -213,10 +239,9 @@ def print_failed(name: str, findings: Iterable[Finding], consequence: str, chang
     explain = f"sbafab explain {failed[0]}".replace(" ", NO_BREAK)
     waive = " ".join(f"--waive{NO_BREAK}{rule}" for rule in failed)
     other = f"waive by name: {waive}" if change != FILES else "regenerate the folder"
-    print_wrapped(
+    print_failure(
         f"{name} failed: {', '.join(failed)}. {consequence}. Change the {change} ({explain}), "
-        f"or {other}",
-        "bold red",
+        f"or {other}"
     )
 
 

@@ -5,12 +5,14 @@ A line names the stage, the time elapsed and, once there is a rate, the rate and
 
 from __future__ import annotations
 
+import io
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any
 
 import click
@@ -18,6 +20,8 @@ import click
 from sbafab.process import Progress, ignore_progress
 
 QUIET, VERBOSE = "sbafab.quiet", "sbafab.verbose"
+RESULTS = "sbafab.results"
+"""Where results go while -q discards the rest."""
 FIRST_LINE_SECONDS = 5.0
 """Before the first plain line, so that quick commands leave no lines in a log."""
 LINE_SECONDS = 10.0
@@ -30,28 +34,48 @@ RATE_AFTER_SECONDS = 1.0
 
 
 def add_verbosity(command: click.Command) -> None:
-    """Add the options -q and -v to a command, unless it has options of that name."""
+    """Add the option -v to a command, unless it has one of that name, and -q to one that writes
+    files or checks them.
+    """
     taken = {name for option in command.params for name in option.opts}
-    for short, long, key, words in (
-        ("-q", "--quiet", QUIET, "Print results and errors only, no progress."),
-        ("-v", "--verbose", VERBOSE, "Print the progress of every stage as lines."),
-    ):
-        if short not in taken:
-            option = click.Option(
-                [short, long],
-                is_flag=True,
-                expose_value=False,
-                callback=_set_verbosity(key),
-                help=words,
-            )
-            command.params.append(option)
+    if "-v" not in taken:
+        _add_flag(command, "-v", VERBOSE, "Print the progress of every stage as lines.")
+    if taken & {"-o", "--to"} or command.name == "check":
+        _add_flag(command, "-q", QUIET, "Print errors only, and the folder or file written.")
+        command.callback = _quietly(command.callback)
 
 
-def _set_verbosity(key: str) -> Callable[[click.Context, click.Parameter, bool], None]:
+def _add_flag(command: click.Command, short: str, key: str, words: str) -> None:
+    """Add a flag that ``is_requested`` knows."""
+
     def set_key(ctx: click.Context, _: click.Parameter, value: bool) -> None:
         ctx.meta[key] = ctx.meta.get(key, False) or value
 
-    return set_key
+    names = [short, f"--{key.rpartition('.')[2]}"]
+    command.params.append(
+        click.Option(names, is_flag=True, expose_value=False, callback=set_key, help=words)
+    )
+
+
+def _quietly(callback: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Return a callback that with -q prints nothing but by ``print_result``."""
+    assert callback is not None
+
+    @wraps(callback)
+    def call(*args: Any, **parameters: Any) -> Any:
+        if not is_requested(QUIET):
+            return callback(*args, **parameters)
+        click.get_current_context().meta[RESULTS] = sys.stdout
+        with redirect_stdout(io.StringIO()):
+            return callback(*args, **parameters)
+
+    return call
+
+
+def print_result(value: object) -> None:
+    """Print a line on standard output, with -q too."""
+    context = click.get_current_context(silent=True)
+    click.echo(value, file=context.meta.get(RESULTS) if context else None)
 
 
 def is_requested(key: str) -> bool:

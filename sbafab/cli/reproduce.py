@@ -67,7 +67,8 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
     print_verdict(
         f"\nPaper reproduced: {predicted} of {len(rows)} values predicted; "
         f"{calibrated.summary}. Written to "
-        f"{out / FOLDER}: reproduction.md, reproduction.json, charts"
+        f"{out / FOLDER}: reproduction.md, reproduction.json, charts",
+        out / FOLDER,
     )
 
 

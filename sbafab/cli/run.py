@@ -19,6 +19,7 @@ from sbafab.cli.printing import (
     print_line,
     print_open,
     print_passed,
+    print_written,
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.cutting.properties import TRUE_ARCS, Curves
@@ -126,8 +127,9 @@ def print_run_verdict(run: Run, change: str) -> None:
         if run.kept:
             print_line(f"{run.folder} {UNCHANGED}")
         print_failed(run.folder.name, run.findings, "No cut files were written", change)
+        print_written(None if run.kept else run.folder)
     else:
-        print_passed(run.folder.name, groups, f"sbafab check {run.folder}")
+        print_passed(run.folder.name, groups, f"sbafab check {run.folder}", run.folder)
 
 
 def stock_rows(run: Run) -> Iterator[tuple[str, str]]:

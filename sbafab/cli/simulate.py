@@ -132,4 +132,4 @@ def _print(name: str, result: Result, folder: Path, is_export: bool) -> None:
     for label, value, unit in result.rows:
         click.echo(f"{label:{width}} {value:10.3f} {unit}")
     outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
-    print_verdict(f"{name} {'exported' if is_export else outcome}. Written to {folder}")
+    print_verdict(f"{name} {'exported' if is_export else outcome}. Written to {folder}", folder)

@@ -139,5 +139,6 @@ def _print(request: SweepRequest, designs: SweptDesigns) -> None:
     count = "1 design" if designs.designs == 1 else f"{designs.designs} designs"
     print_verdict(
         f"{request.design.name} swept: {count}, {outcomes}{earlier}. Written to {designs.folder}: "
-        f"{', '.join(designs.files)}"
+        f"{', '.join(designs.files)}",
+        designs.folder,
     )
