@@ -592,7 +592,11 @@ def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
             yield from edges
 
 
-# Strips: what a tool of some width covers on its way along a path.
+# Strips: what a tool of some width covers on its way along a path, or a region on its own.
+
+
+SHORT_TURN = 1.5
+"""Radians, under a quarter turn: between points of two arcs the angle differs by less than pi."""
 
 
 def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
@@ -608,6 +612,122 @@ def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
         joints += [path[0].start, path[-1].end]
     discs = [Region((circle(p, half),)) for p in dict.fromkeys(joints)]
     return union([*(_band(edge, half) for edge in path), *discs])
+
+
+def dragged(region: Region, way: Edge) -> Region:
+    """Return all sums of a point of a region and one of an edge: what it covers on its way along.
+
+    It is what the region covers at both ends, and what its edges cover on the way, exactly.
+    """
+    bands = [
+        band
+        for part in _short(way)
+        for edge in region.edges
+        for piece in _short(edge)
+        for band in _sums(piece, part)
+    ]
+    return union([region.moved(*way.start), region.moved(*way.end), *bands])
+
+
+def _short(edge: Edge) -> list[Edge]:
+    """An edge, an arc in parts that turn by less than a quarter."""
+    count = math.ceil(abs(edge.sweep) / SHORT_TURN) if isinstance(edge, Arc) else 1
+    return [edge.part(edge.at(k / count), edge.at((k + 1) / count)) for k in range(count)]
+
+
+def _sums(a: Edge, b: Edge) -> Iterator[Region]:
+    """Yield what the sums of a point of one short edge and one of another cover."""
+    if isinstance(a, Arc) and isinstance(b, Arc):
+        loops = _sums_of_arcs(a, b)
+    else:
+        loops = _slid(a, b) if isinstance(b, Line) else _slid(b, a)
+    for loop in loops:
+        contour = Contour(tuple(loop))
+        if contour.edges and abs(contour.area) > EPSILON**2:
+            yield Region((contour if contour.area > 0 else contour.reversed(),))
+
+
+def _slid(edge: Edge, way: Edge) -> Iterator[Sequence[Edge]]:
+    """Yield outlines of what an edge covers on a straight way, parted where it turns along it."""
+    shares = [0.0, 1.0]
+    if isinstance(edge, Arc):
+        (u, v), (x, y), r = way.direction(way.start), edge.centre, edge.radius
+        turns = map(edge.parameter, [(x - v * r, y + u * r), (x + v * r, y - u * r)])
+        shares += [t for t in turns if 0 < t < 1]
+    for t0, t1 in pairwise(sorted(shares)):
+        part = edge.part(edge.at(t0), edge.at(t1))
+        near, far = _shifted(part, way.start), _shifted(part, way.end)
+        yield near, Line(near.end, far.end), far.reversed(), Line(far.start, near.start)
+
+
+def _shifted(edge: Edge, by: Point) -> Edge:
+    start, end = ((p[0] + by[0], p[1] + by[1]) for p in (edge.start, edge.end))
+    if isinstance(edge, Line):
+        return Line(start, end)
+    x, y = edge.centre
+    return Arc(start, end, (x + by[0], y + by[1]), edge.radius, edge.ccw)
+
+
+def _sums_of_arcs(a: Arc, b: Arc) -> Iterator[Sequence[Edge]]:
+    """Yield outlines of what the sums of a point of one arc and one of another cover.
+
+    By the angles of the two points these are a rectangle. It folds over where the arcs are
+    parallel: where the angles differ by a multiple of pi. On one side of that no sums are equal.
+    """
+    first, low = a.start_angle, b.start_angle
+    last, high = first + a.sweep, low + b.sweep
+    cell = [(first, low), (last, low), (last, high), (first, high)]
+    differ = [s - t for s, t in cell]
+    fold = math.pi * math.ceil(min(differ) / math.pi)
+    if not min(differ) < fold < max(differ):
+        yield _outline(cell, a, b)
+        return
+    for side in (1, -1):
+        half: list[Point] = []
+        for (s, t), (s1, t1) in pairwise([*cell, cell[0]]):
+            off, off1 = side * (s - t - fold), side * (s1 - t1 - fold)
+            if off >= 0:
+                half.append((s, t))
+            if off * off1 < 0:
+                # One of the two angles is that of the side of the rectangle.
+                half.append((s, s - fold) if s == s1 else (t + fold, t))
+        yield _outline(half, a, b)
+
+
+def _outline(cell: Sequence[Point], a: Arc, b: Arc) -> list[Edge]:
+    """The sums along the edges of a cell of angles: arcs of either, or of both where it folds."""
+    centre = a.centre[0] + b.centre[0], a.centre[1] + b.centre[1]
+
+    def on(middle: Point, radius: float, angle: float) -> Point:
+        return middle[0] + radius * math.cos(angle), middle[1] + radius * math.sin(angle)
+
+    points = [on(on(centre, a.radius, s), b.radius, t) for s, t in cell]
+    edges: list[Edge] = []
+    for n, ((s, t), (s1, t1)) in enumerate(pairwise([*cell, cell[0]])):
+        start, end = points[n], points[(n + 1) % len(points)]
+        middle, radius = centre, a.radius + b.radius * math.cos(s - t)
+        if s == s1:
+            middle, radius = on(centre, a.radius, s), b.radius
+        elif t == t1:
+            middle, radius = on(centre, b.radius, t), a.radius
+        if math.dist(start, end) > EPSILON:
+            edges.append(Arc(start, end, middle, abs(radius), (s1, t1) > (s, t)))
+    return edges
+
+
+def shortened(path: Sequence[Edge], length: float) -> tuple[Edge, ...]:
+    """Return a chain of edges without a ``length``, mm, at each end; a closed one as it is."""
+    if math.dist(path[0].start, path[-1].end) < EPSILON:
+        return tuple(path)
+    edges = list(path)
+    for _ in range(2):
+        rest = length
+        while edges and edges[0].length <= rest:
+            rest -= edges.pop(0).length
+        if edges:
+            edges[0] = edges[0].part(edges[0].at(rest / edges[0].length), edges[0].end)
+        edges = [edge.reversed() for edge in reversed(edges)]
+    return tuple(edges)
 
 
 def _band(edge: Edge, half: float) -> Region:

@@ -140,7 +140,7 @@ KEYS = (
     _Key("hand_turn", WORST, lambda lim: lim.tolerances.turn, "default"),
     _Key(
         "seam_error",
-        (*WORST, "sealing", "nets"),
+        WORST,
         lambda lim: lim.tolerances.of_seam("hot-tip"),
         "default",
     ),

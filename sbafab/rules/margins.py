@@ -32,6 +32,7 @@ from sbafab.laminate.laminate import Interface, Laminate, Pin
 from sbafab.rules.boundary import END_ROOM, STEEP, Facing, Reach
 from sbafab.rules.freedoms import Freedom, Freedoms, Part, seam_part
 from sbafab.rules.limits import TOLERANCE, Limits, holds
+from sbafab.rules.seam_overlaps import Overlap
 
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
@@ -46,10 +47,15 @@ ROOM: Final = 1e-6
 """mm: far more than the rounding of what is compared."""
 
 
+UNCUT: Final = -1
+
+
 class Owner(NamedTuple):
     """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
 
-    Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles.
+    Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles. The
+    contour is UNCUT where it is no cut edge that ends a margin, but a seam, or a film that it ends
+    on: an overlap.
     """
 
     seat: int
@@ -59,6 +65,10 @@ class Owner(NamedTuple):
     @property
     def is_film(self) -> bool:
         return self.seat < 2
+
+    @property
+    def is_cut(self) -> bool:
+        return self.contour != UNCUT
 
 
 class Margin(NamedTuple):
@@ -76,6 +86,11 @@ class Margin(NamedTuple):
     @property
     def middle(self) -> Point:
         return (self.start[0] + self.end[0]) / 2, (self.start[1] + self.end[1]) / 2
+
+    @property
+    def is_overlap(self) -> bool:
+        """True if it is how far a seam runs into another one, or past a film's edge."""
+        return not self.owners[0].is_cut
 
 
 class Push(NamedTuple):
@@ -266,10 +281,12 @@ def narrow_places(
     pins: tuple[Pin, ...],
     limits: Limits,
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
+    overlaps: Sequence[Sequence[Overlap]],
 ) -> list[dict[Quantity, Places]]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
-    ``reaches`` are the masks' reaches past film edges, for each group of interfaces.
+    ``reaches`` are the masks' reaches past film edges, for each group of interfaces, ``overlaps``
+    those of its seams.
     """
     slacks = [group.slack(limits) for group in groups]
     # Of one bond all interfaces ask for the same places.
@@ -287,7 +304,13 @@ def narrow_places(
         if group.bond is not None:
             bond = interface.whole_bond
             queries.append(
-                (number, "bond", BondQuery(bond, group.bond, slack, widest[bond], profiles))
+                (
+                    number,
+                    "bond",
+                    BondQuery(
+                        bond, group.bond, slack, widest[bond], profiles, 2 + len(interface.masks)
+                    ),
+                )
             )
         free = tuple(
             (edge, reach)
@@ -304,7 +327,31 @@ def narrow_places(
     results = places_of([query for *_, query in queries])
     for (number, quantity, _), places in zip(queries, results, strict=True):
         by_group[number][quantity] = places
+    for number, of_seams in enumerate(overlaps):
+        if of_seams:
+            places = _of_overlaps(groups[number].interfaces[0], of_seams)
+            bonds = by_group[number].pop("bond", None)
+            joined: dict[Quantity, Places] = {"bond": bonds.joined(places) if bonds else places}
+            by_group[number] = joined | by_group[number]
     return by_group
+
+
+def _of_overlaps(interface: Interface, overlaps: Sequence[Overlap]) -> Places:
+    """Overlaps of seams as places of bonds: as wide as they are deep, and moved as a whole."""
+    first, films = 2 + len(interface.masks), (interface.below.profile, interface.above.profile)
+    owners = []
+    for overlap in overlaps:
+        other = Owner(first + (overlap.other or 0), UNCUT, 0)
+        if overlap.film is not None:
+            pieces = films[overlap.film].pieces
+            near = min(range(len(pieces)), key=lambda n: pieces[n].distance_to_edge(overlap.at))
+            other = Owner(overlap.film, UNCUT, near)
+        owners.append((Owner(first + overlap.seam, UNCUT, 0), other))
+    depth = np.array([overlap.depth for overlap in overlaps])
+    way = columns_of([overlap.way for overlap in overlaps], 2)
+    middle = columns_of([overlap.at for overlap in overlaps], 2)
+    start, end = (middle + side * depth * way for side in (-0.5, 0.5))
+    return Places(depth, start, end, way, np.arange(len(owners)), owners)
 
 
 def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
@@ -354,12 +401,23 @@ class Places(NamedTuple):
             self.owners,
         )
 
+    def joined(self, more: Places) -> Places:
+        """These places, then others."""
+        return Places(
+            np.concatenate([self.nominal, more.nominal]),
+            np.concatenate([self.start, more.start], axis=1),
+            np.concatenate([self.end, more.end], axis=1),
+            np.concatenate([self.normal, more.normal], axis=1),
+            np.concatenate([self.between, more.between + len(self.owners)]),
+            [*self.owners, *more.owners],
+        )
+
 
 class BondQuery(NamedTuple):
     """Query of a bond's places at most ``slack`` mm wider than its narrowest.
 
     ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
-    the layers, by seat.
+    ``layers`` films and masks, by seat, and of seams.
     """
 
     bond: Region
@@ -367,6 +425,7 @@ class BondQuery(NamedTuple):
     slack: float
     widest: float
     profiles: tuple[Region, ...]
+    layers: int
 
 
 class OverhangQuery(NamedTuple):
@@ -402,11 +461,28 @@ def places_of(queries: Sequence[PlacesQuery]) -> Sequence[Places]:
     ]
     located = _owned(segments, [query.profiles for query in queries])
     return [
-        places
-        if isinstance(query, BondQuery) or not len(places.nominal)
+        _without_necks(places, query.layers)
+        if isinstance(query, BondQuery)
         else _nearest(places, query.slack)
+        if len(places.nominal)
+        else places
         for query, places in zip(queries, located, strict=True)
     ]
+
+
+def _without_necks(places: Places, layers: int) -> Places:
+    """Places without those at which two seams cross at both ends, and that either may narrow.
+
+    How far the seams may be moved there is measured by their overlap.
+    """
+    seams = [tuple(o.seat for o in both if o.seat >= layers) for both in places.owners]
+    if not any(len(set(both)) == 2 for both in seams):
+        return places
+    ends = [(*p, *q) for p, q in zip(places.start.T.tolist(), places.end.T.tolist(), strict=True)]
+    rows = [(end, seams[n]) for end, n in zip(ends, places.between.tolist(), strict=True)]
+    there = {(end, both) for end, both in rows if len(set(both)) == 2}
+    numbers = [n for n, (end, both) in enumerate(rows) if (end, both[::-1]) not in there]
+    return places.at(np.array(numbers, dtype=np.intp))
 
 
 def _nearest(places: Places, slack: float) -> Places:
@@ -700,7 +776,8 @@ class LinearForms(NamedTuple):
     ``normal`` (2 rows) have a column each; ``between`` is the number of the owners of both edges
     among ``owners`` and ``moves``. ``levers`` has a line for each of these moves: mm per radian of
     what turns, as it counts, else 0. ``loss`` is the most that all of them take from each margin,
-    mm; ``pinned_loss`` that of all but what the hand does.
+    mm; ``pinned_loss`` that of all but what the hand does. ``cut_edges`` is how many of its two
+    edges are cut ones: both, or none of an overlap.
     """
 
     runs: Sequence[MarginRun]
@@ -714,6 +791,7 @@ class LinearForms(NamedTuple):
     levers: Floats
     loss: Floats
     pinned_loss: Floats
+    cut_edges: Floats
 
     def by_quantity(self, values: Mapping[Quantity, float]) -> Floats:
         """A value for each margin."""
@@ -768,6 +846,7 @@ def linear_forms(groups: Sequence[InterfaceMargins], moves: Freedoms) -> LinearF
         levers,
         (shift + turn * np.abs(levers)).sum(axis=0),
         pinned.sum(axis=0),
+        np.array([owner.is_cut + other.is_cut for owner, other in owners], dtype=float)[pair],
     )
 
 

@@ -24,6 +24,7 @@ from sbafab.rules.margins import (
     linear_forms,
     narrow_places,
 )
+from sbafab.rules.seam_overlaps import overlaps_of
 
 
 class Measures:
@@ -85,7 +86,10 @@ class Measures:
             for interfaces in group_interfaces(self.laminate, self.facing, self.moves)
         ]
         reaches = [self.reaches(group.interfaces[0]) for group in groups]
-        places_of_groups = narrow_places(groups, self.laminate.pins, limits, reaches)
+        overlaps = overlaps_of(
+            self.laminate, [group.interfaces[0] for group in groups], limits.tolerances.of_seam
+        )
+        places_of_groups = narrow_places(groups, self.laminate.pins, limits, reaches, overlaps)
         return [
             InterfaceMargins(group.interfaces, places)
             for group, places in zip(groups, places_of_groups, strict=True)

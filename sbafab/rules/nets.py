@@ -25,7 +25,6 @@ from sbafab.rules.boundary import without_slivers
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits, at
 from sbafab.rules.measures import Measures
-from sbafab.rules.moved_seams import STEADIER, moved_seams, straying
 from sbafab.rules.opening_pressure import hardest_place
 from sbafab.rules.rule import Explanation, Rule
 from sbafab.rules.void_axes import (
@@ -113,7 +112,6 @@ def check(measures: Measures) -> list[Finding]:
             "nothing else"
         )
         findings.append(Finding(NAME, "pass", 0.0, 0.0, "faults", Place(), message))
-        findings += _off_their_paths(laminate, limits)
     return [*findings, *_openings(found.narrow, laminate, limits)]
 
 
@@ -122,38 +120,16 @@ def _failed(fault: NetFault, message: str) -> Finding:
     return Finding(NAME, "fail", 0.0, 1.0, "faults", place, message)
 
 
-def _off_their_paths(laminate: Laminate, limits: Limits) -> Iterable[Finding]:
-    """Yield the first open, short or leak with seams off their paths; nothing without seams."""
-    words = straying(laminate, limits.tolerances)
-    if words is None:
-        return
-    for moved in moved_seams(laminate, limits.tolerances):
-        reading = _Reading(moved)
-        fault = next(chain(reading.opens(), reading.shorts(), reading.leaks()), None)
-        if fault is not None:
-            yield _failed(fault, f"with {words}, {fault.message.split('; ')[0]}; {STEADIER}")
-            return
-    message = f"joined as declared with {words}, too"
-    yield Finding(NAME, "pass", 0.0, 0.0, "faults", Place(), message)
-
-
 RULE = Rule(
     NAME,
     check,
     Explanation(
         "the voids join the ports of each net, and nothing else; no branch ends blind, and every "
         "channel opens under pressure",
-        "An open net never fills, two that are joined fill together, and a blind branch keeps air. "
-        "Seams are also moved off their paths by registration.seam_error.",
-        "Look at the place named: a mask that is cut or bridged, a seam that strays too far, or a "
-        "hole that is missing or one too many.",
-        (
-            "nets",
-            "ports",
-            "rules.opening_pressure_kpa",
-            "rules.dead_end",
-            "registration.seam_error",
-        ),
+        "An open net never fills, two that are joined fill together, and a blind branch keeps air.",
+        "Look at the place named: a mask that is cut or bridged, or a hole that is missing or one "
+        "too many.",
+        ("nets", "ports", "rules.opening_pressure_kpa", "rules.dead_end"),
     ),
     at_most=True,
 )

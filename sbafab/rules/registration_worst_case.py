@@ -2,7 +2,7 @@
 
 Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
 without pins by the hand's placement and turn, and seams by their tool's error of place. A seam's
-width is taken to be as exact as a cut edge.
+width is taken to be as exact as a cut edge; where seams overlap it does not count.
 """
 
 from __future__ import annotations
@@ -16,14 +16,28 @@ from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
-from sbafab.rules.margins import InterfaceMargins, Margin, Push, Quantity, pushes
+from sbafab.rules.margins import (
+    InterfaceMargins,
+    Margin,
+    Push,
+    Quantity,
+    bonding_seams,
+    pushes,
+)
 from sbafab.rules.measures import DistinctInterface, Measures, interface_name
 from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-worst-case"
 
 WHAT: dict[Quantity, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
-REMEDY: dict[Quantity, str] = {"bond": "bond.width", "overhang": "mask.overhang"}
+REMEDY: dict[Quantity, str] = {
+    "bond": "make bond.width larger, or draw the bond wider",
+    "overhang": "make mask.overhang larger, or draw the mask so",
+}
+STEADIER = (
+    "make the seam wider, or run it farther past the edge or the other seam, or state a smaller "
+    "registration.seam_error that the tool keeps"
+)
 SAME = 1e-8
 """mm: of values that differ by less, the first is the worst if they are equal when rounded."""
 
@@ -68,8 +82,9 @@ def least_remaining(
         {"bond": least_passing(limits.bond_width), "overhang": least_passing(limits.mask_overhang)}
     )
     # Both edges are cut: two contours, or one that is off on either side.
-    cut = forms.nominal - 2 * limits.tolerances.cutting
-    firm = np.where(forms.nominal >= drawn, cut - forms.pinned_loss, math.inf)
+    cut = forms.nominal - forms.cut_edges * limits.tolerances.cutting
+    is_counted = (forms.nominal >= drawn) | (forms.cut_edges == 0)
+    firm = np.where(is_counted, cut - forms.pinned_loss, math.inf)
     pinned = np.minimum.reduceat(firm, begins).tolist()
     worst = cut - forms.loss
     (near,) = (worst <= np.minimum.reduceat(worst, begins)[forms.run] + SAME).nonzero()
@@ -111,8 +126,14 @@ RULE = Rule(
     Explanation(
         "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
         "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
-        'Lay up with care, set registration.method = "ears", or make bond and overhang larger.',
-        ("rules.worst_bond_width", "rules.worst_mask_overhang", "registration.hand_placement"),
+        'Lay up with care, set registration.method = "ears", make bond and overhang larger, or run '
+        "seams farther past each other and past edges.",
+        (
+            "rules.worst_bond_width",
+            "rules.worst_mask_overhang",
+            "registration.hand_placement",
+            "registration.seam_error",
+        ),
     ),
 )
 
@@ -140,11 +161,11 @@ def _finding(
     message = _message(worst, margin, dearest, limits.tolerances)
     remedy = ""
     if verdict == "fail":
+        by_seams = any(freedom.seam for freedom, _ in dearest)
         message += (
             f"; even without what is laid by hand {_mm(least_pinned.pinned)} is left at "
-            f"{interface_name(least_pinned.interfaces[0])}, and it needs {limit:g}: make "
-            f"{'seam or ' if any(freedom.seam for freedom, _ in dearest) else ''}"
-            f"{REMEDY[quantity]} larger"
+            f"{interface_name(least_pinned.interfaces[0])}, and it needs {limit:g}: "
+            f"{STEADIER if by_seams else REMEDY[quantity]}"
         )
     elif verdict == "warn":
         short = sum(len(place.interfaces) for place in places if not holds(place.worst, limit))
@@ -165,12 +186,24 @@ def _message(
     where = f"{interface_name(worst.interfaces[0])}{worst.distinct.suffix}"
     text = (
         f"at worst {_mm(worst.worst)} is left of the {margin.nominal:.3f} mm "
-        f"{WHAT[margin.quantity]} at {where}, {at(margin.middle)}"
+        f"{_what(margin, worst.group.first)} at {where}, {at(margin.middle)}"
     )
+    if not dearest and margin.is_overlap:
+        return f"{text}; nothing can move"
     if not dearest:
         return f"{text}; cutting takes {2 * tolerances.cutting:.3f} mm and nothing can move"
     freedom, cost = dearest[0]
     return f"{text}; largest contribution: {_source(freedom)}, {cost:.3f} mm"
+
+
+def _what(margin: Margin, interface: Interface) -> str:
+    if not margin.is_overlap:
+        return WHAT[margin.quantity]
+    seams = bonding_seams(interface)
+    of, on = (owner.seat - 2 - len(interface.masks) for owner in margin.owners)
+    if on < 0:
+        return f"by which seam {seams[of].name} runs past the film's edge"
+    return f"overlap of seams {seams[of].name} and {seams[on].name}"
 
 
 def costs(acting: Iterable[Push]) -> list[Cost]:
@@ -214,15 +247,15 @@ def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> 
     """Remedy for the hand's errors."""
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:
-        return f"make {REMEDY[quantity]} larger"
+        return REMEDY[quantity]
     where = f"{_moved(loose)} in step {loose.step}"
     on_its_own = loose.lowest == loose.highest
     masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
     if laminate.registration == "channel-pin" and not masks_pocket:
         return f'align {where} with care, or set registration.method = "ears", which pins it'
     return (
-        f"align {where} with care (registration.hand_placement, registration.hand_turn), or make "
-        f"{REMEDY[quantity]} larger"
+        f"align {where} with care (registration.hand_placement, registration.hand_turn), or "
+        f"{REMEDY[quantity]}"
     )
 
 

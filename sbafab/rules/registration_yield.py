@@ -149,7 +149,8 @@ def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits)
     room = forms.nominal - forms.by_quantity(
         {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
     )
-    (short,) = np.nonzero(room - 2 * limits.tolerances.cutting - forms.loss < -TOLERANCE)
+    cut = forms.cut_edges * limits.tolerances.cutting
+    (short,) = np.nonzero(room - cut - forms.loss < -TOLERANCE)
     between = forms.between.take(short)
     # Owners in the order of their first short margin.
     owners = list(dict.fromkeys(between.tolist()))
@@ -182,6 +183,8 @@ def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits)
 
 def _sign(quantity: Quantity, owner: Owner) -> float:
     """More film widens a bond, more mask an overhang."""
+    if not owner.is_cut:
+        return 0.0
     return 1.0 if owner.is_film == (quantity == "bond") else -1.0
 
 

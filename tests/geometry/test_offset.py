@@ -8,7 +8,7 @@ from random import Random
 import pytest
 
 from sbafab.geometry.edges import Arc, Edge, Line, Point, edge_from_bulge
-from sbafab.geometry.offset import beam_path, fillet, grow, shrink, swept
+from sbafab.geometry.offset import beam_path, dragged, fillet, grow, shrink, swept
 from sbafab.geometry.region import Region, disc, polygon, rectangle, stadium, strip, union
 
 CONVEX = [
@@ -292,6 +292,25 @@ def test_a_tool_covers_what_lies_within_half_its_width_of_its_path(seed: int) ->
         p = random.uniform(-9, 9), random.uniform(-9, 9)
         away = min(math.dist(p, edge.nearest(p)) for edge in path)
         assert covered.contains(p) == (away < half) or abs(away - half) < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_a_region_covers_on_its_way_all_sums_of_points(seed: int) -> None:
+    """A region dragged along a line or an arc, against copies of it along the way."""
+    random = Random(seed)
+    hole, plate = disc((0.9, 0), 0.5), polygon([(0, 0), (5, 1), (2, 4)])
+    shapes = [disc((1, 2), 1.2) - hole, grow(plate, 0.4), stadium((0, 0), 2, 5), disc((0, 0), 1)]
+    shape = shapes[seed % 4].turned(random.uniform(0, 360)) - hole
+    start, end = ((random.uniform(-3, 3), random.uniform(-3, 3)) for _ in range(2))
+    way = edge_from_bulge(start, end, random.choice((0.0, random.uniform(-1, 1), 1.0)))
+    covered = dragged(shape, way)
+    stops = [way.at(k / 400) for k in range(401)]
+    for _ in range(150):
+        p = random.uniform(-8, 8), random.uniform(-8, 8)
+        copies = [(p[0] - x, p[1] - y) for x, y in stops]
+        if covered.contains(p) != any(map(shape.contains, copies)):
+            # Between two copies, or on the edge.
+            assert min(map(shape.distance_to_edge, copies)) < way.length / 400
 
 
 def test_a_figure_of_eight_is_covered_on_both_loops() -> None:

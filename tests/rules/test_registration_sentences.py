@@ -79,11 +79,11 @@ def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
     assert bond.message.startswith("at worst nothing is left of the 0.750 mm bond")
     assert bond.message.endswith(
         "; even without what is laid by hand 0.342 mm is left at chamber interface 1 (layers 1 "
-        "and 3), and it needs 0.5: make bond.width larger"
+        "and 3), and it needs 0.5: make bond.width larger, or draw the bond wider"
     )
     assert overhang.message.endswith(
         "; even without what is laid by hand 0.092 mm is left at chamber interface 1 (layers 1 "
-        "and 3), and it needs 0.25: make mask.overhang larger"
+        "and 3), and it needs 0.25: make mask.overhang larger, or draw the mask so"
     )
 
 
@@ -98,9 +98,9 @@ def test_what_is_short_as_drawn_says_so(good: Good) -> None:
     bond, overhang = worst_of(good(*ONE), limits)
     assert (bond.verdict, overhang.verdict) == ("warn", "warn")
     # Every ring is 0.75; at the walls' pin the mask's bore is flush, and meant to be.
-    assert bond.message.startswith("make bond.width larger: at worst 0.750 mm is left")
+    assert bond.message.startswith("make bond.width larger, or draw the bond wider: at worst 0.750 mm is left")
     assert bond.message.endswith("; that is short of 0.76 at 5 interfaces, and short as drawn")
-    assert overhang.message.startswith("make mask.overhang larger: ")
+    assert overhang.message.startswith("make mask.overhang larger, or draw the mask so: ")
     assert overhang.message.endswith("; that is short of 0.55 at 3 interfaces, and short as drawn")
 
 
@@ -158,9 +158,9 @@ def test_where_ears_are_no_help_care_is_advised(good: Good) -> None:
     assert bond.message.startswith("align layer ")
     assert bond.remedy.endswith(
         " with care (registration.hand_placement, registration.hand_turn), or make "
-        "bond.width larger"
+        "bond.width larger, or draw the bond wider"
     )
-    assert overhang.remedy.endswith("or make mask.overhang larger")
+    assert overhang.remedy.endswith("or make mask.overhang larger, or draw the mask so")
 
 
 def test_a_mask_that_turns_in_its_pocket_is_aligned_with_care(good: Good) -> None:
@@ -170,7 +170,7 @@ def test_a_mask_that_turns_in_its_pocket_is_aligned_with_care(good: Good) -> Non
     assert overhang.verdict == "warn"
     assert overhang.remedy == (
         "align layer 2 in step 1 with care (registration.hand_placement, registration.hand_turn), "
-        "or make mask.overhang larger"
+        "or make mask.overhang larger, or draw the mask so"
     )
 
 
