@@ -54,8 +54,7 @@ class Owner(NamedTuple):
     """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
 
     Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles. The
-    contour is UNCUT where it is no cut edge that ends a margin, but a seam, or a film that it ends
-    on: an overlap.
+    contour is UNCUT where no cut edge ends a margin: in an overlap of two seams.
     """
 
     seat: int
@@ -89,7 +88,7 @@ class Margin(NamedTuple):
 
     @property
     def is_overlap(self) -> bool:
-        """True if it is how far a seam runs into another one, or past a film's edge."""
+        """True if it is how far a seam runs into another one."""
         return not self.owners[0].is_cut
 
 
@@ -338,15 +337,11 @@ def narrow_places(
 
 def _of_overlaps(interface: Interface, overlaps: Sequence[Overlap]) -> Places:
     """Overlaps of seams as places of bonds: as wide as they are deep, and moved as a whole."""
-    first, films = 2 + len(interface.masks), (interface.below.profile, interface.above.profile)
-    owners = []
-    for overlap in overlaps:
-        other = Owner(first + (overlap.other or 0), UNCUT, 0)
-        if overlap.film is not None:
-            pieces = films[overlap.film].pieces
-            near = min(range(len(pieces)), key=lambda n: pieces[n].distance_to_edge(overlap.at))
-            other = Owner(overlap.film, UNCUT, near)
-        owners.append((Owner(first + overlap.seam, UNCUT, 0), other))
+    first = 2 + len(interface.masks)
+    owners = [
+        (Owner(first + overlap.seam, UNCUT, 0), Owner(first + overlap.other, UNCUT, 0))
+        for overlap in overlaps
+    ]
     depth = np.array([overlap.depth for overlap in overlaps])
     way = columns_of([overlap.way for overlap in overlaps], 2)
     middle = columns_of([overlap.at for overlap in overlaps], 2)

@@ -24,7 +24,7 @@ from sbafab.rules.margins import (
     linear_forms,
     narrow_places,
 )
-from sbafab.rules.seam_overlaps import overlaps_of
+from sbafab.rules.seam_overlaps import SeamEnds, seam_ends
 
 
 class Measures:
@@ -49,6 +49,7 @@ class Measures:
         """
         steadier = Measures(self.laminate, limits, self.pause)
         steadier.margins, steadier.laid = self.margins, self.laid
+        steadier.seam_ends = self.seam_ends
         return steadier
 
     @cached_property
@@ -78,17 +79,25 @@ class Measures:
         return lay_up(self.laminate)
 
     @cached_property
+    def _equal_interfaces(self) -> list[list[Interface]]:
+        return group_interfaces(self.laminate, self.facing, self.moves)
+
+    @cached_property
+    def seam_ends(self) -> list[SeamEnds]:
+        """What seams end on in the first of every set of equal interfaces."""
+        first = [interfaces[0] for interfaces in self._equal_interfaces]
+        return seam_ends(self.laminate, first, self.limits.tolerances.of_seam)
+
+    @cached_property
     def margins(self) -> list[InterfaceMargins]:
         """The narrow places of every interface."""
         limits = self.limits
         groups = [
             InterfaceGroup.of(interfaces, limits, self.moves, self.bond(interfaces[0]))
-            for interfaces in group_interfaces(self.laminate, self.facing, self.moves)
+            for interfaces in self._equal_interfaces
         ]
         reaches = [self.reaches(group.interfaces[0]) for group in groups]
-        overlaps = overlaps_of(
-            self.laminate, [group.interfaces[0] for group in groups], limits.tolerances.of_seam
-        )
+        overlaps = [ends.overlaps for ends in self.seam_ends]
         places_of_groups = narrow_places(groups, self.laminate.pins, limits, reaches, overlaps)
         return [
             InterfaceMargins(group.interfaces, places)

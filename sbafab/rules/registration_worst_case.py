@@ -26,6 +26,7 @@ from sbafab.rules.margins import (
 )
 from sbafab.rules.measures import DistinctInterface, Measures, interface_name
 from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.seam_overlaps import EdgeBond
 
 NAME = "registration-worst-case"
 
@@ -114,10 +115,19 @@ def check(measures: Measures) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and largest contribution."""
     laminate, limits = measures.laminate, measures.limits
     remaining = least_remaining(laminate, limits, measures)
-    return [
-        _finding("bond", limits.worst_bond_width, remaining, measures, limits),
-        _finding("overhang", limits.worst_mask_overhang, remaining, measures, limits),
+    bond = _finding("bond", limits.worst_bond_width, remaining, measures, limits)
+    overhang = _finding("overhang", limits.worst_mask_overhang, remaining, measures, limits)
+    # bond-width reports seams that are too narrow as drawn.
+    edges = [
+        edge
+        for ends in measures.seam_ends
+        for edge in ends.edges
+        if holds(edge.seam.width, limits.bond_width)
     ]
+    least = min(edges, key=lambda edge: round(edge.width, 9), default=None)
+    if least is not None and bond.verdict != "fail" and not holds(least.width, bond.limit or 0.0):
+        bond = _at_edge(least, limits)
+    return [bond, overhang]
 
 
 RULE = Rule(
@@ -200,10 +210,21 @@ def _what(margin: Margin, interface: Interface) -> str:
     if not margin.is_overlap:
         return WHAT[margin.quantity]
     seams = bonding_seams(interface)
-    of, on = (owner.seat - 2 - len(interface.masks) for owner in margin.owners)
-    if on < 0:
-        return f"by which seam {seams[of].name} runs past the film's edge"
-    return f"overlap of seams {seams[of].name} and {seams[on].name}"
+    of, on = (seams[owner.seat - 2 - len(interface.masks)].name for owner in margin.owners)
+    return f"overlap of seams {of} and {on}"
+
+
+def _at_edge(bond: EdgeBond, limits: Limits) -> Finding:
+    """The finding of a seam that may end too near to the edge of a film, or short of it."""
+    interface, seam, limit = bond.interface, bond.seam, limits.worst_bond_width
+    left = f"bonds only {_mm(bond.width)}" if bond.width > 0 else "ends short"
+    message = (
+        f"with its end {limits.tolerances.of_seam(seam.tool):g} mm off its path, seam {seam.name} "
+        f"{left} of the film's edge at {interface_name(interface)}, {at(bond.at)}, where it parts "
+        f"two voids; it needs {limit:g}: {STEADIER}"
+    )
+    place = Place(interface.index, interface.layer_indices, *bond.at)
+    return Finding(NAME, "fail", limit, bond.width, "mm", place, message)
 
 
 def costs(acting: Iterable[Push]) -> list[Cost]:

@@ -2,7 +2,8 @@
 
 Each seam lies off its path as a whole. Two of them meet in any case if one must be moved farther
 than both errors together until it leaves the other, whichever way. That is asked of two at a time,
-so that neither the number of seams nor their order matters.
+so that neither the number of seams nor their order matters. A seam that runs past the edge of a
+film bonds it along that edge, less of it the nearer its end comes.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.joints import Seam, SeamTool
 from sbafab.laminate.laminate import Interface, Laminate
+from sbafab.rules.boundary import edges_along
 from sbafab.rules.voids import OUTSIDE, Cavity, VoidGraph, cavities, void_graph
 
 NEAR: Final = 1e-5
@@ -31,38 +33,52 @@ Error = Callable[[SeamTool], float]
 
 
 class Overlap(NamedTuple):
-    """An overlap of a seam with another one, or with what lies past a film's edge.
+    """An overlap of two seams, by their places among the interface's.
 
     They meet no more once the ``seam`` has moved by ``depth``, mm, along the unit vector ``way``,
-    and by no less in any direction. ``seam`` and ``other`` are places among the interface's seams;
-    in place of the other, ``film`` is 0 for the edge of the film below, 1 for that above.
+    and by no less in any direction.
     """
 
     seam: int
-    other: int | None
-    film: int | None
+    other: int
     depth: float
     way: Point
     at: Point
 
 
-def overlaps_of(
-    laminate: Laminate, interfaces: Sequence[Interface], error: Error
-) -> list[list[Overlap]]:
-    """Return the overlaps of each interface that part two voids; none where films are pressed."""
+class EdgeBond(NamedTuple):
+    """The bond of a seam that runs past a film's edge: ``width`` along the edge at worst, mm."""
+
+    interface: Interface
+    seam: Seam
+    width: float
+    at: Point
+
+
+class SeamEnds(NamedTuple):
+    """What seams of an interface end on, where that parts two voids: each other, and edges."""
+
+    overlaps: Sequence[Overlap] = ()
+    edges: Sequence[EdgeBond] = ()
+
+
+def seam_ends(laminate: Laminate, interfaces: Sequence[Interface], error: Error) -> list[SeamEnds]:
+    """Return what seams end on in each interface; nothing where films are pressed."""
     if all(gap.pressed or not gap.seams for gap in interfaces):
-        return [[] for _ in interfaces]
+        return [SeamEnds() for _ in interfaces]
     graph = void_graph(laminate)
     every = cavities(laminate, graph)
+    rows = [_Seams(gap, _Voids.of(gap, graph, every), error) for gap in interfaces]
     return [
-        [] if gap.pressed else list(_Seams(gap, _Voids.of(gap, graph, every), error).overlaps())
-        for gap in interfaces
+        SeamEnds() if row.gap.pressed else SeamEnds(list(row.overlaps()), list(row.edge_bonds()))
+        for row in rows
     ]
 
 
 class _Voids(NamedTuple):
-    """Cavities of an interface by name, those open to the outside under one, and the outer edges
-    of its contact, but for folds.
+    """Cavities of an interface by name, and the outer edges of its contact, but for folds.
+
+    Those open to the outside have one name, unless they are at an inlet.
     """
 
     cavities: Sequence[tuple[object, Region]]
@@ -70,11 +86,13 @@ class _Voids(NamedTuple):
 
     @staticmethod
     def of(gap: Interface, graph: VoidGraph, every: Sequence[Cavity]) -> _Voids:
-        named = [
-            (OUTSIDE if any(OUTSIDE in graph.joins.get(v, ()) for v in c.voids) else n, c.region)
-            for n, c in enumerate(every)
-            if c.interface == gap.index
-        ]
+        named: list[tuple[object, Region]] = []
+        for number, cavity in enumerate(every):
+            if cavity.interface == gap.index:
+                beside = {v for void in cavity.voids for v in graph.joins.get(void, ())}
+                is_inlet = any(void.kind == "mouth" for void in beside)
+                name = OUTSIDE if OUTSIDE in beside and not is_inlet else number
+                named.append((name, cavity.region))
         outer = [edge for contour in gap.contact.outers for edge in contour.edges]
         return _Voids(named, [edge for edge in outer if not lies_on(edge, gap.fold_lines)])
 
@@ -95,10 +113,9 @@ class _Seams(NamedTuple):
     error: Error
 
     def overlaps(self) -> Iterator[Overlap]:
-        seams, bare = self.gap.seams, self.gap.contact - self.gap.mask
-        inside = Region(self.gap.contact.outers)
+        bare = self.gap.contact - self.gap.mask
         # A roller's ends are square: of two seams the other is moved along its path.
-        numbered = sorted(enumerate(seams), key=lambda pair: pair[1].tool == "roller")
+        numbered = sorted(enumerate(self.gap.seams), key=lambda pair: pair[1].tool == "roller")
         for (a, seam), (b, other) in combinations(numbered, 2):
             if not boxes_meet(seam.region.bounds, other.region.bounds):
                 continue
@@ -106,16 +123,28 @@ class _Seams(NamedTuple):
             for piece in (seam.region & other.region & bare).pieces:
                 if self._is_needed(piece, (seam, other)):
                     body = other.region & _swath(_edges_near(piece, other, reach), other.width)
-                    yield Overlap(a, b, None, *_depth(seam, body, piece, reach), _middle(piece))
-        for a, seam in enumerate(seams):
-            reach = max(2 * seam.width, self.error(seam.tool))
+                    yield Overlap(a, b, *_depth(seam, body, piece, reach), _middle(piece))
+
+    def edge_bonds(self) -> Iterator[EdgeBond]:
+        inside = Region(self.gap.contact.outers)
+        for seam in self.gap.seams:
+            error = self.error(seam.tool)
+            reach = max(2 * seam.width, error)
             for piece in (seam.region - inside).pieces:
-                if self._is_needed(piece, (seam,)):
-                    left, low, right, high = widened(piece.bounds, 2 * reach)
-                    body = rectangle((left, low), (right, high)) - inside
-                    depth, way = _depth(seam, body, piece, reach)
-                    for film in self._films_at(piece):
-                        yield Overlap(a, None, film, depth, way, _middle(piece))
+                if not self._is_needed(piece, (seam,)):
+                    continue
+                left, low, right, high = widened(piece.bounds, 2 * reach)
+                beyond = rectangle((left, low), (right, high)) - inside
+                depth, (x, y) = _depth(seam, beyond, piece, reach)
+                width = 0.0
+                if depth > error:
+                    moved = seam.region.moved(error * x, error * y) & inside
+                    width = sum(
+                        edge.length
+                        for edge in edges_along(moved, inside)
+                        if boxes_meet(edge.bounds, widened(piece.bounds, error + NEAR))
+                    )
+                yield EdgeBond(self.gap, seam, width, _middle(piece))
 
     def _is_needed(self, overlap: Region, seams: Sequence[Seam]) -> bool:
         """Return True if two voids are joined when these seams no longer meet there.
@@ -133,12 +162,6 @@ class _Seams(NamedTuple):
                 near = max(near, off + self.error(seam.tool))
                 overlap -= shrink(seam.region, off + self.error(seam.tool))
         return self.voids.are_parted_by(overlap, near)
-
-    def _films_at(self, piece: Region) -> list[int]:
-        """The films whose edge a seam crosses at a piece of it that lies past the contact."""
-        corners = [e.start for e in piece.edges if _is_on(e.start, self.gap.contact.edges)]
-        films = (self.gap.below.profile, self.gap.above.profile)
-        return [n for n, film in enumerate(films) if any(_is_on(p, film.edges) for p in corners)]
 
 
 def _depth(seam: Seam, body: Region, piece: Region, reach: float) -> tuple[float, Point]:

@@ -98,7 +98,9 @@ def test_what_is_short_as_drawn_says_so(good: Good) -> None:
     bond, overhang = worst_of(good(*ONE), limits)
     assert (bond.verdict, overhang.verdict) == ("warn", "warn")
     # Every ring is 0.75; at the walls' pin the mask's bore is flush, and meant to be.
-    assert bond.message.startswith("make bond.width larger, or draw the bond wider: at worst 0.750 mm is left")
+    assert bond.message.startswith(
+        "make bond.width larger, or draw the bond wider: at worst 0.750 mm is left"
+    )
     assert bond.message.endswith("; that is short of 0.76 at 5 interfaces, and short as drawn")
     assert overhang.message.startswith("make mask.overhang larger, or draw the mask so: ")
     assert overhang.message.endswith("; that is short of 0.55 at 3 interfaces, and short as drawn")
