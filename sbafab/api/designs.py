@@ -11,10 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar, overload
 
 from sbafab import actuators
-from sbafab.actuators.drawn import DrawnDesign
-from sbafab.actuators.lobed import LobedDesign
-from sbafab.actuators.one_dof import OneDofDesign
-from sbafab.actuators.radial import RadialDesign
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.build import assemble as put_together
 from sbafab.assemblies.files import load as load_either
@@ -36,6 +32,11 @@ from sbafab.reports.drawing import dimensions as measured
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
+
+    from sbafab.actuators.drawn import DrawnDesign
+    from sbafab.actuators.lobed import LobedDesign
+    from sbafab.actuators.one_dof import OneDofDesign
+    from sbafab.actuators.radial import RadialDesign
 
 Source = Design | str | Path
 """A design: itself, a template's name, or a TOML file."""

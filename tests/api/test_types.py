@@ -36,7 +36,7 @@ def test_every_template_of_a_family_is_named() -> None:
     """The names that ``load`` knows, with the record that it says they have."""
     named: dict[str, type] = {}
     for signature in get_overloads(load):
-        hints = get_type_hints(signature)
+        hints = get_type_hints(signature, localns=globals())
         if getattr(hints["source"], "__origin__", None) is Literal:
             named |= dict.fromkeys(get_args(hints["source"]), hints["return"])
     shipped = [
