@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -55,6 +55,8 @@ LEAST_PRESSURE = 0.01
 """Pressure in kPa from which the tolerance of the residual is taken where there is less."""
 PLATE_STIFFNESS = 20_000.0
 """Penalty of a plate: the pressure on the film presses it in by 1 / PLATE_STIFFNESS mm."""
+FEW = 4
+"""Balloons up to which their systems are solved by blocks: quicker than all rows in step."""
 WRINKLE_ROUNDS = 3
 """Iterations between the wrinkles' stress, which follows the tension, and the shape."""
 
@@ -182,6 +184,20 @@ class Shapes(NamedTuple):
     energy: Array
     r: Array
     z: Array
+
+    def rows(self, these: slice) -> Shapes:
+        return Shapes(*(part[these] for part in self))
+
+
+def distinct(states: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Return the distinct rows of states (n, values), and which of these each row is: (n,).
+
+    As np.unique does, which takes as long to load as to compute some balloons.
+    """
+    rows = list(map(tuple, states.tolist()))
+    numbers = {row: number for number, row in enumerate(dict.fromkeys(rows))}
+    unique = np.array(list(numbers)).reshape(-1, states.shape[1])
+    return unique, np.array([numbers[row] for row in rows], dtype=np.int_)
 
 
 class BalloonLoad(NamedTuple):
@@ -350,8 +366,10 @@ class BalloonEnergy:
         band = state.matrix.copy()
         band[:, 0] += damping * np.abs(band[:, 0])
         freedoms = self.balloon.freedoms
-        step = np.zeros_like(state.gradient)
-        step[freedoms] = least_energy.solve(band, -state.gradient[freedoms])
+        step, right_side = np.zeros_like(state.gradient), -state.gradient[freedoms]
+        few = len(damping) <= FEW
+        solution = least_energy.solve_positive(band, right_side) if few else None
+        step[freedoms] = least_energy.solve(band, right_side) if solution is None else solution
         step[1 : self.balloon.level : 2] = step[self.balloon.level]
         return step
 
@@ -367,7 +385,7 @@ def tolerances(balloon: Balloon, load: BalloonLoad) -> tuple[Array, Array]:
 
 def relative_change(x: Array, ahead: Array) -> Array:
     """Return the largest share of its length by which a step changes an element: (rows,)."""
-    length, by = (np.hypot(np.diff(y[0::2], axis=0), np.diff(y[1::2], axis=0)) for y in (x, ahead))
+    length, by = (np.hypot(y[2::2] - y[:-2:2], y[3::2] - y[1:-2:2]) for y in (x, ahead))
     return np.asarray((by / length).max(0))
 
 
@@ -435,8 +453,13 @@ def ripples_at(films: Sequence[Balloon], shapes: Sequence[tuple[Array, Array]]) 
 
 WAVE_NUMBERS = np.arange(2, 201)
 """Numbers of waves round the rim that are compared."""
-GAUSS_POINTS = 5
-"""Gauss points an element."""
+GAUSS_PLACES = np.array([-1.0, -1.0, 0.0, 1.0, 1.0]) * [
+    math.sqrt(5 + far * 2 * math.sqrt(10 / 7)) / 3 for far in (1, -1, 0, -1, 1)
+]
+GAUSS_WEIGHTS = np.array(
+    [(322 - far * 13 * math.sqrt(70)) / 900 if far else 128 / 225 for far in (1, -1, 0, -1, 1)]
+)
+"""Five Gauss points an element, from -1 to 1 (Abramowitz and Stegun, 25.4.30)."""
 
 
 class Ripple(NamedTuple):
@@ -470,7 +493,7 @@ def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]
 
     One film stands for two equal ones.
     """
-    pair = films if len(films) == 2 else (films[0], films[0])
+    pair = films[0], films[-1]
     pulls = tensions if len(films) == 2 else (tensions[0], tensions[0])
     roots = sum(
         np.sqrt(film.bending_stiffness * np.maximum(pull, 0.0))
@@ -499,16 +522,16 @@ def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]
     return ripples
 
 
-def _rim_modes(pair: Sequence[Balloon]) -> tuple[Array, Array, Array, Array]:
+@lru_cache(maxsize=64)
+def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array, Array]:
     """Return, by number of waves: half the cost of bending; rho of each element; each element's
     area; and the integral of E rho^2 over both films.
     """
     balloon = pair[0]
     nodes = balloon.nodes[balloon.edge :]
-    places, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     length = np.diff(nodes)
-    r = nodes[:-1, None] + length[:, None] * (places + 1) / 2
-    area = math.tau * r * length[:, None] * weights / 2
+    r = nodes[:-1, None] + length[:, None] * (GAUSS_PLACES + 1) / 2
+    area = math.tau * r * length[:, None] * GAUSS_WEIGHTS / 2
     s, n = r - balloon.pocket, WAVE_NUMBERS[:, None, None]
     around = 1 / r - n**2 * s / r**2
     twist = n * (1 / r - s / r**2)

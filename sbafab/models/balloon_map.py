@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes
-from sbafab.models.rippled import compressed_shapes, free_shapes, least_free_states
+from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.rippled import compressed_shapes, least_free_states, with_waves
 from sbafab.process import one_blas_thread
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ SCALE_STRAIN = 3e-4
 """Film strain, p R / (E t), below which the spline's pieces are equal in pressure, above equal in
 ratio.
 """
+RISES = 8
+"""Pressures at which free balloons are computed to see how high they rise."""
 RISE_POINTS = 65
 """Pressures at which free heights are tabulated, to start from."""
 COLLAPSE_SUCTION = 0.1
@@ -368,9 +370,11 @@ def horner(table: Array, which: NDArray[np.int_], y: Array) -> Array:
 @one_blas_thread
 def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     """The map of a balloon from 0 to a pressure in kPa, and somewhat higher than it may rise."""
-    top = HEADROOM * highest(balloon, most_pressure)
     scale = scale_pressure_of(balloon)
     p = scale * np.sinh(_spread(PRESSURE_POINTS) * math.asinh(most_pressure / scale))
+    rises = np.linspace(most_pressure / RISES, most_pressure, RISES)
+    smooth = inflate(balloon, np.concatenate([rises, p[1:]]))
+    top = HEADROOM * highest(balloon, smooth.rows(slice(RISES)))
     # A film that is slack comes taut at a pressure that is the lower the flatter it lies.
     even = _spread(HEIGHT_POINTS)
     least = min(LEAST_HEIGHT, LEAST_SHARE * top)
@@ -379,7 +383,7 @@ def balloon_map(balloon: Balloon, most_pressure: float) -> BalloonMap:
     shapes = compressed_shapes(balloon, pressures, heights, tied=True)
     blank = np.zeros((PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE))
     frame = BalloonMap(balloon, most_pressure, top, blank, scale)
-    stands = least_free_states(balloon, p[1:])
+    stands = least_free_states(balloon, smooth.rows(slice(RISES, None)))
     is_inside = stands.height < top
     free = _Free(p[1:][is_inside], stands.height[is_inside], stands.volume[is_inside])
     return replace(frame, coefficients=_fitted(frame, pressures, heights, shapes, free))
@@ -390,10 +394,11 @@ def scale_pressure_of(balloon: Balloon) -> float:
     return SCALE_STRAIN * balloon.membrane_stiffness / balloon.pocket
 
 
-def highest(balloon: Balloon, most_pressure: float) -> float:
-    """Height in mm to which it may rise freely: at a pressure, or where its films stretch most."""
-    pressures = np.linspace(most_pressure / 8, most_pressure, 8)
-    free = free_shapes(balloon, pressures)
+def highest(balloon: Balloon, rising: Shapes) -> float:
+    """Height in mm to which it may rise freely: at the last of pressures, or where its films
+    stretch most; ``rising`` are those by ``inflate``.
+    """
+    free = with_waves(balloon, rising)
     longer = stretch(balloon, free)
     return float(np.interp(MOST_STRETCH, longer, free.height))
 
@@ -530,7 +535,7 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> Ma
     each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
     x = np.linspace(0, PRESSURE_SPANS, PRESSURE_SPANS * PRESSURE_PARTS + 1)
     even = np.linspace(0, 1, HEIGHT_SPANS * HEIGHT_PARTS + 1)
-    y = HEIGHT_SPANS * np.unique(np.concatenate([even, LOW_PARTS]))
+    y = HEIGHT_SPANS * np.sort(np.concatenate([even, LOW_PARTS]))
     value, slope, curve = (_parts(x, order, PRESSURE_SPANS + DEGREE) for order in (0, 1, 2))
     slope, curve = each * slope, each**2 * curve
     # With p = p0 sinh s the volume is -W_s / (p0 cosh s). It rises where tanh(s) W_s - W_ss > 0.
@@ -602,22 +607,24 @@ def _admissible(matrix: Array, right_side: Array, limits: MapLimits) -> Array | 
 
     An active-set method: violated limits are added until all are met.
     """
-    stiff = 1e-9 * np.abs(matrix).max() * np.eye(matrix.shape[1])
-    upper = np.linalg.qr(np.concatenate([matrix, stiff]), mode="r")
-    back = np.linalg.inv(upper)
-    free = back.T @ (matrix.T @ right_side)
-    lengths = limits.lengths(back @ back.T)
-    best, chosen = back @ free, [np.zeros(kind.shape, bool) for kind in lengths]
+    # In units that make all columns equally long the normal equations are well-conditioned
+    # (2e6; 1e17 without), and need no orthogonal factor.
+    units = 1 / np.sqrt((matrix * matrix).sum(0))
+    columns = matrix * units
+    normal = columns.T @ columns
+    free = np.linalg.solve(normal, columns.T @ right_side)
+    lengths = limits.lengths(units[:, None] * np.linalg.inv(normal) * units)
+    best, chosen = free, [np.zeros(kind.shape, bool) for kind in lengths]
     for _ in range(ACTIVE_SET_ROUNDS):
-        values = limits.values(best)
+        values = limits.values(units * best)
         if min(kind.min() for kind in values) >= MARGIN / 2:
-            return np.asarray(best)
+            return np.asarray(units * best)
         chosen = [old | (kind < 2 * MARGIN) for old, kind in zip(chosen, values, strict=True)]
         size = np.concatenate([kind[these] for kind, these in zip(lengths, chosen, strict=True)])
-        closest = nearest_admissible(free, ChosenLimits(limits, chosen, back, size))
+        closest = nearest_admissible(free, normal, ChosenLimits(limits, chosen, units, size))
         if closest is None:
             return None
-        best = back @ closest
+        best = closest
     return None
 
 
@@ -639,15 +646,15 @@ def stretch(kind: Balloon, shape: Shapes) -> Array:
 
 
 QP_STEPS = 80
-CLOSE, SMALL = 1e-5, 1e-8
+CLOSE, SMALL = 1e-7, 1e-10
 """Residual that counts as none; violation, and slack times its multiplier, that count as none."""
 STEP_SHARE = 0.99
 """Share of the way to the next limit that a step may go."""
 
 
 class ChosenLimits(NamedTuple):
-    """Limits ``rows @ x >= least`` on x, where ``back @ x`` are a spline's coefficients: the values
-    ``chosen`` of each kind, divided by the lengths ``size`` of their gradients by x.
+    """Limits ``rows @ x >= least`` on x, where ``units * x`` are the coefficients of a spline: the
+    values ``chosen`` of each kind, divided by the lengths ``size`` of their gradients.
 
     A row is the product of one by pressure and one by height, of six coefficients each. All
     products with ``rows``, (values, coefficients), are made of these.
@@ -655,7 +662,7 @@ class ChosenLimits(NamedTuple):
 
     limits: MapLimits
     chosen: list[NDArray[np.bool_]]
-    back: Array
+    units: Array
     size: Array
 
     @property
@@ -668,7 +675,7 @@ class ChosenLimits(NamedTuple):
 
     def times(self, x: Array) -> Array:
         """Return ``rows @ x``."""
-        grid = (self.back @ x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
+        grid = (self.units * x).reshape(PRESSURE_SPANS + DEGREE, HEIGHT_SPANS + DEGREE)
         values = [
             (across @ grid @ along.T)[these]
             for (across, along, _), these in zip(self.limits.kinds, self.chosen, strict=True)
@@ -681,7 +688,7 @@ class ChosenLimits(NamedTuple):
         grids = self._on_grids(factors / self.size)
         for (across, along, _), grid in zip(self.limits.kinds, grids, strict=True):
             total += across.T @ grid @ along
-        return np.asarray(total.ravel() @ self.back)
+        return np.asarray(total.ravel() * self.units)
 
     def normal_matrix(self, weights: Array) -> Array:
         """Return ``rows.T @ diag(weights) @ rows``."""
@@ -689,8 +696,7 @@ class ChosenLimits(NamedTuple):
         grids = self._on_grids(weights / self.size**2)
         for (across, along), grid in zip(self.limits.outer_products, grids, strict=True):
             pairs[:-1, :-1] += across.T @ (grid @ along)
-        matrix = self.back.T @ pairs.ravel()[PAIR_OF] @ self.back
-        return np.asarray((matrix + matrix.T) / 2)
+        return np.asarray(self.units[:, None] * pairs.ravel()[PAIR_OF] * self.units)
 
     def _on_grids(self, values: Array) -> Iterator[Array]:
         """Yield each kind's values at their places by pressure and height, with 0 elsewhere."""
@@ -701,8 +707,9 @@ class ChosenLimits(NamedTuple):
             yield grid
 
 
-def nearest_admissible(point: Array, limits: ChosenLimits) -> Array | None:
-    """Return the x nearest to ``point`` (n,) within the limits; None where there is none.
+def nearest_admissible(point: Array, metric: Array, limits: ChosenLimits) -> Array | None:
+    """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
+    d @ ``metric`` @ d; None where there is none.
 
     Mehrotra's predictor and corrector (Nocedal and Wright, Numerical Optimization, Sec. 16.6).
     """
@@ -711,12 +718,12 @@ def nearest_admissible(point: Array, limits: ChosenLimits) -> Array | None:
     begin = max(1e-2 * float(np.abs(room).max(initial=0.0)), 1e-4)
     slack, push = np.maximum(room, begin), np.full(len(least), begin)
     for _ in range(QP_STEPS):
-        off = x - point - limits.transposed(push)
+        off = metric @ (x - point) - limits.transposed(push)
         gap = limits.times(x) - slack - least
         mean = float(slack @ push) / len(least)
         if np.abs(off).max() < CLOSE and max(np.abs(gap).max(), mean) < SMALL:
             return x
-        matrix = np.eye(len(x)) + limits.normal_matrix(push / slack)
+        matrix = metric + limits.normal_matrix(push / slack)
 
         def step(target: Array) -> tuple[Array, Array, Array]:
             right_side = limits.transposed((-target - push * gap) / slack) - off  # noqa: B023

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations, product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from sbafab.errors import BeyondError, DesignError
 from sbafab.models import paper
-from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import (
@@ -107,13 +108,19 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
     """Return the balloons at each pressure, solved at once; None if one has no equilibrium."""
     try:
-        shapes = {kind: free_shapes(kind, pressures) for kind in kinds}
+        shapes = {kind: _free_shapes(kind, tuple(pressures)) for kind in kinds}
     except DesignError:
         return None
     return [
-        {kind: Shapes(*(values[row : row + 1] for values in shapes[kind])) for kind in shapes}
+        {kind: shapes[kind].rows(slice(row, row + 1)) for kind in shapes}
         for row in range(len(pressures))
     ]
+
+
+@lru_cache(maxsize=64)
+def _free_shapes(kind: Balloon, pressures: tuple[float, ...]) -> Shapes:
+    """Return ``free_shapes``; factors that move no balloon ask for the same again."""
+    return free_shapes(kind, pressures)
 
 
 class Rise(NamedTuple):
@@ -167,6 +174,8 @@ def refuse_stretched(longer: float) -> None:
 
 SAMPLES = 21
 ANGLES = (30.0, 60.0, 90.0)
+NO_FURTHER = 1e-7
+"""Share of a pressure within which that of a bend is not looked for any more closely."""
 PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
 SOURCE = "membrane of revolution between plates, the film's modulus"
@@ -362,20 +371,31 @@ def _clearances(
 def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
     """Return the pose bent by an angle in degrees with some chambers pressurised and the others
     empty; None where no pressure gives it.
+
+    Bisection until both ends have poses, then false position by the pressure's logarithm, with the
+    end that stays halved (Illinois).
     """
     low, high = 0.01, stack.most_pressure
-    pose = None
-    for _ in range(40):
-        middle = math.sqrt(low * high)
+    below = above = math.nan
+    pose, before = None, 0.0
+    while high > low * (1 + NO_FURTHER):
+        share = below / (below - above)
+        middle = low * (high / low) ** (share if math.isfinite(share) else 0.5)
         try:
             pose = stack.pose(_pressures(stack, chambers, middle), near=pose)
         except DesignError:
-            high = middle
+            high, above, before = middle, math.nan, 0.0
             continue
-        if abs(pose.bend - angle) < 1e-3:
-            break
-        low, high = (middle, high) if pose.bend < angle else (low, middle)
-    return pose if pose is not None and abs(pose.bend - angle) < 0.01 else None
+        missing = pose.bend - angle
+        if abs(missing) < 1e-6:
+            return pose
+        stays = 0.5 if missing * before > 0 else 1.0
+        if missing < 0:
+            low, below, above = middle, missing, stays * above
+        else:
+            high, above, below = middle, missing, stays * below
+        before = missing
+    return None
 
 
 def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
@@ -583,7 +603,7 @@ def _radii(stack: Stack, poses: Sequence[Pose]) -> Array:
         rows = stack.levels == kind
         heights = np.maximum(gaps[:, rows], LEAST_GAP).round(4)
         states = np.stack([pressures[:, rows], heights], -1)
-        unique, back = np.unique(states.reshape(-1, 2), axis=0, return_inverse=True)
+        unique, back = distinct(states.reshape(-1, 2))
         shapes = inflate(balloon.balloon, unique[:, 0], unique[:, 1], tied=True)
         within = shapes.r[:, balloon.balloon.neck_edge : balloon.balloon.edge + 1].max(-1)
         radii[:, rows] = within[back].reshape(heights.shape)

@@ -10,6 +10,8 @@ coordinates of nodes.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -25,7 +27,8 @@ for a double cantilever beam, isotropic, nu = 0.2.
 """
 
 
-class FlatFilm(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class FlatFilm:
     """The flat film: radii of its nodes and thickness in mm, modulus in kPa, Poisson's ratio.
 
     ``order`` m selects the strain in which the energy is quadratic: (stretch^m - 1) / m, of the
@@ -38,13 +41,23 @@ class FlatFilm(NamedTuple):
     poisson: float
     order: int = 2
 
-    @property
+    @cached_property
     def lengths(self) -> Array:
         return np.diff(self.nodes)
 
-    @property
+    @cached_property
     def middles(self) -> Array:
-        return (self.nodes[1:] + self.nodes[:-1]) / 2
+        return np.asarray((self.nodes[1:] + self.nodes[:-1]) / 2)
+
+    @cached_property
+    def squares(self) -> tuple[Array, Array]:
+        """Squares of lengths and of middle radii, mm2."""
+        return self.lengths**2, self.middles**2
+
+    @cached_property
+    def volumes(self) -> Array:
+        """Volumes of the elements, mm3."""
+        return np.asarray(math.tau * self.middles * self.lengths * self.thickness)
 
 
 class Elements(NamedTuple):
@@ -100,7 +113,7 @@ def curvature(flat: FlatFilm, r: Array, z: Array) -> Array:
 
 def _squared_stretches(flat: FlatFilm, at: Elements) -> tuple[Array, Array]:
     """Return the squared meridional and hoop stretch of each element."""
-    return at.square / flat.lengths**2, (at.middle / flat.middles) ** 2
+    return at.square / flat.squares[0], (at.middle / flat.middles) ** 2
 
 
 def _strain_measure(flat: FlatFilm, square: Array) -> Array:
@@ -129,24 +142,24 @@ def membrane(flat: FlatFilm, at: Elements, cap: Array) -> EnergyTerm:
     support = np.where(wrinkled, cap, 0.0)
     film_hoop = np.where(wrinkled, support / -plane - nu * e1, e2)
     s1, s2 = plane * (e1 + nu * film_hoop), plane * (film_hoop + nu * e1)
-    volume = math.tau * flat.middles * flat.lengths * flat.thickness
+    volume, (length2, middle2) = flat.volumes, flat.squares
     density = (s1 * e1 + s2 * film_hoop) / 2 + support * (film_hoop - e2)
     c11 = np.where(wrinkled, flat.modulus, plane)
     c12 = np.where(wrinkled, 0.0, plane * nu)
     c22 = np.where(wrinkled, 0.0, plane)
     # Strains by the squares of stretches, and those by dr, dz and the middle radius.
-    by1, by2 = 2 * volume / flat.lengths**2, 2 * volume / flat.middles**2
+    by1, by2 = 2 * volume / length2, 2 * volume / middle2
     if flat.order == 2:
         g1, g2 = by1 / 2 * s1, by2 / 2 * s2
-        k1, k2 = by1 / flat.lengths**2 / 2 * c11, by2 / flat.middles**2 / 2 * c22
-        k12 = by1 / flat.middles**2 / 2 * c12
+        k1, k2 = by1 / length2 / 2 * c11, by2 / middle2 / 2 * c22
+        k12 = by1 / middle2 / 2 * c12
     else:
         half = flat.order / 2 - 1
         f1, f2 = sq1**half / 2, sq2**half / 2
         g1, g2 = by1 * (s1 * f1), by2 * (s2 * f2)
-        k1 = by1 * 2 / flat.lengths**2 * (c11 * f1 * f1 + s1 * half * f1 / sq1)
-        k2 = by2 * 2 / flat.middles**2 * (c22 * f2 * f2 + s2 * half * f2 / sq2)
-        k12 = by1 * 2 / flat.middles**2 * (c12 * f1 * f2)
+        k1 = by1 * 2 / length2 * (c11 * f1 * f1 + s1 * half * f1 / sq1)
+        k2 = by2 * 2 / middle2 * (c22 * f2 * f2 + s2 * half * f2 / sq2)
+        k12 = by1 * 2 / middle2 * (c12 * f1 * f2)
     dr, dz, middle = at.dr, at.dz, at.middle
     k1_dr, k12_middle = k1 * dr, k12 * middle
     return EnergyTerm(

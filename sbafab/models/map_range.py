@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sbafab.models.balloon import distinct
 from sbafab.models.balloon_map import LEAST_HEIGHT, LOW_PRESSURE
 from sbafab.models.rippled import compressed_shapes
 
@@ -112,9 +113,9 @@ def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.boo
     """
     base, ratio = _base(made)
     places = np.stack([np.maximum(pressure / ratio, 0.0), np.maximum(height, FLAT)], -1)
-    unique, back = np.unique(places.round(PLACE_DIGITS), axis=0, return_inverse=True)
+    unique, back = distinct(places.round(PLACE_DIGITS))
     p, h = np.minimum(unique[:, 0], base.most_pressure), unique[:, 1]
     holds, inside = np.zeros(len(h), bool), h <= base.most_height
     if inside.any():
         holds[inside] = relative_errors(base, p[inside], h[inside]) <= MOST_ERROR
-    return holds[back.ravel()]
+    return holds[back]

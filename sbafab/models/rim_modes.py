@@ -15,7 +15,7 @@ out. One film and its share of the rim are computed. Lengths mm, pressures kPa, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -573,7 +573,7 @@ class Waves:
         balloon = self.of.balloon
         lie = Elements.of(places[:, :, R], places[:, :, Z])
         thick, thin = (
-            air_volume(balloon.film._replace(thickness=by), balloon.edge, lie)
+            air_volume(replace(balloon.film, thickness=by), balloon.edge, lie)
             for by in (balloon.thickness, 0.0)
         )
         slopes = [a - b for a, b in zip(thick.slopes, thin.slopes, strict=True)]

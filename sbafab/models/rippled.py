@@ -79,7 +79,11 @@ def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
     """Return free balloons at pressures (kPa): with waves in step where the pocket is wide and its
     rim ripples, else by ``inflate``.
     """
-    shapes = inflate(balloon, pressure)
+    return with_waves(balloon, inflate(balloon, pressure))
+
+
+def with_waves(balloon: Balloon, shapes: Shapes) -> Shapes:
+    """Return ``free_shapes`` at the pressures of free balloons by ``inflate``."""
     rows = np.flatnonzero(shapes.pressure < _first_pressure(balloon) * END / START)
     if not resolves_waves(balloon) or not len(rows):
         return shapes
@@ -143,15 +147,15 @@ def compressed_shapes(
     return shapes._replace(force=force, volume=volume, energy=energy)
 
 
-def least_free_states(balloon: Balloon, pressure: Array) -> FilmStates:
-    """Return the free balloons at pressures (kPa, above 0) of least energy of all states known:
-    those at which ``compressed_shapes`` carries no force.
+def least_free_states(balloon: Balloon, smooth: Shapes) -> FilmStates:
+    """Return the free balloons of least energy of all states known, at the pressures of those by
+    ``inflate``: the ones at which ``compressed_shapes`` carries no force.
     """
-    smooth, waves = inflate(balloon, pressure), wave_states(balloon)
+    waves = wave_states(balloon)
     states = FilmStates(smooth.height.copy(), smooth.energy.copy(), smooth.volume.copy())
     if not len(waves.height):
         return states
-    for number, p in enumerate(pressure):
+    for number, p in enumerate(smooth.pressure):
         potential = waves.energy - p * waves.volume
         best = int(potential.argmin())
         if potential[best] < states.energy[number] - p * states.volume[number]:

@@ -51,7 +51,7 @@ def test_what_ripples_take_off_has_the_slopes_that_it_says() -> None:
     found = inflate(lone, 6.0)
     (ripple,) = ripples_at((lone,), ((found.r, found.z),))
     for law in (2, 0):
-        flat = lone.film._replace(order=law)
+        flat = replace(lone.film, order=law)
         term = balloon.ripple_energy(flat, lone.edge, ripple, found.r)
         assert term.energy[0] < 0
         for node in (lone.edge, lone.edge + 2, len(lone.nodes) - 1):

@@ -13,7 +13,7 @@ import sbafab
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, inflate
 from sbafab.models.balloon_map import BalloonMap
-from sbafab.models.elastic import blocked_force
+from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Plate, Stack
 from sbafab.models.stack_balance import (
@@ -51,6 +51,23 @@ def test_a_map_is_the_balloon_that_it_was_made_from(balloon: BalloonMap) -> None
     assert balloon.volume(p, h) == pytest.approx(found.volume, rel=0.01)
     free = inflate(balloon.balloon, [1.0, 5.0, 20.0])
     assert balloon.free_height([1.0, 5.0, 20.0]) == pytest.approx(free.height, rel=0.01)
+
+
+@pytest.mark.parametrize(("chambers", "angle"), [(1, 30.0), (2, 60.0), (1, 90.0)])
+def test_a_bend_is_met_by_the_one_pressure_that_gives_it(
+    three: Stack, chambers: int, angle: float
+) -> None:
+    pose = pose_bent_by(three, chambers, angle)
+    assert pose is not None
+    assert pose.bend == pytest.approx(angle, abs=1e-6)
+    more, less = (
+        three.pose([factor * p for p in pose.pressures], near=pose).bend for factor in (1.01, 0.99)
+    )
+    assert less < angle < more
+
+
+def test_a_bend_that_no_pressure_gives_is_none(three: Stack) -> None:
+    assert pose_bent_by(three, 1, 175.0) is None
 
 
 def test_a_map_holds_where_films_are_slack_and_pressures_low(balloon: BalloonMap) -> None:
