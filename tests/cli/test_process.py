@@ -67,7 +67,7 @@ def printed(code: str) -> list[str]:
     ("solver", "call"),
     [
         # The fit of a map, films with waves, two unlike films, and many stacks at once.
-        ("np.linalg.qr", "sbafab.predict('3dof-15mm')"),
+        ("sbafab.models.balloon_map.nearest_admissible", "sbafab.predict('3dof-15mm')"),
         ("sbafab.models.rippled.equilibrium", "rippled.rippled(Balloon(pocket=5.0), 8.0)"),
         ("np.linalg.pinv", "inflate(Balloon(mate=Balloon(thickness=0.1)), 8.0)"),
         (
