@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from sbafab.actuators import drawn, lobed, one_dof, radial
+from sbafab import plugins
 from sbafab.actuators.fits import Fits, refuse_unfit
 from sbafab.design.files import (
     FITS,
@@ -24,10 +23,8 @@ from sbafab.design.files import (
 )
 from sbafab.design.outline import understood
 from sbafab.design.records import Design, validated
-from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-
-Item = TypeVar("Item")
+from sbafab.plugins import Plugins
 
 
 class Family(NamedTuple):
@@ -37,71 +34,38 @@ class Family(NamedTuple):
     build: Callable[[Any], Laminate]
 
 
-FAMILIES = {
-    "1dof": Family(one_dof.OneDofDesign, one_dof.build),
-    "lobed": Family(lobed.LobedDesign, lobed.build),
-    "radial": Family(radial.RadialDesign, radial.build),
-    "drawn": Family(drawn.DrawnDesign, drawn.build),
-}
-PLUGINS = "sbafab.families"
-"""Entry points by which an installed package adds families, each a ``Family``."""
+FAMILIES = Plugins(
+    plugins.FAMILIES,
+    "family",
+    Family,
+    {
+        "1dof": "sbafab.actuators.one_dof:FAMILY",
+        "lobed": "sbafab.actuators.lobed:FAMILY",
+        "radial": "sbafab.actuators.radial:FAMILY",
+        "drawn": "sbafab.actuators.drawn:FAMILY",
+    },
+)
+"""All families by name. Packages are searched only for a name that is not ours, or for all names:
+that may raise DesignError.
+"""
 
 
-class _LazyMapping(Mapping[str, Item]):
-    """A mapping that calls ``every`` only for names that are not ``here``, or for all names."""
+class _Records(Mapping[str, type[Design]]):
+    """The design record of every family, likewise."""
 
-    def __init__(self, here: Mapping[str, Item], every: Callable[[], Mapping[str, Item]]) -> None:
-        self.here = here
-        self.every = every
-
-    def __getitem__(self, name: str) -> Item:
-        return self.here[name] if name in self.here else self.every()[name]
+    def __getitem__(self, name: str) -> type[Design]:
+        return FAMILIES[name].record
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.every())
+        return iter(FAMILIES)
 
     def __len__(self) -> int:
-        return len(self.every())
-
-
-@cache
-def _every() -> Mapping[str, Family]:
-    """All families by name: those here, then those of installed packages.
-
-    Raises DesignError where a package's family cannot be loaded or takes a name that is in use.
-    """
-    from importlib.metadata import entry_points
-
-    families = dict(FAMILIES)
-    for entry in sorted(entry_points(group=PLUGINS), key=lambda entry: entry.name):
-        try:
-            family = entry.load()
-        except Exception as error:
-            raise DesignError(
-                f"family {entry.name} of the installed package {entry.value.partition(':')[0]} "
-                f"cannot be loaded ({error}); repair or uninstall that package"
-            ) from error
-        if entry.name in families:
-            raise DesignError(
-                f"family {entry.name} is there already; uninstall one of the packages that add it"
-            )
-        families[entry.name] = family
-    return families
-
-
-def families() -> Mapping[str, Family]:
-    """Return all families by name.
-
-    Installed packages are searched only for a name that is not built in, or for all names: that may
-    raise DesignError.
-    """
-    return _LazyMapping(FAMILIES, _every)
+        return len(FAMILIES)
 
 
 def records() -> Mapping[str, type[Design]]:
     """Return the design record of every family, likewise."""
-    here = {name: family.record for name, family in FAMILIES.items()}
-    return _LazyMapping(here, lambda: {name: family.record for name, family in _every().items()})
+    return _Records()
 
 
 def load_design(
@@ -126,7 +90,7 @@ def build(design: Design) -> Laminate:
 
     Its notes state the size of a drawn outline, and that the actuator fits ``fits``.
     """
-    laminate = families()[design.family].build(design)
+    laminate = FAMILIES[design.family].build(design)
     fits = getattr(design, FITS, None)
     room = refuse_unfit(design, fits, laminate) if isinstance(fits, Fits) else None
     if room is not None:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
+from sbafab.actuators import Family
 from sbafab.actuators.shapes import (
     Angle,
     Coordinates,
@@ -206,7 +207,7 @@ class NamedNets(Section):
         return self.__pydantic_extra__ or {}
 
 
-FAMILY = "drawn"
+DRAWN = "drawn"
 """The family's name, for what writes design files of it."""
 
 
@@ -675,3 +676,6 @@ def _inlet(chamber: DrawnChamber, design: DrawnDesign) -> Inlet:
         settings.tab_length if chamber.length is None else chamber.length,
         settings.tube_outer_diameter,
     )
+
+
+FAMILY = Family(DrawnDesign, build)

@@ -8,6 +8,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
+from sbafab.actuators import Family
 from sbafab.actuators.ears import film_setback
 from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.footprint import Footprint, build_footprint
@@ -179,3 +180,6 @@ def _ears(axes: Sequence[Point]) -> list[tuple[Point, float]]:
         (axes[0], -60.0),
         (axes[-1], -step - 60.0),
     ]
+
+
+FAMILY = Family(LobedDesign, build)

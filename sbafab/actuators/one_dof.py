@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
+from sbafab.actuators import Family
 from sbafab.actuators.fits import Fits, fitted
 from sbafab.actuators.footprint import Footprint, build_footprint
 from sbafab.actuators.stacking import (
@@ -60,3 +61,6 @@ def footprint(design: OneDofDesign) -> Footprint:
 def build(design: OneDofDesign) -> Laminate:
     """Return the laminate of a 1-DoF design. Raises DesignError where parts do not fit."""
     return build_footprint(design, footprint(design))
+
+
+FAMILY = Family(OneDofDesign, build)

@@ -11,6 +11,7 @@ from typing import Literal, Self
 
 from pydantic import Field
 
+from sbafab.actuators import Family
 from sbafab.actuators.ears import (
     Ear,
     Ray,
@@ -424,3 +425,6 @@ def _ahead(outline: Region, start: Point, side: Side, design: Design) -> float:
     band = outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))
     _, low, _, high = band.bounds
     return (high - start[1]) if side > 0 else (start[1] - low)
+
+
+FAMILY = Family(RadialDesign, build)

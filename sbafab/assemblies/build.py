@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sbafab.actuators import build, records
 from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
@@ -23,7 +23,7 @@ from sbafab.design.files import (
 )
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, validated
-from sbafab.design.sections import RuleName
+from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
@@ -360,7 +360,7 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
         _keep_outline(data, part, assembly.folder)
         _keep_kit(data, part, assembly)
         waived = _waivers(data)
-        rules = [r for r in assembly.rules.waive if r in get_args(RuleName) and r not in waived]
+        rules = [r for r in assembly.rules.waive if r in rule_names() and r not in waived]
         return validated(add_waivers(data, rules), records(), path.parent)
     except DesignError as error:
         raise DesignError(f"parts.{name}: {error}") from None

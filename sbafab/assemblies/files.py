@@ -27,7 +27,6 @@ from sbafab.design.files import (
 )
 from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.design.records import Design, validated
-from sbafab.design.sections import RuleName
 from sbafab.errors import DesignError
 
 
@@ -70,8 +69,7 @@ def changed_assembly(
 ) -> Assembly:
     """Return the assembly of a file's tables with the changes made. Raises DesignError."""
     _start_where_the_user_stands(data, changes)
-    names = (*get_args(RuleName), *get_args(CheckName))
-    return assembly_of(add_waivers(data, waivers, names), path)
+    return assembly_of(add_waivers(data, waivers, get_args(CheckName)), path)
 
 
 def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:

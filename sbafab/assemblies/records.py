@@ -7,11 +7,19 @@ Lengths are mm, angles degrees.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from sbafab.design.sections import NAME_PATTERN, Laser, Order, Press, RuleName, Sheets
+from sbafab.design.sections import (
+    NAME_PATTERN,
+    Laser,
+    Order,
+    Press,
+    Sheets,
+    name_of,
+    rule_names,
+)
 from sbafab.design.toml_table import Section
 from sbafab.design.units import Length, LengthOrZero, Millimetres
 
@@ -184,6 +192,10 @@ class Deploy(Section):
     """It must pass this lumen deflated and hold in it inflated (paper, Sec. 5: 25.4)."""
 
 
+def _waivable() -> tuple[str, ...]:
+    return (*get_args(CheckName), *rule_names())
+
+
 class AssemblyRules(Section):
     """Limits of the checks between parts, and what is waived."""
 
@@ -193,7 +205,7 @@ class AssemblyRules(Section):
     """By how much a radial design's tube and the tube it is wrapped round may differ (ours)."""
     seat_share: float = Field(default=0.25, ge=0, le=1)
     """Least share of the smaller of two glued faces that lies on the other (ours)."""
-    waive: tuple[Literal[CheckName, RuleName], ...] = Field(default=(), strict=False)
+    waive: tuple[Annotated[str, *name_of(_waivable)], ...] = Field(default=(), strict=False)
     """Checks and rules whose failure shall not stop the cut files; sheets, traveller and manifest
     then say so."""
 

@@ -15,7 +15,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from sbafab.design.sections import RuleName
+from sbafab.design.sections import rule_names
 from sbafab.errors import DesignError
 
 
@@ -376,22 +376,19 @@ def open_what_fits(data: dict[str, Any], changes: Iterable[Change]) -> None:
 
 
 def add_waivers(
-    data: dict[str, Any], waivers: Sequence[str], rule_names: Sequence[str] = get_args(RuleName)
+    data: dict[str, Any], waivers: Sequence[str], checks: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Return ``data`` with rule names added to ``rules.waive``.
+    """Return ``data`` with names of rules, or of ``checks``, added to ``rules.waive``.
 
-    Raises DesignError for a name that is not among ``rule_names``, in the command line's words.
+    Raises DesignError for another name, in the command line's words.
     """
+    names = (*rule_names(), *checks) if waivers else ()
     for name in waivers:
-        if name not in rule_names:
-            near = difflib.get_close_matches(name, rule_names, 3) or [
-                rule for rule in rule_names if rule.startswith(name)
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 3) or [
+                rule for rule in names if rule.startswith(name)
             ]
-            hint = (
-                f"did you mean {' or '.join(near)}"
-                if near
-                else f"it may be {', '.join(rule_names)}"
-            )
+            hint = f"did you mean {' or '.join(near)}" if near else f"it may be {', '.join(names)}"
             raise DesignError(f"--waive {shown(name)}: no rule has that name; {hint}")
     rules = data.get("rules", {})
     if not waivers or not isinstance(rules, dict) or not isinstance(rules.get("waive", []), list):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal, Self
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import (
     AfterValidator,
@@ -15,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 
+from sbafab import plugins
 from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
 from sbafab.design.recipes import MachineName, Recipe
 from sbafab.design.toml_table import Section, writable
@@ -186,6 +189,30 @@ RuleName = Literal[
     "registration-worst-case",
     "registration-yield",
 ]
+
+
+def rule_names() -> tuple[str, ...]:
+    """Return the names of all rules, those of installed packages last."""
+    return (*get_args(RuleName), *(entry.name for entry in plugins.installed(plugins.RULES)))
+
+
+def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
+    """Return what allows one of some names, which installed packages may add to, in validation and
+    in the schema.
+    """
+
+    def checked(name: str) -> str:
+        allowed = names()
+        if name not in allowed:
+            near = get_close_matches(name, allowed, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(allowed)}"
+            raise ValueError(f"must be the name of a rule; {hint}")
+        return name
+
+    def listed(schema: dict[str, Any]) -> None:
+        schema["enum"] = [*names()]
+
+    return AfterValidator(checked), Field(json_schema_extra=listed)
 
 
 class Bond(Section):
@@ -583,7 +610,7 @@ class Rules(Section):
     default 100 kPa, at which the paper gives forces."""
     dead_end: float | None = Field(default=None, ge=0.5, le=1000)
     """A branch of a net without a port may be so many times as long as wide; by default 2."""
-    waive: tuple[RuleName, ...] = Field(default=(), strict=False)
+    waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
     """Rules whose failure shall not stop the cut files; every file then says so."""
 
 

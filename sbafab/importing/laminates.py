@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sbafab.actuators import load_design
-from sbafab.actuators.drawn import FAMILY, DrawnDesign
+from sbafab.actuators.drawn import DRAWN, DrawnDesign
 from sbafab.design.drawing import OUTLINE, seam_layer
 from sbafab.design.files import ASSEMBLY, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
@@ -64,7 +64,7 @@ def import_folder(folder: Path) -> Imported:
     remarks = []
     if isinstance(design, DrawnDesign) and design.mechanism is not None:
         tables["mechanism"] = plain_tables(design)["mechanism"]
-    if design.family != FAMILY:
+    if design.family != DRAWN:
         remarks = [
             f"family {design.family}: its keys are not carried over, its layers as built are",
             "predictions: stroke, force and bending have no model of drawn layers",
@@ -85,7 +85,7 @@ def import_laminate(path: Path) -> Imported:
         if stock[names[film.material]].shade != film.shade:
             # Films that no layer is cut from count for the colours of the others.
             remarks.append(f"film {film.material}: has another colour in pictures")
-    tables: dict[str, Any] = {"name": file_name(laminate.name), "family": FAMILY, "kit": "paper"}
+    tables: dict[str, Any] = {"name": file_name(laminate.name), "family": DRAWN, "kit": "paper"}
     if films:
         tables["films"] = films
     tables["layup"] = _layup(laminate, names)
@@ -131,7 +131,7 @@ def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
         shared["films"] = {name: plain_tables(design)["films"][name] for name in shared["films"]}
     if "inlet" in shared:
         shared["inlet"] = {k: v for k, v in shared["inlet"].items() if k in Inlets.model_fields}
-    return {**shared, "name": laminate.name, "family": FAMILY, "kit": design.kit}
+    return {**shared, "name": laminate.name, "family": DRAWN, "kit": design.kit}
 
 
 def _drawn(

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
-from sbafab.actuators.drawn import FAMILY
+from sbafab.actuators.drawn import DRAWN
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
 from sbafab.design.files import listed, shown
@@ -84,7 +84,7 @@ def import_table(folder: Path) -> Imported:
         raise DesignError(f"{folder} has no {CHAMBERS} (columns {columns}); add it")
     tables: dict[str, Any] = {
         "name": file_name(folder.resolve().name),
-        "family": FAMILY,
+        "family": DRAWN,
         "layers": layers,
         "chambers": _chambers(folder / CHAMBERS),
         "shapes": shapes,

@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-from sbafab.actuators.drawn import FAMILY
+from sbafab.actuators.drawn import DRAWN
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.files import shown
 from sbafab.design.outline import crossing
@@ -395,7 +395,7 @@ def _design(circuit: Circuit) -> Imported:
         layers.append(row)
     tables: dict[str, Any] = {
         "name": circuit.name,
-        "family": FAMILY,
+        "family": DRAWN,
         "layers": layers,
         "ports": ports,
         "shapes": shapes,

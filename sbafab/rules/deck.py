@@ -1,26 +1,39 @@
 """The rule deck: all rules in the order they are reported, and what runs them.
 
-A rule is a file of this folder with a ``RULE``; ``design.records.RuleName`` lists them in order.
+A rule is a file of this folder with a ``RULE``, whose name stands in ``RuleName``, in order; or an
+entry point of an installed package. A rule that cannot be loaded is an error: no design passes
+without it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from importlib import import_module
 from typing import get_args
 
+from sbafab import plugins
 from sbafab.design.sections import RuleName
+from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.plugins import Plugins
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, lowered
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Rule
 
-RULES: tuple[Rule, ...] = tuple(
-    import_module(f"sbafab.rules.{name.replace('-', '_')}").RULE for name in get_args(RuleName)
-)
+OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in get_args(RuleName)}
+
+
+def _named_rules() -> Iterator[Rule]:
+    """Yield all rules. Raises DesignError for one of another name than its entry point's."""
+    for name, rule in Plugins(plugins.RULES, "rule", Rule, OWN).items():
+        if rule.name != name:
+            raise DesignError(f"rule {name} of an installed package calls itself {rule.name}")
+        yield rule
+
+
+RULES = tuple(_named_rules())
 
 AT_MOST = frozenset(rule.name for rule in RULES if rule.at_most)
 """Rules whose limit is the largest value allowed."""

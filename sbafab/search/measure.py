@@ -29,6 +29,7 @@ from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.output.checked import check, refuse_undoable
+from sbafab.plugins import FAMILIES, RULES, installed
 from sbafab.process import prepare
 from sbafab.rules.deck import AT_MOST
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -170,12 +171,15 @@ def _severity(margin: RuleMargin) -> tuple[int, float]:
 
 @cache
 def fingerprint() -> str:
-    """The version, and a hash of the package's source."""
+    """The version, and a hash of the package's source and of the packages that add to it."""
     root = Path(sbafab.__file__).parent
     total = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
         total.update(path.relative_to(root).as_posix().encode())
         total.update(path.read_bytes())
+    for entry in (*installed(FAMILIES), *installed(RULES)):
+        version = entry.dist.version if entry.dist else ""
+        total.update(f"{entry.name} {entry.value} {version}".encode())
     return f"{sbafab.__version__}+{total.hexdigest()[:12]}"
 
 

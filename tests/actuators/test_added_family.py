@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,13 +45,23 @@ at = "top"
 """
 
 
-def installed(folder: Path, module: str = TWIN) -> Path:
-    """A folder on the path that holds the package as pip would lay it out."""
-    (folder / "twin.py").write_text(module, encoding="utf-8")
-    record = folder / "twin-1.0.dist-info"
+def installed(
+    folder: Path,
+    module: str = TWIN,
+    groups: Mapping[str, Mapping[str, str]] | None = None,
+    name: str = "twin",
+) -> Path:
+    """A folder on the path that holds a package as pip would lay it out: one module, with entry
+    points by group.
+    """
+    (folder / f"{name}.py").write_text(module, encoding="utf-8")
+    record = folder / f"{name}-1.0.dist-info"
     record.mkdir()
-    (record / "METADATA").write_text("Metadata-Version: 2.1\nName: twin\nVersion: 1.0\n")
-    (record / "entry_points.txt").write_text("[sbafab.families]\ntwin = twin:FAMILY\n")
+    (record / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    lines = []
+    for group, entries in (groups or {"sbafab.families": {"twin": "twin:FAMILY"}}).items():
+        lines += [f"[{group}]", *(f"{entry} = {place}" for entry, place in entries.items())]
+    (record / "entry_points.txt").write_text("\n".join(lines))
     return folder
 
 

@@ -59,7 +59,7 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
         '"tube", "arm" are fixed on each other',
     ),
     ("brace", {"parts.arm.on": "arm", "parts.arm.at": "top"}, '"arm" hangs on itself'),
-    ("brace", {"rules": {"waive": ["bond"]}}, "must be 'tube-match', .*'bond-width'"),
+    ("brace", {"rules": {"waive": ["bond"]}}, "there are tube-match, .*bond-width"),
     ("brace", {"parts.tube.inner_diameter": 15}, "parts.tube must have an inner_diameter smaller"),
     ("brace", {"parts.tube.length": "long"}, "parts.tube.length = 'long' must be a length"),
     ("brace", {"parts.tube.length": -4}, "parts.tube.length = -4 must be"),

@@ -80,7 +80,11 @@ def test_not_a_length(text: object) -> None:
         (["chamber.count=9"], "must be at most 8"),
         (["family=lobbed"], "did you mean lobed?"),
         (["name=../up"], "must be 1 to 64 letters"),
-        (['rules.waive=["bond"]'], "'bond-width'"),
+        (
+            ['rules.waive=["bond"]'],
+            "must be the name of a rule; there are bond-width, mask-overhang,",
+        ),
+        (['rules.waive=["bond-with"]'], "did you mean bond-width?"),
         (["laser.kerf_tpe=abc"], '"uncalibrated"'),
         (["laser.kerf_tpe=7"], "from 0 to 1 mm"),
         (["laser.kerf_tpe=-0.1"], "from 0 to 1 mm"),

@@ -28,7 +28,9 @@ def holds_text(annotation: Any) -> bool:
 
 
 def texts(record: type[BaseModel]) -> list[str]:
-    return [path for path, annotation in key_paths(record).items() if holds_text(annotation)]
+    """Return the keys of free texts; names of rules are listed."""
+    paths = key_paths(record).items()
+    return [path for path, kind in paths if holds_text(kind) and path != "rules.waive"]
 
 
 def nested(path: str, value: object) -> dict[str, Any]:

@@ -1,0 +1,84 @@
+"""Families and rules by name: those of the program and, by entry points, of installed packages.
+
+Both are entries, ``module:attribute``, and are loaded by one function. The program's own stand in
+its source and not in the metadata of its installation, so that a checkout, a page in the browser or
+an installation of yesterday has all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from sbafab.errors import DesignError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+FAMILIES, RULES = "sbafab.families", "sbafab.rules"
+"""Groups of entry points, which are an interface: docs/plugins.md describes them."""
+Kind = TypeVar("Kind")
+
+
+@cache
+def installed(group: str) -> tuple[EntryPoint, ...]:
+    """Return the entry points of a group in all installed packages, by name."""
+    from importlib.metadata import entry_points
+
+    return tuple(sorted(entry_points(group=group), key=lambda entry: (entry.name, entry.value)))
+
+
+class Plugins(Mapping[str, Kind], Generic[Kind]):
+    """What a group has by name: the program's ``own``, then what installed packages add.
+
+    An entry is loaded when it is first asked for, and packages are searched only for a name that is
+    not among ours, or for all names. ``noun`` is what messages call an entry. Raises DesignError
+    where a package's entry cannot be loaded, is of another ``kind``, or takes a name in use.
+    """
+
+    def __init__(self, group: str, noun: str, kind: type[Kind], own: Mapping[str, str]) -> None:
+        self.group, self.noun, self.kind, self.own = group, noun, kind, own
+        self._loaded: dict[str, Kind] = {}
+
+    def __getitem__(self, name: str) -> Kind:
+        if name not in self._loaded:
+            self._loaded[name] = self._load(name)
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self.own, *self._added))
+
+    def __len__(self) -> int:
+        return len(self.own) + len(self._added)
+
+    @property
+    def _added(self) -> dict[str, EntryPoint]:
+        """The entries of installed packages by name."""
+        added: dict[str, EntryPoint] = {}
+        for entry in installed(self.group):
+            if entry.name in self.own or entry.name in added:
+                raise DesignError(
+                    f"{self.noun} {entry.name} is there already; uninstall one of the packages "
+                    "that add it"
+                )
+            added[entry.name] = entry
+        return added
+
+    def _load(self, name: str) -> Kind:
+        from importlib.metadata import EntryPoint
+
+        if name in self.own:
+            own: Kind = EntryPoint(name, self.own[name], self.group).load()
+            return own
+        entry = self._added[name]
+        try:
+            value = entry.load()
+            if not isinstance(value, self.kind):
+                raise TypeError(f"{entry.value} is no {self.kind.__name__}")
+        except Exception as error:
+            raise DesignError(
+                f"{self.noun} {name} of the installed package {entry.module.partition('.')[0]} "
+                f"cannot be loaded ({error}); repair or uninstall that package"
+            ) from error
+        return value
