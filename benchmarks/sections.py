@@ -35,6 +35,11 @@ RIVALS = {"foldable": "foldable-robotics==0.0.37", "build123d": "build123d"}
 MODULES = {"foldable": "foldable_robotics", "build123d": "build123d"}
 BATCH = 12
 """Designs a round."""
+FIRST_CALL = (
+    "import numpy, threadpoolctl; threadpoolctl.threadpool_limits(8)\n"
+    "import sbafab; sbafab.predict('3dof-15mm')"
+)
+"""As in a notebook on a machine of eight processors."""
 HEAVY = ("ezdxf", "manifold3d", "numpy", "pydantic", "rich", "shapely", "trimesh")
 
 
@@ -243,6 +248,8 @@ def commands(rounds: int) -> Section:
             "sbafab --help": [*sbafab, "--help"],
             "sbafab check 1dof-5mm": [*sbafab, "check", "1dof-5mm"],
             "sbafab predict 1dof-5mm": [*sbafab, "predict", "1dof-5mm", "-o", root],
+            "sbafab predict 3dof-15mm": [*sbafab, "predict", "3dof-15mm", "-o", root],
+            "its first call in Python, 8 BLAS threads": [sys.executable, "-c", FIRST_CALL],
             "sbafab generate 3dof-15mm": [*sbafab, "generate", "3dof-15mm", "-o", root],
         }
         times = by_turns(runs, rounds)
