@@ -583,8 +583,11 @@ def _press() -> dict[str, Any]:
     body["properties"] = {"schema": {"const": PRESS_SCHEMA}, **body["properties"]}
     body["properties"]["batch"] = _batch()
     body["properties"]["hands_minutes"] = number("null")
-    del body["properties"]["is_timed"]
-    body["required"] = ["schema", *body["required"]]
+    body["properties"]["warnings"] = array(TEXT)
+    for name in ("is_timed", "cautions", "remarks"):
+        del body["properties"][name]
+    given = [name for name in body["required"] if name != "cautions"]
+    body["required"] = ["schema", *given, "warnings"]
     return body
 
 

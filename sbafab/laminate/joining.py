@@ -28,7 +28,8 @@ class Joining:
     """One act of joining, counted from 1: a press, a seam or a fold.
 
     ``layers`` are those in hand, by index, and ``bodies`` the same as they come, lowest first: what
-    was joined before, and single layers.
+    was joined before, and single layers. ``from_below``: a film above the seam would melt under the
+    tool, so that the work is turned over and the path mirrored.
     """
 
     number: int
@@ -38,6 +39,7 @@ class Joining:
     reason: str
     seam: Seam | None = None
     fold: Fold | None = None
+    from_below: bool = False
 
 
 class _Task(NamedTuple):
@@ -275,9 +277,8 @@ def _bonds_by(laminate: Laminate, gap: Interface, seam: Seam) -> bool:
 
 def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> str | None:
     """Return the sentence for a seam that films which melt cover from above and from below."""
-    above = [gap.above for gap in gaps if gap.index > task.first]
     below = [gap.below for gap in gaps if gap.index < task.first]
-    covers = [_melting(films, seam) for films in (above, below)]
+    covers = [_cover(seam, task, gaps), _melting(below, seam)]
     if None in covers:
         return None
     over, under = (layer.index for layer in covers if layer is not None)
@@ -286,6 +287,11 @@ def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> str | Non
         f"layer {over} or layer {under}, which melt under the tool; make it before these are "
         "joined to them, or open them there"
     )
+
+
+def _cover(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> Layer | None:
+    """Return the film above a seam that a tool from above would melt first, if any."""
+    return _melting([gap.above for gap in gaps if gap.index > task.first], seam)
 
 
 def _melting(films: Sequence[Layer], seam: Seam) -> Layer | None:
@@ -330,7 +336,10 @@ def _steps(
         folded.append(fold)
     bodies = tuple(_bodies(laminate, layers, done, folded))
     reason = _reason(laminate, task, before)
-    yield Joining(count + 1, task.process, layers, bodies, reason, task.seam)
+    from_below = task.seam is not None and _cover(task.seam, task, gaps) is not None
+    yield Joining(
+        count + 1, task.process, layers, bodies, reason, task.seam, from_below=from_below
+    )
 
 
 def _layers(laminate: Laminate, task: _Task) -> range:

@@ -342,11 +342,11 @@ def schedule_of(checked: Checked) -> Schedule:
     if not remarks:
         return plain
     if not plain.steps:
-        return replace(plain, warnings=(*remarks, *plain.warnings))
+        return replace(plain, remarks=tuple(remarks))
     first, *later = plain.steps
     words = " ".join(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
     marked = replace(first, instructions=f"{words} {first.instructions}")
-    return replace(plain, steps=(marked, *later), warnings=(*remarks, *plain.warnings))
+    return replace(plain, steps=(marked, *later), remarks=tuple(remarks))
 
 
 def refuse_undoable(checked: Sequence[Checked]) -> None:

@@ -83,19 +83,33 @@ def layers_in_words(layers: Sequence[int]) -> str:
     return f"layer{'s' if len(layers) > 1 else ''} {joined_words(words)}"
 
 
-def unstated_minutes(films: list[Film], press: PressSettings) -> str:
-    """Return the warning that no minutes are stated for these films; empty for none."""
-    if not films:
-        return ""
+class Caution(NamedTuple):
+    """A warning for the technician; its ``remedy`` in a design file is the designer's.
+
+    ``at_step``: the step's own page says it where the layer is laid.
+    """
+
+    words: str
+    remedy: str = ""
+    at_step: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """Warning and remedy, for the designer."""
+        return f"{self.words}; {self.remedy}" if self.remedy else self.words
+
+
+def _unstated_minutes(films: list[Film], press: PressSettings) -> Caution:
+    """Return the warning that no minutes are stated for these films."""
     names = [f'"{film.said}"' for film in films]
     stated = joined_words(
         [f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for]
     )
-    return (
+    return Caution(
         f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
-        f"{joined_words(names)}; try the bond on a sample at {press.temperature_c:g} C, set "
-        "press.temperature_c, press.pressure_kpa and the press minutes to what held, and name the "
-        "film in press.minutes_for"
+        f"{joined_words(names)}; try the bond on a sample at {press.temperature_c:g} C",
+        "set press.temperature_c, press.pressure_kpa and the press minutes to what held, and name "
+        "the film in press.minutes_for",
     )
 
 
@@ -103,12 +117,12 @@ STATED_C = 135.0
 """Temperature that the paper states its minutes for, C (Sec. 2)."""
 
 
-def minutes_of_another_temperature(
+def _minutes_of_another_temperature(
     laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
-) -> str:
-    """Return the warning that the paper's minutes are pressed at another temperature than the
-    paper's; empty for none. Minutes that differ from the paper's, and those of films that it did
-    not press, were stated by the user, who tried them as set.
+) -> Iterator[Caution]:
+    """Yield the warning that the paper's minutes are pressed at another temperature than the
+    paper's. Minutes that differ from the paper's, and those of films that it did not press, were
+    stated by the user, who tried them as set.
     """
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     paper = PressSettings()
@@ -117,9 +131,9 @@ def minutes_of_another_temperature(
     ]
     is_the_papers = any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
     if press.temperature_c == STATED_C or not (usual and is_the_papers):
-        return ""
+        return
     some = "" if len(usual) == len(parts) else f" of step{'s' * (len(usual) > 1)} "
-    return (
+    yield Caution(
         f"minutes{some}{joined_words(usual) if some else ''} stated for {STATED_C:g} C, the press "
         f"is set to {press.temperature_c:g} C: nobody stated minutes for that, so try the bond on "
         "scrap first, and set the press minutes to what held"
@@ -266,7 +280,7 @@ class SeamStep:
 
     ``layers`` are in hand, ``adds`` those of them that are laid in this step. ``length_mm`` is that
     of the path that the middle of the tool follows. Temperature and speed are None where nobody
-    stated them.
+    stated them. ``from_below``: the work is turned over, and the path mirrored.
     """
 
     step: int
@@ -283,6 +297,7 @@ class SeamStep:
     speed_mm_s: float | None
     instructions: str
     reason: str
+    from_below: bool
 
 
 @dataclass(frozen=True)
@@ -299,7 +314,8 @@ class FoldStep:
 
 @dataclass(frozen=True)
 class Schedule:
-    """All steps, their time, and the warnings for the technician.
+    """All steps, their time, and what the technician is warned of: ``cautions``, and ``remarks`` on
+    waived rules and lowered limits.
 
     The two totals are None where the minutes of a step are; warming up is not in them.
     ``hands_minutes`` are the estimate's minutes beside those in the press; plans of a batch take
@@ -310,13 +326,19 @@ class Schedule:
     total_press_minutes: float | None
     estimated_build_minutes: float | None
     estimate_basis: str
-    warnings: tuple[str, ...]
+    cautions: tuple[Caution, ...]
     heating: Heating
     hands_minutes: float
     is_timed: bool = True
     tacking: Tacking | None = None
     seams: tuple[SeamStep, ...] = ()
     folds: tuple[FoldStep, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Remarks and cautions, a sentence each."""
+        return (*self.remarks, *(caution.sentence for caution in self.cautions))
 
 
 def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
@@ -377,7 +399,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         total,
         (total or 0.0) + hands if has_total else None,
         f"{pressed} in the press{_tacked(tacking)} and {by_hand}",
-        tuple(warnings(laminate, press, parts, steps)),
+        tuple(_cautions(laminate, press, parts, steps)),
         warming,
         hands,
         press.is_timed,
@@ -559,6 +581,8 @@ def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
         lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
         bond = laminate.bond_of(lower, upper, seam.tool)
         laid = f"Lay {layers_in_words(step.adds)} in place by hand. " if step.adds else ""
+        if step.joining.from_below:
+            laid += TURN_OVER
         yield SeamStep(
             step=step.number,
             title=f"Seam {seam.name}",
@@ -578,9 +602,14 @@ def seam_steps(laminate: Laminate) -> Iterator[SeamStep]:
                 f"{seam.above}."
             ),
             reason=step.joining.reason,
+            from_below=step.joining.from_below,
         )
 
 
+TURN_OVER = (
+    "Turn the work over, left to right, so that the tool comes from below: the path is mirrored "
+    "left to right. "
+)
 STAND_OUT = (
     "Fin seam: let the edges of both films stand out together, face to face, and weld them there. "
 )
@@ -621,8 +650,8 @@ PINS_IN = (
 )
 
 MIDDLE_FIRST = (
-    'untested: with registration.sequence = "middle-first" the base is pressed on together with '
-    "the cap, in the last bond alone; try a sample, and look at its lowest bond"
+    "untested: with the middle pressed first the base is pressed on together with the cap, in the "
+    "last bond alone; try a sample, and look at its lowest bond"
 )
 
 HOTTEST_TRIED = 150.0
@@ -701,50 +730,51 @@ def _refuse_bonds(laminate: Laminate, press: PressSettings, parts: Sequence[Asse
                 )
 
 
-def warnings(
+def _cautions(
     laminate: Laminate,
     press: PressSettings,
     parts: Sequence[AssemblyStep],
     steps: Sequence[Step],
-) -> Iterator[str]:
+) -> Iterator[Caution]:
     if laminate.panel is not None:
-        yield UNTRIED
+        yield Caution(UNTRIED)
         if press.carrier_limit is None:
-            yield (
+            yield Caution(
                 "nobody stated what temperature the transfer film of the masks stands; it is "
-                f"pressed at {press.temperature_c:g} C (panel.carrier_limit_c)"
+                f"pressed at {press.temperature_c:g} C",
+                "set panel.carrier_limit_c",
             )
     yield from _unknown_films(laminate, press)
     yield from _other_temperatures(laminate, press, parts)
     low, high = PRESSURES_TRIED
     if not low <= press.pressure_kpa <= high:
-        yield (
+        yield Caution(
             f"{press.pressure_kpa:g} kPa lies outside {low:g} to {high:g} kPa; 110 kPa is "
             "validated, and earlier work pressed at 70 kPa"
         )
     if laminate.balloons > press.validated_balloons:
-        yield (
+        yield Caution(
             f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
         )
     uneven = [step for step in steps if not low <= step.film_kpa <= high]
     if uneven and low <= press.pressure_kpa <= high:
         worst = max(uneven, key=lambda step: abs(step.film_kpa - press.pressure_kpa))
-        yield (
+        yield Caution(
             f"step {worst.step}: the films get about {worst.film_kpa:.0f} kPa (estimate), outside "
-            f"{low:g} to {high:g} kPa; take a thicker or softer pad (press.pad_thickness, "
-            "press.pad_hardness)"
+            f"{low:g} to {high:g} kPa",
+            "take a thicker or softer pad (press.pad_thickness, press.pad_hardness)",
         )
     if laminate.registration == "ears" and laminate.pins:
-        yield PINS_IN if laminate.pins_in_full_bonds else PINS_OUT
+        yield Caution(PINS_IN if laminate.pins_in_full_bonds else PINS_OUT)
     if laminate.middle_first and laminate.panel is None and parts[0].name == "flash_middle":
-        yield MIDDLE_FIRST
+        yield Caution(MIDDLE_FIRST)
     pads = (
         item.thickness_mm for step in steps for item in step.build_up if item.part == build_up.PAD
     )
     pad = next(pads, 0.0)
     if (pile := build_up.pad_sheets(pad)) > 1:
-        yield (
+        yield Caution(
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"
         )
@@ -752,38 +782,40 @@ def warnings(
         pin.diameter for pin in laminate.pins if not is_sold(pin.diameter, press.pin_standard)
     }
     if unsold and not press.pin_lengths:
-        yield (
+        yield Caution(
             f"{press.pin_standard} has no dowel pin of diameter "
-            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}: change the "
-            "diameter, or make the pins and give their lengths in registration.pin_lengths"
+            f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}",
+            "change the diameter, or make the pins and give their lengths in "
+            "registration.pin_lengths",
         )
     for step, part in zip(steps, parts, strict=True):
         if step.bond == "flash" and (layers := _unpinned(laminate, part)):
             which = layers_in_words(layers) if len(layers) < 4 else _by_role(laminate, layers)
-            yield f"step {step.step}: no pin holds {which}; align by hand"
+            words = f"step {step.step}: no pin holds {which}; align by hand"
+            yield Caution(words, at_step=True)
 
 
-def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[str]:
+def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[Caution]:
     """Yield warnings of films without stated minutes or melting point."""
-    if words := unstated_minutes(films_without_minutes(laminate, press), press):
-        yield words
+    if films := films_without_minutes(laminate, press):
+        yield _unstated_minutes(films, press)
     for film in dict.fromkeys(layer.film for layer in pressed_layers(laminate)):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:
-            yield (
+            yield Caution(
                 f"no melting point of {film.product} is known, so nobody has checked that "
-                f"{press.temperature_c:g} C bonds it; add {film.table}.melting_point, in C"
+                f"{press.temperature_c:g} C bonds it",
+                f"add {film.table}.melting_point, in C",
             )
 
 
 def _other_temperatures(
     laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
-) -> Iterator[str]:
+) -> Iterator[Caution]:
     """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
-    has_minutes = not films_without_minutes(laminate, press)
-    if has_minutes and (words := minutes_of_another_temperature(laminate, press, parts)):
-        yield words
+    if not films_without_minutes(laminate, press):
+        yield from _minutes_of_another_temperature(laminate, press, parts)
     if press.temperature_c > HOTTEST_TRIED:
-        yield (
+        yield Caution(
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
             "which already over-melted more than 135 C does"
         )

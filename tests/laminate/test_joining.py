@@ -71,6 +71,8 @@ def test_a_seam_that_would_weld_a_third_film_is_made_before_it_is_laid() -> None
     # The neck is covered from both sides once both pouches are closed; the smaller rim of the upper
     # pouch lies over the lower one's pocket, and not the other way.
     assert order(stack) == ["neck", "top", "low"]
+    # Layer 3 lies over the seam of layers 1 and 2, and melts; over the other two lies nothing.
+    assert [step.from_below for step in joinings(stack)] == [False, False, True]
     reasons = [step.reason for step in joinings(stack)]
     assert "melt under the tool" in reasons[0]
     assert "weld layers 1 and 2 too" in reasons[1]
@@ -157,6 +159,8 @@ def test_a_cover_that_stays_solid_lets_the_heat_through() -> None:
         SPOT,
     )
     assert order(replace(stack, seams=seams, bonds=bonds)) == ["one", "two", "rim"]
+    steps = joinings(replace(stack, seams=seams, bonds=bonds))
+    assert not any(step.from_below for step in steps)
 
 
 def test_a_fold_comes_before_what_is_bonded_in_it() -> None:

@@ -387,11 +387,7 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
             "with ink if you can. Each print goes into the press once: paper dries there and "
             "shrinks. Not tried by us.",
         )
-    for warning in schedule.warnings:
-        if not warning.startswith(("made although", CHECKED_AGAINST)) and not _is_in_step(warning):
-            yield "Press schedule", warning
-
-
-def _is_in_step(warning: str) -> bool:
-    """Return True if the press step itself gives the warning where the layer is laid."""
-    return warning.endswith("align by hand")
+    for caution in schedule.cautions:
+        if not caution.at_step:
+            tell = "; tell the designer" if caution.remedy else ""
+            yield "Press schedule", f"{caution.words}{tell}"
