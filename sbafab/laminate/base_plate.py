@@ -41,6 +41,13 @@ reamed holes, fobproto.com, cnc-drilling-reaming-tolerances); a CNC mill 0.001 i
 promise of precise work (makerstage.com, cnc-tolerances-guide; olympusmachining.com)."""
 
 
+def for_a_cnc_mill(design: str) -> str:
+    """Return the command that makes bonds and overhangs of a design wide enough for a plate from a
+    CNC mill: for nine good builds in ten, as the paper had.
+    """
+    return f"sbafab generate {design} --set registration.plate_made_by=cnc-mill --target-yield 0.9"
+
+
 def pin_deviations(diameter: float) -> tuple[float, float]:
     """Return the least and the most by which a dowel pin is thicker than its diameter, mm: m6."""
     return next(((low, high) for d, low, high in M6 if diameter <= d), M6[-1][1:])

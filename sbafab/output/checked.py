@@ -117,6 +117,7 @@ def warnings(design: Design) -> dict[Material, str]:
 
 def limits(design: Design) -> Limits:
     on_pins, on_one = design.pin_error, design.lone_pin_error
+    is_set = design.registration.pin_error is not None or design.form.is_drawn
     return Limits(
         bond_width=design.rules.bond_width,
         mask_overhang=design.rules.mask_overhang,
@@ -145,6 +146,7 @@ def limits(design: Design) -> Limits:
         yield_builds=design.rules.yield_builds,
         minutes_for=tuple(map(named_film, design.press.minutes_for)),
         waive=frozenset(design.rules.waive),
+        plate=None if is_set else design.registration.plate_made_by,
     )
 
 

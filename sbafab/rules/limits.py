@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.geometry.offset import Kerf
+from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
 from sbafab.laminate.joints import SeamTool
 from sbafab.laminate.laminate import Laminate
@@ -64,7 +65,9 @@ class Limits:
     ``tolerances``; ``target_yield`` is the share of ``yield_builds`` random builds that must keep
     them (None: none asked for; for the builds: as many as are quick). ``opening_pressure``: kPa
     that may open a channel; ``dead_end``: widths that a blind branch may be long. ``minutes_for``:
-    product and thickness of the films that the press minutes were stated for.
+    product and thickness of the films that the press minutes were stated for. ``plate``: the
+    machine that makes the base plate's holes, None where it does not set the pins' error, or bonds
+    are as drawn.
     """
 
     bond_width: float = 0.75
@@ -86,6 +89,7 @@ class Limits:
     yield_builds: int | None = None
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
     waive: frozenset[str] = frozenset()
+    plate: PlateMachine | None = None
 
 
 def holds(measured: float, limit: float) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.on_demand import np
+from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import Freedom
@@ -184,9 +185,22 @@ def _finding(
             f"{remedy}: {message}; that is short of {limit:g} at {short} "
             f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
+    if quantity == "bond":
+        message += _plate(verdict == "fail", measures.laminate, limits)
     place = Place(interface.index, interface.layer_indices, *margin.middle)
     value = max(0.0, worst.worst)
     return Finding(NAME, verdict, limit, value, "mm", place, message, remedy=remedy)
+
+
+def _plate(failed: bool, laminate: Laminate, limits: Limits) -> str:
+    """Return the command for a plate that a workshop can make, where several pins hold layers."""
+    if limits.plate is None or len(laminate.pins) < 2:
+        return ""
+    command = f"`{for_a_cnc_mill('DESIGN')}`"
+    if limits.plate == "cnc-mill":
+        return f" ({command} finds by how much)" if failed else ""
+    exact = f"its pins are to stand within {limits.tolerances.pin:g} mm, which takes a jig borer: "
+    return f"; {exact if limits.plate == 'jig-borer' else ''}for a plate from a CNC mill, {command}"
 
 
 def _message(

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import pytest
+
 from sbafab.actuators import build, load_design
+from sbafab.cli import main
 from sbafab.design.records import Design
+from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
 from sbafab.output.checked import check, limits
+from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")
@@ -104,6 +111,22 @@ def test_a_rough_plate_is_made_by_a_better_machine() -> None:
     found = reached(0.9, "registration.method=ears", "registration.plate_made_by=drill-press")
     assert found.changes["registration.plate_made_by"] in ("cnc-mill", "jig-borer")
     assert is_good(found)
+
+
+@pytest.mark.long
+def test_the_command_for_a_cnc_mill_makes_a_design_that_may_be_cut(tmp_path: Path) -> None:
+    """Findings and bench.html name it, where a plate takes a jig borer."""
+    command = for_a_cnc_mill("3dof-15mm").split()
+    with pytest.raises(SystemExit) as ended:
+        main([*command[1:], "-o", str(tmp_path)])
+    assert ended.value.code == 0
+    made = load_design(tmp_path / "3dof-15mm" / "design.toml")
+    assert made.registration.plate_made_by == "cnc-mill"
+    changed = made.bond.width, made.mask.overhang
+    assert changed == pytest.approx((0.79, 0.53), abs=0.011)
+    # As it is drawn, with wider holes' places, it must not be cut.
+    given = load_design("3dof-15mm", ["registration.plate_made_by=cnc-mill"])
+    assert has_failed(run_deck(build(given), limits(given)))
 
 
 def test_what_is_fixed_stays_and_the_best_is_said() -> None:

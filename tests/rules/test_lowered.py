@@ -74,7 +74,7 @@ def test_every_key_of_rules_and_laser_is_decided_on() -> None:
 def test_a_design_s_own_limits_are_the_usual_ones() -> None:
     """What is usual stands in the rules; the design's defaults agree with it."""
     design = OneDofDesign(name="any", family="1dof")
-    assert limits(design) == Limits()
+    assert limits(design) == Limits(plate="jig-borer")
 
 
 def test_the_findings_of_its_rules_say_so() -> None:

@@ -70,6 +70,25 @@ def test_a_layer_on_several_pins_cannot_turn(good: Good) -> None:
     assert bond.message.endswith(", 0.004 mm")
 
 
+def test_a_plate_that_takes_a_jig_borer_names_the_command_for_a_mill(good: Good) -> None:
+    command = (
+        "`sbafab generate DESIGN --set registration.plate_made_by=cnc-mill --target-yield 0.9`"
+    )
+    tip, one = good("3dof-15mm", "stack.balloons=3"), good(*ONE)
+    bond, overhang = worst_of(tip, Limits(plate="jig-borer"))
+    within = "its pins are to stand within 0.004 mm, which takes a jig borer"
+    assert bond.message.endswith(f"; {within}: for a plate from a CNC mill, {command}")
+    assert command not in overhang.message
+    # A mill's plate, 0.029, leaves too little of the 0.75.
+    milled = Limits(plate="cnc-mill", tolerances=Tolerances(pin=0.029))
+    bond, _ = worst_of(tip, milled)
+    assert bond.verdict == "fail"
+    assert bond.message.endswith(f"make bond.width larger ({command} finds by how much)")
+    # The place of a plate's only pin does not matter.
+    assert command not in worst_of(one, Limits(plate="jig-borer"))[0].message
+    assert command not in worst_of(tip, Limits())[0].message
+
+
 def test_a_failure_says_what_is_left_without_the_hand(good: Good) -> None:
     limits = Limits(tolerances=Tolerances(0.2, 0.004, 0.2, 1.0))
     bond, overhang = worst_of(good(*ONE), limits)

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Laminate
 from sbafab.reports.html_templates import environment
 from sbafab.reports.nets_svg import nets_svg
-from sbafab.reports.traveller.page import HERE, frame
+from sbafab.reports.traveller.job import HERE, frame
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
@@ -138,6 +139,11 @@ def _remedies(places: Measures) -> Iterator[str]:
         "sbafab check design.toml --target-yield 0.99 computes the wider bonds and overhangs that "
         "reach 99 % with this hand."
     )
+    if places.limits.plate == "jig-borer" and len(places.laminate.pins) > 1:
+        yield (
+            f"No jig borer for the base plate? {for_a_cnc_mill('design.toml')} makes bonds and "
+            "overhangs wide enough for one from a CNC mill."
+        )
     if places.laminate.registration == "channel-pin":
         yield (
             'registration.method = "ears" pins every film and separator in every step; the ears '
