@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sbafab.assemblies.build import Assembled, PlacedPart
@@ -81,31 +82,50 @@ def _ring(outer: float, inner: float) -> Region:
 
 def _bell(cup: Cup) -> Surface:
     """A cup's surface: its section, counter-clockwise from its bore, turned round its axis."""
-    import numpy as np
-
     bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
     inside = max(neck - cup.wall, bore)
-    section = np.array(
-        [
-            (bore, 0.0),
-            (neck, 0.0),
-            (rim, cup.height),
-            (rim - cup.wall / 2, cup.height),
-            (inside, cup.wall),
-            (bore, cup.wall),
-        ]
-    )
+    outer = [(bore, 0.0), (neck, 0.0), (rim, cup.height)]
+    return _turned([*outer, (rim - cup.wall / 2, cup.height), (inside, cup.wall), (bore, cup.wall)])
+
+
+MOULD_WALL, DOWEL, DOWEL_PLAY = 4.0, 2.0, 0.1
+"""mm: of the mould round the cup, of the bore's pin in the lower half, and of its play there."""
+
+
+def cup_mould(cup: Cup) -> tuple[Surface, Surface]:
+    """Return lower and upper half of the mould that a cup is cast in, its rim up.
+
+    The lower half has its outside, the upper one its inside and a pin for its bore, which goes
+    into a hole of the lower half. Ours, not tried.
+    """
+    bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
+    inside, out, foot = max(neck - cup.wall, bore), rim + MOULD_WALL, -DOWEL - MOULD_WALL
+    socket = bore + DOWEL_PLAY
+    lower = [(0.0, foot), (out, foot), (out, cup.height), (rim, cup.height), (neck, 0.0)]
+    lower += [(socket, 0.0), (socket, -DOWEL), (0.0, -DOWEL)]
+    upper = [(0.0, -DOWEL), (bore, -DOWEL), (bore, cup.wall), (inside, cup.wall)]
+    upper += [(rim - cup.wall / 2, cup.height), (out, cup.height)]
+    upper += [(out, cup.height + MOULD_WALL), (0.0, cup.height + MOULD_WALL)]
+    return _turned(lower), _turned(list(dict.fromkeys(upper)))
+
+
+def _turned(outline: Sequence[tuple[float, float]]) -> Surface:
+    """Return a section (r, z), counter-clockwise, turned round the axis."""
+    import numpy as np
+
+    section = np.array(outline)
     angles = np.arange(AROUND) * (2 * math.pi / AROUND)
     r, z = section.T
     points = np.concatenate([np.column_stack([r * np.cos(a), r * np.sin(a), z]) for a in angles])
     count = len(section)
-    ring, place = np.divmod(np.arange(AROUND * count), count)
-    here = ring * count + place
-    up = ring * count + (place + 1) % count
-    on = (ring + 1) % AROUND * count + place
-    both = (ring + 1) % AROUND * count + (place + 1) % count
-    lower, upper = np.column_stack([here, on, both]), np.column_stack([here, both, up])
-    return Surface(points, np.concatenate([lower, upper]))
+    # All turns share a point on the axis.
+    number = np.where(r == 0.0, 0, np.arange(AROUND)[:, None]) * count + np.arange(count)
+    here, up = number, np.roll(number, -1, axis=1)
+    on, both = np.roll(here, -1, axis=0), np.roll(up, -1, axis=0)
+    lower, upper = np.stack([here, on, both], axis=-1), np.stack([here, both, up], axis=-1)
+    faces = np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
+    a, b, c = faces.T
+    return Surface(points, faces[(a != b) & (b != c) & (c != a)])
 
 
 # Colours of parts in pictures and solids, distinct for the colour blind.

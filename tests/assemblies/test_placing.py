@@ -19,7 +19,15 @@ from sbafab.assemblies.build import (
     shifted,
 )
 from sbafab.assemblies.files import load_assembly
-from sbafab.assemblies.shapes import placed_surface
+from sbafab.assemblies.records import Cup
+from sbafab.assemblies.shapes import (
+    AROUND,
+    DOWEL,
+    DOWEL_PLAY,
+    cup_mould,
+    own_surface,
+    placed_surface,
+)
 from sbafab.geometry.region import rectangle
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import open_edges
@@ -40,6 +48,24 @@ def test_poses_follow_each_other_as_matrices_do() -> None:
     point = (0.7, -0.4, 2.0)
     assert outer.then(inner).at(point) == pytest.approx(outer.at(inner.at(point)))
     assert outer.points(np.array([point]))[0] == pytest.approx(outer.at(point))
+
+
+def test_both_halves_of_a_mould_leave_room_for_the_cup_alone() -> None:
+    """Block, halves and cup are of as many facets, so that their volumes add up to rounding."""
+    placed = assemble(load_assembly("brace"))["cup"]
+    assert isinstance(placed.part, Cup)
+    lower, upper = cup_mould(placed.part)
+    cup, part = own_surface(placed), placed.part
+    for half in (lower, upper):
+        assert len(open_edges(half)) == 0
+        assert half.volume > 0
+    turn = AROUND / 2 * math.sin(2 * math.pi / AROUND)
+    low, high = lower.points[:, 2].min(), upper.points[:, 2].max()
+    block = turn * (np.hypot(*lower.points[:, :2].T).max()) ** 2 * (high - low)
+    # Round the pin of the bore, 0.1 mm wide and 2 deep.
+    bore = part.bore / 2
+    play = turn * ((bore + DOWEL_PLAY) ** 2 - bore**2) * DOWEL
+    assert lower.volume + upper.volume + cup.volume + play == pytest.approx(block, rel=1e-9)
 
 
 def test_a_bent_slab_is_closed_and_has_the_volume_of_its_ring_sector() -> None:
