@@ -584,6 +584,7 @@ def _press() -> dict[str, Any]:
     body["properties"]["batch"] = _batch()
     body["properties"]["hands_minutes"] = number("null")
     body["properties"]["warnings"] = array(TEXT)
+    del body["$defs"]["Caution"]
     for name in ("is_timed", "cautions", "remarks"):
         del body["properties"][name]
     given = [name for name in body["required"] if name != "cautions"]

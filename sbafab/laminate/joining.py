@@ -337,9 +337,7 @@ def _steps(
     bodies = tuple(_bodies(laminate, layers, done, folded))
     reason = _reason(laminate, task, before)
     from_below = task.seam is not None and _cover(task.seam, task, gaps) is not None
-    yield Joining(
-        count + 1, task.process, layers, bodies, reason, task.seam, from_below=from_below
-    )
+    yield Joining(count + 1, task.process, layers, bodies, reason, task.seam, from_below=from_below)
 
 
 def _layers(laminate: Laminate, task: _Task) -> range:

@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from sbafab.reports.traveller.job import Job
 
 TRAVELLER = "traveller.html"
+BENCH = "bench.html"
 FINDINGS = "findings.html"
 PREDICT = "predict"
 """Folder of a prediction's plots."""
@@ -411,6 +412,17 @@ def _traveller(folder: DesignFolder) -> str:
     return traveller_html(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
 
 
+def _bench(folder: DesignFolder) -> str:
+    # The pages for the bench take as long to load as all the rules.
+    from sbafab.reports.traveller.bench import bench_html
+    from sbafab.reports.traveller.job import Work
+
+    assert folder.plan.pressing is not None
+    job = order_of(folder.checked)
+    work = Work(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
+    return bench_html(folder.design.name, job.design_sha256, GENERATOR, [work])
+
+
 def order_of(checked: Checked, folder: str = "") -> Job:
     """Return what a traveller says of the order of a design whose files lie in ``folder``."""
     # `check` and `cut` have no traveller.
@@ -535,8 +547,16 @@ ARTEFACTS: tuple[Artefact, ...] = (
     Artefact(
         TRAVELLER,
         "cut",
-        "the page for the bench",
+        "the pages that go with each actuator: steps, cut list, press steps with pictures, tests",
         _traveller,
+        needs=frozenset(("press", "preview")),
+        is_page=True,
+    ),
+    Artefact(
+        BENCH,
+        "cut",
+        "what is made, measured and read once for a bench: base plate, press, laser",
+        _bench,
         needs=frozenset(("press", "preview")),
         is_page=True,
     ),
@@ -557,3 +577,5 @@ ARTEFACTS: tuple[Artefact, ...] = (
     ),
 )
 """All that lies in a design's folder beside its index, in the order of writing."""
+PAGES = tuple(row.path for row in ARTEFACTS if row.is_page)
+"""Pages, of which an assembly has one for all its designs."""

@@ -9,10 +9,12 @@ from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, assembly_toml, part_entry
-from sbafab.assemblies.shapes import colours, linear, placed_surface
+from sbafab.assemblies.records import Cup
+from sbafab.assemblies.shapes import colours, cup_mould, linear, placed_surface
 from sbafab.cutting.sheets import SheetFile
-from sbafab.meshing.formats.surfaces import Node, write_scene
+from sbafab.meshing.formats.surfaces import Node, write_scene, write_stl
 from sbafab.output.artefacts import (
+    BENCH,
     FINDINGS,
     TRAVELLER,
     DesignFolder,
@@ -123,7 +125,10 @@ def _write_assembly(
     if plan.is_cut:
         (path / "mesh").mkdir()
         meshes.append(_write_solid(assembled, path))
-        write_text(path / TRAVELLER, _traveller(plan, assembled, sheets, bare))
+        _write_moulds(assembled, path)
+        traveller, bench = _bench_pages(plan, assembled, sheets, bare)
+        write_text(path / TRAVELLER, traveller)
+        write_text(path / BENCH, bench)
     sha256 = assembly_sha256(assembled)
     write_text(path / FINDINGS, findings_page(job.name, sha256, job.designs, job.between or ()))
     designs = [checked.design for checked in job.designs]
@@ -162,6 +167,14 @@ def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
     }
 
 
+def _write_moulds(assembled: Assembled, folder: Path) -> None:
+    """Write both halves of the mould of every cast part, to be printed."""
+    for placed in assembled.parts:
+        if isinstance(placed.part, Cup):
+            for half, surface in zip(("lower", "upper"), cup_mould(placed.part), strict=True):
+                write_stl(surface, folder / f"mesh/mould_{placed.name}_{half}.stl")
+
+
 def _material(placed: PlacedPart) -> str:
     if placed.made is not None:
         return placed.made.laminate.bonded_materials
@@ -178,11 +191,18 @@ def _claims(assembled: Assembled) -> dict[str, Any]:
     }
 
 
-def _traveller(
+def _bench_pages(
     plan: Plan, assembled: Assembled, sheets: Sequence[SheetFile], picture: bytes
-) -> str:
+) -> tuple[str, str]:
+    """Return the traveller and the page of the bench."""
     # Nor has it the pages of an assembly, whose modules take 0.1 s to load.
-    from sbafab.reports.traveller.assembly_page import AssemblyJob, DesignWork, assembly_html
+    from sbafab.reports.traveller.assembly_page import (
+        AssemblyJob,
+        DesignWork,
+        assembly_html,
+        tools_of_assembly,
+    )
+    from sbafab.reports.traveller.bench import bench_html
     from sbafab.reports.traveller.job import Work
 
     works = []
@@ -192,11 +212,11 @@ def _traveller(
         folder = f"{design.name}/"
         work = Work(design, laminate, each.pressing, sheets, order_of(each.checked, folder))
         works.append(DesignWork(work, folder))
-    order = assembled.assembly.order
-    return assembly_html(
+    order, sha256 = assembled.assembly.order, assembly_sha256(assembled)
+    traveller = assembly_html(
         AssemblyJob(
             assembled=assembled,
-            sha256=assembly_sha256(assembled),
+            sha256=sha256,
             generator=GENERATOR,
             works=works,
             sheets=sheets,
@@ -209,3 +229,6 @@ def _traveller(
             note=order.note,
         )
     )
+    designs = [each.work for each in works]
+    tools = tools_of_assembly(assembled)
+    return traveller, bench_html(assembled.assembly.name, sha256, GENERATOR, designs, tools)

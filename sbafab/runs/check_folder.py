@@ -43,7 +43,7 @@ from sbafab.models.prediction import predict
 from sbafab.nesting.records import NestPart, parts_of
 from sbafab.output.artefacts import (
     ARTEFACTS,
-    FINDINGS,
+    PAGES,
     TRAVELLER,
     DesignFolder,
     write_artefacts,
@@ -135,7 +135,7 @@ def _problems(
         index = _regenerate(folder, fresh, claims, checked, paths, None if of_job else parts)
         regenerated = {*file_names(fresh), *(layer["file"] for layer in index["layers"])}
         # The pages of a job's design show the sheets of the job, and are compared there.
-        excluded = (*BY_OTHER_COMMANDS, TRAVELLER, FINDINGS) if of_job else BY_OTHER_COMMANDS
+        excluded = (*BY_OTHER_COMMANDS, *PAGES) if of_job else BY_OTHER_COMMANDS
         problems.extend(_foreign_problems(claims, regenerated, excluded))
         problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
         problems.extend(_index_problems(folder, index, of_job))

@@ -32,8 +32,8 @@ LAID = re.compile(r"\b(TPE|PTFE) ([a-z ]+?) (P\d+)")
 ALONG = r"(?:([\d.]+) mm )?(on|outside|inside) that of the (?:TPE|PTFE) [a-z ]+ below"
 WHOLE = r", (all round(?: but for the tabs)?)"
 BY_HAND = re.compile(
-    r"No pin holds (P\d+)(?: in layers? ([^:]+))?: "
-    rf"lay by eye, (?:its|each) edge {ALONG}{WHOLE}"
+    r"(?:No|One) pin holds (P\d+)(?: in layers? ([^:]+))?: "
+    rf"(?:lay|turn) by eye, (?:its|each) edge {ALONG}{WHOLE}"
 )
 NUMBERED = re.compile(rf"Lay (?:its|each) edge (?:\(layer (\d+)\) )?(.*? below \(layer.*?){WHOLE}")
 STACK = re.compile(r"Lay the (?:stack|\d+ stacks) from step \d+ \(layers? ([^)]*)\)")
@@ -168,7 +168,7 @@ def _named(
 ) -> Iterator[Disagreement]:
     """What a line lays: as many names as layers, or as many as a turn has."""
     by_index = {layer.index: layer for layer in folder.layers}
-    named = LAID.findall(said.partition(" No pin holds")[0])
+    named = LAID.findall(re.split(r" (?:No|One) pin holds", said)[0])
     if not named:
         return
     for place, index in enumerate(indices):

@@ -23,6 +23,9 @@ DESIGN = {
 }
 
 
+PAGES = ("traveller.html", "bench.html")
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Patient:
     home = tmp_path_factory.mktemp("page")
@@ -35,11 +38,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Patient:
 
 @pytest.fixture
 def patient(made: Patient) -> Iterator[Patient]:
-    """The folder, its page put right again afterwards."""
-    path = made.folder / "traveller.html"
-    sound = path.read_bytes()
+    """The folder, its pages put right again afterwards."""
+    sound = {name: (made.folder / name).read_bytes() for name in PAGES}
     yield made
-    path.write_bytes(sound)
+    for name, data in sound.items():
+        (made.folder / name).write_bytes(data)
 
 
 def said(patient: Patient) -> list[str]:
@@ -73,6 +76,11 @@ FAULTS = {
     "another mask laid": ("PTFE chamber mask P02", "PTFE chamber mask P06", "laid as"),
     "a layer forgotten": (' data-layers="2"', "", r"step 1 lays [3], not [2, 3]"),
     "a mask laid too far out": ("its edge 0.5 mm outside", "its edge 0.6 mm outside", "lie 0.6"),
+    "a wall turned to another edge": (
+        r"turn by eye, its edge 0\.75 mm outside",
+        "turn by eye, its edge 0.85 mm outside",
+        "lie 0.85",
+    ),
     "a stack laid along another edge": (
         r"edge \(layer 3\) on that",
         "edge (layer 3) 0.5 mm outside that",
@@ -106,8 +114,10 @@ FAULTS = {
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_judge_sees(patient: Patient, fault: str) -> None:
     old, new, expected = FAULTS[fault]
-    path = patient.folder / "traveller.html"
-    page, times = re.subn(old, new, path.read_text(encoding="utf-8"))
-    assert times
-    path.write_text(page, encoding="utf-8")
+    changes = 0
+    for path in (patient.folder / name for name in PAGES):
+        page, times = re.subn(old, new, path.read_text(encoding="utf-8"))
+        path.write_text(page, encoding="utf-8")
+        changes += times
+    assert changes
     assert any(expected in sentence for sentence in said(patient)), said(patient)

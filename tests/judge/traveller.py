@@ -1,7 +1,7 @@
 """The traveller against the files: what is counted, cut, drilled and bought by its words.
 
-The page of one design is read as a technician reads it, by the headings of its tables and the
-sentences of its steps. Travellers of several designs on common sheets are not judged.
+The pages of one design are read as a technician reads them, by the headings of their tables and
+the sentences of the steps. Travellers of several designs on common sheets are not judged.
 """
 
 from __future__ import annotations
@@ -28,9 +28,12 @@ def judge_traveller(folder: Folder) -> Iterator[Disagreement]:
     path = folder.path / "traveller.html"
     if not path.is_file():
         return
-    text = path.read_text(encoding="utf-8")
-    yield from _nesting(text)
-    page = html.fromstring(text)
+    texts = [one.read_text(encoding="utf-8") for one in (path, folder.path / "bench.html")]
+    for text in texts:
+        yield from _nesting(text)
+    page, bench = map(html.fromstring, texts)
+    # The plate's holes are on the page of the bench.
+    page.append(bench)
     by_name = {part.pattern: part for part in parts(page)}
     of = {index: part.pattern for part in by_name.values() for index in part.layers}
     if sorted(of) != [layer.index for layer in folder.layers]:

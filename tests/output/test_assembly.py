@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -46,9 +47,10 @@ def test_a_folder_for_each_design_and_one_page_for_all(brace: Run) -> None:
     assert not brace.failed
     assert {path.name for path in brace.folder.iterdir()} == {
         *("radial-15mm", "3dof-15mm", "sheets", "mesh", "preview"),
-        *("traveller.html", "findings.html", "checks.json", "design.toml", "manifest.json"),
+        *("traveller.html", "bench.html", "findings.html"),
+        *("checks.json", "design.toml", "manifest.json"),
     }
-    assert not list(brace.folder.glob("*/traveller.html"))
+    assert not [*brace.folder.glob("*/traveller.html"), *brace.folder.glob("*/bench.html")]
     assert (brace.folder / "preview" / "assembled.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -129,6 +131,33 @@ def test_the_page_makes_every_design_and_joins_every_part(brace: Run) -> None:
     assert "laminated at once, as in the paper" in page
     assert "Not pressed together: radial-15mm and 3dof-15mm" in page
     assert "3M 1587" in page
+
+
+def test_no_pattern_of_two_designs_has_one_name(brace: Run) -> None:
+    """Both have a P03: in steps, tables and sheets it is told by its design's letter."""
+    tree = lxml_html.fromstring((brace.folder / "traveller.html").read_text(encoding="utf-8"))
+    for picture in tree.xpath("//svg[contains(@class, 'shapes')]"):
+        picture.drop_tree()
+    body = words(tree.find("body"))
+    assert {"A P03", "B P03"} <= set(re.findall(r"[AB] P\d+", body))
+    assert re.findall(r"(?<![AB] )\bP\d\d\b", body) == []
+    radial, tip = tree.find_class("chapter")
+    assert "B P" not in words(radial)
+    assert "A P" not in words(tip)
+
+
+def test_all_that_joining_takes_is_among_materials_and_tools(brace: Run) -> None:
+    tree = lxml_html.fromstring((brace.folder / "traveller.html").read_text(encoding="utf-8"))
+    rows = tree.get_element_by_id("materials").getparent().findall(".//tbody/tr")
+    bill = {words(row[1]): (words(row[2]), words(row[3])) for row in rows}
+    assert {"Thread", "Ecoflex 00-30 silicone", "Mould of “cup”"} <= set(bill)
+    assert bill["Tube (3dof-15mm)"][1] == "3 pieces + 1 spare"
+    moulds = re.findall(r"mesh/\S+\.stl", bill["Mould of “cup”"][0])
+    assert len(moulds) == 2
+    assert all(trimesh.load(brace.folder / path).is_watertight for path in moulds)
+    bench = lxml_html.fromstring((brace.folder / "bench.html").read_text(encoding="utf-8"))
+    tools = [words(row[1]) for row in bench.xpath("//section[@aria-labelledby='tools']//tbody/tr")]
+    assert any(tool.startswith("Protractor") for tool in tools)
 
 
 @pytest.mark.long

@@ -76,9 +76,9 @@ def test_the_bill_counts_what_the_batch_takes(run: Run) -> None:
     with (run.folder / "bill.csv").open(newline="") as file:
         bill = {row["item"]: row for row in csv.DictReader(file)}
     needed = {name: int(row["needed"] or 0) for name, row in bill.items()}
-    # A tube and a drop a copy; two release films each time that a cycle is pressed in
-    # a step, and one below films that are turned over.
-    assert (needed["Tube"], needed["Adhesive"]) == (COPIES, COPIES)
+    # A tube and a drop a copy, and a spare tube; two release films each time that a cycle is
+    # pressed in a step, and one below films that are turned over.
+    assert (needed["Tube"], needed["Adhesive"]) == (COPIES + 1, COPIES)
     assert (needed["Release film"], needed["Tray"], needed["Base plate"]) == (17, 2, 1)
     # 42 x 32 mm each.
     assert float(bill["Release film"]["area_m2"]) == pytest.approx(17 * 42 * 32 / 1e6, abs=5e-5)

@@ -200,7 +200,7 @@ def batch(tmp_path: Path, items: list[dict[str, Any]]) -> tuple[Path, Path]:
 
 
 def test_a_bill_says_what_the_stock_lacks(tmp_path: Path) -> None:
-    """20 actuators of one chamber take 20 tubes; two pins of 3 mm and two of 4 are told apart."""
+    """20 actuators of one chamber take 20 tubes and a spare one; pins are told apart by length."""
     items = [
         {"item": "tube", "specification": "RPT040", "count": 12},
         {"item": "Tube", "specification": "another tube", "count": 99},
@@ -211,7 +211,7 @@ def test_a_bill_says_what_the_stock_lacks(tmp_path: Path) -> None:
     folder, shelf = batch(tmp_path, items)
     needs = bill_against(folder, read_stock(shelf))
     counts = {need.item: (need.needed, need.in_stock, need.lacking) for need in needs}
-    assert counts["Tube"] == (20, 12, 8)
+    assert counts["Tube"] == (21, 12, 9)
     assert counts["Adhesive"] == (20, 21, 0)
     assert counts["TPE film"] == (1, 3, 0)
     pins = {need.specification[-40:]: need for need in needs if need.item == "Dowel pins"}
@@ -248,7 +248,7 @@ def test_the_command_writes_the_bill(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert ended.value.code == 0
     said = capsys.readouterr().out
     assert (
-        "Tube, Braintree RPT040, outer diameter 1.016 mm: 20 needed, 0 in stock, 20 lacking" in said
+        "Tube, Braintree RPT040, outer diameter 1.016 mm: 21 needed, 0 in stock, 21 lacking" in said
     )
     assert "items lacking" in said
     assert out.read_text(encoding="utf-8").startswith("item,specification,needed,in_stock,lacking")

@@ -13,6 +13,7 @@ from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
+from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.underlay import guides
@@ -27,14 +28,26 @@ def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
     return design, build(design)
 
 
-def page(sheet_files: Any, template: str, *assignments: str) -> Any:
+def work_of(sheet_files: Any, template: str, *assignments: str) -> Work:
     design, laminate = built(template, *assignments)
     plan = schedule(laminate, press_settings(design))
     fixture = "sheets/fixture.dxf" if laminate.pins else None
     underlay = "underlay.pdf" if guides(laminate) else None
-    job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay)
-    work = Work(design, laminate, plan, sheet_files(laminate), job)
+    job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay, copies=design.order.quantity)
+    sheets = sheet_files(laminate) if sheet_files is not None else ()
+    return Work(design, laminate, plan, sheets, job)
+
+
+def page(sheet_files: Any, template: str, *assignments: str) -> Any:
+    """The traveller of a template."""
+    work = work_of(sheet_files, template, *assignments)
     return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
+
+
+def bench(template: str, *assignments: str) -> Any:
+    """The page of its bench."""
+    work = work_of(None, template, *assignments)
+    return lxml_html.fromstring(bench_html(work.design.name, SHA, "sbafab 1.0.0", [work]))
 
 
 FIELDS = ("design", "laminate", "schedule", "sheets", "job")

@@ -14,7 +14,7 @@ ORDER = [field.label for field in HISTORY_FIELDS]
 
 
 def test_a_traveller_ends_with_the_record_page(sheet_files: Any) -> None:
-    [section] = page(sheet_files, "3dof-15mm").xpath("//section[@class='record-page']")
+    [section] = page(sheet_files, "3dof-15mm").xpath("//section[@aria-labelledby='record']")
     assert not section.xpath("./following::section")
     head = [words_of(label) for label in section.xpath(".//label")]
     assert head == ORDER[:2]

@@ -18,12 +18,13 @@ from sbafab.output.checked import limits, press_settings
 from sbafab.pressing.cycles import design_runs
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
+from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.bill import cut_list
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 from sbafab.reports.traveller.sheet_map import sheet_map
 from sbafab.rules.deck import run_deck
-from tests.reports.bench_pages import EARS, SHA, built, page, words_of
+from tests.reports.bench_pages import EARS, SHA, bench, built, page, words_of
 
 TPE, PTFE, BOND, OVERHANG = 0.038, 0.025, 0.75, 0.5
 
@@ -61,8 +62,8 @@ def test_minutes_of_another_temperature_are_not_pressed_without_a_word(sheet_fil
 
 
 @pytest.mark.parametrize("template", ["1dof-5mm", "3dof-15mm", "radial-15mm"])
-def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
-    words = words_of(page(sheet_files, template).get_element_by_id("press").getparent())
+def test_what_the_force_means_is_said(template: str) -> None:
+    words = words_of(bench(template))
     _, laminate = built(template)
     top = sum(
         shapely.Polygon(rings[0], rings[1:]).area
@@ -70,16 +71,16 @@ def test_what_the_force_means_is_said(sheet_files: Any, template: str) -> None:
     )
     assert "2555 N is 110 kPa on the whole platen of 152.4" in words
     assert "What the paper laid between platen and films is not known" in words
-    found = re.search(r"laminate alone \((\d+) mm²\) would be ([\d.]+) MPa", words)
+    found = re.search(r"laminate alone: ([\d.]+) MPa on the (\d+) mm²", words)
     assert found is not None
-    assert float(found[1]) == pytest.approx(top, abs=0.51)
-    assert float(found[2]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
+    assert float(found[2]) == pytest.approx(top, abs=0.51)
+    assert float(found[1]) == pytest.approx(110e-3 * 152.4**2 / top, abs=0.051)
 
 
 def test_pins_stand_over_the_stack_by_their_chamfer_at_least(sheet_files: Any) -> None:
     tree = page(sheet_files, "3dof-15mm")
     first, second, third, fourth = steps(tree)
-    depths = {row[1]: row[2] for row in hole_rows(tree)}
+    depths = {row[1]: row[2] for row in hole_rows(bench("3dof-15mm"))}
     for step, stack in ((first, TPE + PTFE), (third, 27 * TPE + 28 * PTFE)):
         pins = re.findall(
             rf"⌀(\d) {TIMES} (\d) mm, ([\d.]+) mm in the plate, ([\d.]+) to ([\d.]+) mm over it, "
@@ -99,7 +100,9 @@ def test_pins_stand_over_the_stack_by_their_chamfer_at_least(sheet_files: Any) -
     for without in (second, fourth):
         assert "over the stack" not in without
     for step in (first, second, third, fourth):
-        assert "press pad, flush with the platen all round. No second plate on top." in step
+        assert step.count("Cover and close the press") == 1
+    cover = "press pad, flush with the platen all round. No second plate on top."
+    assert words_of(tree).count(cover) == 1
 
 
 def hole_rows(tree: Any) -> list[list[str]]:
@@ -107,8 +110,8 @@ def hole_rows(tree: Any) -> list[list[str]]:
     return [[words_of(cell) for cell in row] for row in table.findall(".//tbody/tr")]
 
 
-def test_the_plate_says_how_its_holes_are_made_and_how_true(sheet_files: Any) -> None:
-    said = words_of(page(sheet_files, "3dof-15mm").get_element_by_id("cut").getparent())
+def test_the_plate_says_how_its_holes_are_made_and_how_true() -> None:
+    said = words_of(bench("3dof-15mm"))
     assert "on that shoulder the pin stands" in said
     assert "lap it to its own pins" in said
     assert (
@@ -117,13 +120,13 @@ def test_the_plate_says_how_its_holes_are_made_and_how_true(sheet_files: Any) ->
     )
     assert "The rules count 0.004 mm for both" in said
     mill = 'registration.plate_made_by="cnc-mill"'
-    said = words_of(page(sheet_files, "3dof-15mm", mill).get_element_by_id("cut").getparent())
+    said = words_of(bench("3dof-15mm", mill))
     assert "Ream it H7" in said
     assert "within 0.025 mm of its place" in said
     # 0.025 and half of H7's largest play with m6, 0.008.
     assert "up to 0.008 mm of play in its hole. The rules count 0.029 mm for both" in said
     # One pin alone may stand where it will.
-    said = words_of(page(sheet_files, "1dof-5mm").get_element_by_id("cut").getparent())
+    said = words_of(bench("1dof-5mm"))
     assert "a drill press is good enough, marked out to 0.2 mm. The rules count 0.004 mm" in said
 
 
@@ -144,7 +147,7 @@ def test_films_pins_and_paper_come_off_in_order(sheet_files: Any) -> None:
         assert places == sorted(places)
         assert len(tree.findall(".//ol/li")) >= len(order)
         for step in steps(tree):
-            parts = ["Close the press", "Pad off", "Upper release film off"]
+            parts = ["close the press", "Pad off", "upper release film off"]
             if "or more over the stack" in step:
                 parts += ["push the pins out of their seats (3)", "draw the pins (4)"]
             parts += ["Lower release film off", "You now hold"]
@@ -157,9 +160,8 @@ def test_films_pins_and_paper_come_off_in_order(sheet_files: Any) -> None:
         assert ("pins drawn up" in picture) == (template != "radial-15mm")
 
 
-def test_the_hole_table_has_every_pin_from_the_plates_corner(sheet_files: Any) -> None:
-    html = page(sheet_files, "3dof-15mm")
-    rows = hole_rows(html)
+def test_the_hole_table_has_every_pin_from_the_plates_corner() -> None:
+    rows = hole_rows(bench("3dof-15mm"))
     _, laminate = built("3dof-15mm")
     assert [row[0] for row in rows] == [pin.name for pin in laminate.pins]
     for row, pin in zip(rows, laminate.pins, strict=True):
@@ -173,13 +175,39 @@ def test_the_hole_table_has_every_pin_from_the_plates_corner(sheet_files: Any) -
     assert all(60 < value < 95 for value in shifts.pop())
 
 
-def test_each_step_draws_its_build_up(sheet_files: Any) -> None:
-    for number, step in enumerate(page(sheet_files, "3dof-15mm").iter("article"), 1):
-        drawn = step.findall(".//svg")[1]
-        assert drawn.get("aria-label").startswith(f"build-up of step {number}: press pad 15 mm")
-        words = words_of(drawn)
+def test_each_kind_of_build_up_is_drawn_once(sheet_files: Any) -> None:
+    """With pins in steps 1 and 3, on the printed page in steps 2 and 4."""
+    tree = page(sheet_files, "3dof-15mm")
+    drawn = [svg for svg in tree.iter("svg") if "build-up" in svg.get("aria-label", "")]
+    assert [words_of(svg.getnext()) for svg in drawn] == [
+        "Build-up as in steps 1 and 3.",
+        "Build-up as in steps 2 and 4.",
+    ]
+    for number, svg in enumerate(drawn, 1):
+        assert svg.get("aria-label").startswith(f"build-up of step {number}: press pad 15 mm")
+        words = words_of(svg)
         for part in ("upper platen", "press pad", "release film", "laminate", "base plate"):
             assert part in words
+        assert ("underlay" in words) == (number == 2)
+
+
+def test_a_mask_on_one_pin_is_turned_to_its_edge(sheet_files: Any) -> None:
+    """Separators turn about the lumen alone; walls have four pins, masks of pockets are discs."""
+    first, _, third, _ = steps(page(sheet_files, "3dof-15mm"))
+    edge = f"turn by eye, its edge {OVERHANG:g} mm outside that of the TPE wall"
+    assert f"One pin holds P04 in layer 4: {edge} above, all round." in third
+    assert f"One pin holds P04 in layers 8, 12, 16 … 52: {edge} below, all round." in third
+    assert f"Lay layer 56: PTFE separator mask P04. One pin holds P04: {edge} below" in third
+    assert third.count("One pin holds") == 3
+    # Each strip of the mask in pieces turns about the pin of its own chamber.
+    strips = f"each edge {BOND:g} mm inside that of the TPE wall above, all round but for the tabs."
+    assert f"One pin holds P02: turn by eye, {strips}" in first
+    # With ears all have two pins at least.
+    assert "One pin holds" not in words_of(page(sheet_files, "3dof-15mm", EARS))
+    # On a plate's only pin the lowest gives the angle, and the wall is turned to it.
+    one, *_ = steps(page(sheet_files, "1dof-5mm"))
+    assert "One pin holds P02" not in one
+    assert "One pin holds P03: turn by eye, its edge 0.75 mm outside that of the PTFE" in one
 
 
 def test_without_pins_each_edge_is_laid_along_another(sheet_files: Any) -> None:
@@ -256,11 +284,11 @@ def test_a_single_chamber_has_no_others(sheet_files: Any) -> None:
 def test_paper_counts_in_pin_heights_only_where_it_lies_below_pins(sheet_files: Any) -> None:
     """Step 3 of a single stack has pins in it and paper; of a tip no step has both."""
     one, three = (words_of(page(sheet_files, name)) for name in ("1dof-5mm", "3dof-15mm"))
-    allowed = "0.1 mm of paper, which the pin heights allow for"
+    allowed = "0.1 mm of paper as large as the plate, which the pin heights allow for"
     assert allowed in one
     assert allowed not in three
-    assert "pricks release film and underlay over the pins" in one
-    assert "pricks the release film over the pins" in three
+    assert "pricks release film and underlay over the pins" in words_of(bench("1dof-5mm"))
+    assert "pricks the release film over the pins" in words_of(bench("3dof-15mm"))
     assert "The print shows the edges of P04: lay by eye along them what no pin holds" in one
 
 
@@ -278,13 +306,15 @@ def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
         words = f"Start the clock, {minutes} min, only when the plate's edge reads 130 °C"
         assert words in step
         assert step.count("Start the clock") == 1
-        assert step.index("base plate down, cold") < step.index("Close the press")
+        assert step.index("Base plate down, cold") < step.index("close the press")
     press = words_of(tree.get_element_by_id("press").getparent())
     assert "Lay up on the plate while it is cold" in press
-    assert "platens' temperature, then lay up" not in press
-    assert "push it down on its pin" in first
-    assert "push it down on its pin" in third
-    assert "Has a mask slipped?" not in second
+    assert (
+        "Has a mask slipped? Lift what lies over it with tweezers, push it down on its pin" in press
+    )
+    # The masks of three stacks on a sheet have no pins.
+    radial = words_of(page(sheet_files, "radial-15mm").get_element_by_id("press").getparent())
+    assert "push it to its edge" in radial
     # Without a pin nothing is laid on one: it could not be had out from under loose films.
     for step in (second, fourth):
         assert "lumen" not in step
@@ -312,7 +342,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     # Three steps, one copy: three prints. Tape, trim line and toner are said.
     assert "A fresh print for each of 3 closings" in whole
     assert "polyimide tape (silicone adhesive, rated 260 °C)" in whole
-    assert "cut out along its dotted line" in whole
+    assert "is cut out along its dotted line" in whole
     assert "Toner on the underlay: laser toner softens in the press" in whole
 
 
@@ -459,7 +489,8 @@ def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
     )
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf", copies=90)
-    words = words_of(lxml_html.fromstring(traveller_html(design, laminate, plan, [], job)))
+    work = Work(design, laminate, plan, [], job)
+    words = words_of(lxml_html.fromstring(bench_html("full", SHA, "sbafab 1.0.0", [work])))
     found = re.search(
         r"rows of (\d+): .* next ([\d.]+) mm to the right, .* next ([\d.]+) mm", words
     )

@@ -43,12 +43,15 @@ def test_every_press_step_has_its_pad_its_pins_and_one_time() -> None:
     first, last = steps()
     for step, minutes in ((first, 10), (last, 20)):
         # Without the pad the force would lie on the sheets alone.
-        assert "Cover with a release film and the press pad" in step
+        assert "Cover and close the press" in step
         assert step.count("Start the clock") == 1
         assert f"Start the clock, {minutes} min, only when the plate's edge reads 130" in step
         assert "every pin reaches through the highest sheet" in step
         assert "do not stand higher" not in step
-    assert "Set the pins on the shoulders of their holes" in first
+    assert "pins in on their shoulders, heights gauged" in first
+    press = words_of(tree().get_element_by_id("press").getparent())
+    assert "Cover with a release film and the press pad" in press
+    assert "Set the pins on the shoulders of their holes" in press
     assert last.index("pad off") < last.index("Pins out") < last.index("Take off the lower release")
     # The stack stays on its pins, so that they are set once, for the highest stack.
     heights = {

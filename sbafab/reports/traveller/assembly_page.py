@@ -6,33 +6,33 @@ import math
 import re
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from string import ascii_uppercase
 from typing import Any
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.assemblies.checks import supply_runs
 from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
-from sbafab.assemblies.shapes import colours
+from sbafab.assemblies.shapes import colours, own_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.models.formulas import inflated_diameter, reached_diameter
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import joined_words
+from sbafab.pressing.work_plan import plan_times
 from sbafab.reports.html_templates import environment
-from sbafab.reports.traveller import base_plate, bench, bill, units
-from sbafab.reports.traveller.bench import Tool, before_the_day, tools
-from sbafab.reports.traveller.bill import Item
-from sbafab.reports.traveller.job import Action, Work
+from sbafab.reports.traveller import bench, bill, process, units
+from sbafab.reports.traveller.bench import Tool
+from sbafab.reports.traveller.bill import THREAD, Item
+from sbafab.reports.traveller.job import HERE, Action, Work, frame
 from sbafab.reports.traveller.page import (
-    HERE,
     cautions,
     code_svg,
     context,
     for_the_designer,
-    frame,
     record_text,
     sheet_rows,
+    to_be_ready,
 )
 from sbafab.reports.traveller.shapes import definitions, pattern_regions
 from sbafab.reports.traveller.sheet_map import part_regions
@@ -81,7 +81,8 @@ class AssemblyJob:
 
 
 def assembly_html(job: AssemblyJob) -> str:
-    """Return the whole page."""
+    """Return the whole page, each pattern named with the mark of its design."""
+    job = _with_marks(job)
     name = job.assembled.assembly.name
     text = record_text(name, job.sha256, job.generator)
     works = [one.work for one in job.works]
@@ -100,11 +101,12 @@ def assembly_html(job: AssemblyJob) -> str:
             tested=[name for build in job.assembled.designs for name in build.parts],
             cautions=_cautions(job),
             bill=_bill(job),
-            before_the_day=[*before_the_day(works), *_castings(job.assembled)],
-            tools=[*tools(works), *_test_tools(job.assembled)],
+            **to_be_ready(works),
+            castings=_castings(job.assembled),
             before_cutting=bench.before_cutting(works),
             after_cutting=bench.after_cutting(works),
-            sheet_rows=sheet_rows(works[0].design, job.sheets, _marks(job)),
+            sheet_rows=sheet_rows(works[0].design, job.sheets, dict.fromkeys(_marks(job), "")),
+            program=works[0].design.sheets.program,
             laser_minutes=bill.laser_minutes(works[0]),
             laser_basis=bill.laser_basis(works[0]),
             press_plan=[_press_words(one) for one in job.works],
@@ -114,11 +116,11 @@ def assembly_html(job: AssemblyJob) -> str:
                 _chapter(one, number, _marks(job)[one.name])
                 for number, one in enumerate(job.works, 1)
             ],
+            press_rows=[(one, process.step_rows(one.work)) for one in job.works],
             joins=join_pages(job.assembled),
             finals=final_checks(job.assembled),
             times=_times(job),
-            kerf_notes=list(dict.fromkeys(n for work in works for n in bill.kerf_notes(work))),
-            expected_sizes=list(dict.fromkeys(s for w in works for s in bill.expected_sizes(w))),
+            kerf_notes=bill.kerf_notes(works),
         )
     )
 
@@ -133,19 +135,47 @@ def _chapter(design: DesignWork, number: int, mark: str) -> str:
         environment(HERE)
         .get_template(CHAPTER)
         .render(
-            **page | _again(design, number),
+            **page | {"in_chapter": True, "again": number > 1},
             runs=design.runs,
             press_words=_press_words(design),
-            number=number,
             mark=mark,
         )
     )
     return _NAMES.sub(rf"\g<1>d{number}-", html)
 
 
-def _again(design: DesignWork, number: int) -> dict[str, tuple[str, ...]]:
-    """Return the build-up in short, as the first chapter has given it in full."""
-    return {} if number == 1 else {"force_notes": base_plate.build_up_again(design.work)}
+def _with_marks(job: AssemblyJob) -> AssemblyJob:
+    """Return the job with "A P03" for P03 of its first design, on sheets and in laminates; a single
+    design's patterns need no mark.
+    """
+    marks = _marks(job)
+    if len(marks) == 1:
+        return job
+    sheets = [
+        replace(
+            sheet,
+            counts=tuple(
+                (name, f"{marks[name]} {pattern}", n) for name, pattern, n in sheet.counts
+            ),
+            nest=replace(
+                sheet.nest,
+                parts=tuple(
+                    replace(part, pattern=f"{marks[part.design]} {part.pattern}")
+                    for part in sheet.nest.parts
+                ),
+            ),
+        )
+        for sheet in job.sheets
+    ]
+    works = []
+    for one in job.works:
+        layers = tuple(
+            replace(layer, pattern=f"{marks[one.name]} {layer.pattern}")
+            for layer in one.work.laminate.layers
+        )
+        laminate = replace(one.work.laminate, layers=layers)
+        works.append(replace(one, work=replace(one.work, laminate=laminate, sheets=sheets)))
+    return replace(job, works=works, sheets=sheets)
 
 
 def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
@@ -189,20 +219,10 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
     """Return films of all designs together, each design's other items, and what is bought."""
     items = _films(job)
     for design in job.works:
-        items += [
-            _named(item, design) for item in bill.bill(design.work) if not _is_elsewhere(item)
-        ]
+        # Films are summed over the designs, and what a sheet is wrapped with is a part here.
+        items += [_named(item, design) for item in bill.bill(design.work) if item.kind == "other"]
     items += bought(job.assembled, job.copies)
     return list(dict.fromkeys(items))
-
-
-def _is_elsewhere(item: bill.Item) -> bool:
-    """Return True for films, which are summed over the designs, and for the tube to wrap, a part
-    here.
-    """
-    name, _, rest = item.name.partition(" ")
-    is_film = name.isupper() and rest == "film"
-    return is_film or item.name in ("Tube to wrap", "Adhesive of the wrap")
 
 
 def _named(item: bill.Item, design: DesignWork) -> bill.Item:
@@ -279,6 +299,7 @@ def _not_together(job: AssemblyJob) -> str:
 def _times(job: AssemblyJob) -> list[bill.Time]:
     rows: list[bill.Time] = []
     total: float | None = 0.0
+    waited = cure = 0.0
     for design in job.works:
         plan, runs = design.work.schedule, design.runs
         pressed = units.product(runs.count, plan.total_press_minutes)
@@ -290,18 +311,31 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
             f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
         rows.append(bill.Time(f"Making {design.name}", units.minutes(whole), made_of))
+        each = plan_times(design.work.design, design.work.laminate, plan)
+        waited += runs.count * len(plan.steps) * (each.warm + each.cool)
+        cure = max(cure, each.cure)
     laser = units.minutes(bill.laser_minutes(job.works[0].work))
     basis = bill.laser_basis(job.works[0].work)
     rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
-    rows.append(
-        bill.Time(
-            "Total, without joining",
-            units.whole_minutes(total),
-            "not included: heating the press, warming the plate, leak and proof tests, gluing and "
-            "curing, for which the paper gives no times",
-        )
+    basis = "estimate, each plate after the other; warming the press comes before"
+    rows.append(bill.Time("Warming and cooling", units.minutes(waited), basis))
+    return [*rows, _total_time(job, None if total is None else total + waited, cure)]
+
+
+def _total_time(job: AssemblyJob, worked: float | None, cure: float) -> bill.Time:
+    """Return the days until all actuators are tested, and what comes after."""
+    hours = units.hours(None) if worked is None else f"{worked / 60:.1f} h"
+    joints = sum(placed.part.on is not None for placed in job.assembled.parts)
+    basis = (
+        f"{hours} until all tubes are glued; {cure / 60:g} h for their adhesive, "
+        f"then the tests; then {units.count(joints, 'joint')}, each cured as its package says "
+        "before the next"
     )
-    return rows
+    shift = 60 * job.works[0].work.design.order.shift_hours
+    days = units.BLANK
+    if worked is not None:
+        days = f"{math.ceil(worked / shift) + max(1, math.ceil(cure / bill.DAY))}"
+    return bill.Time("Total, without joining", f"{days} days", basis)
 
 
 # Joining, part by part.
@@ -389,8 +423,7 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
     elif isinstance(part, Magnet):
         yield Action(
             f"Measure {part.part}: {units.millimetres(part.diameter)} across, "
-            f"{units.millimetres(part.thickness)} thick. If it differs, change the assembly's file "
-            "and generate again."
+            f"{units.millimetres(part.thickness)} thick. If it differs, tell the designer."
         )
         yield Action(
             "Bring it near the outer magnet, which will hold it through the wall, and mark the "
@@ -398,10 +431,15 @@ def _ready(placed: PlacedPart) -> Iterator[Action]:
         )
     elif isinstance(part, Cup):
         yield Action(
-            f"Cast the cup in {part.material} as its package says: rim "
-            f"{units.millimetres(part.diameter)}, neck {units.millimetres(part.neck)}, height "
-            f"{units.millimetres(part.height)}, wall {units.millimetres(part.wall)}, hole for the "
-            f"line {units.millimetres(part.bore)}."
+            f"Print mesh/mould_{placed.name}_lower.stl and mesh/mould_{placed.name}_upper.stl, not "
+            "in resin, which may keep the silicone from curing. Fill the lower half, rim up, with "
+            f"{part.material} mixed and freed of air as its package says; press the upper half in "
+            "until both halves meet all round, let it cure, take the cup out. (Ours, not tried.)"
+        )
+        yield Action(
+            f"Measure it: rim {units.millimetres(part.diameter)}, neck "
+            f"{units.millimetres(part.neck)}, height {units.millimetres(part.height)}, wall "
+            f"{units.millimetres(part.wall)}, hole for the line {units.millimetres(part.bore)}."
         )
     elif isinstance(part, Line):
         yield Action(
@@ -615,18 +653,20 @@ def _leak_pressures(actuators: Sequence[PlacedSba]) -> str:
     return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
 
 
-def _castings(assembled: Assembled) -> list[Action]:
+def _castings(assembled: Assembled) -> list[str]:
     """Return what must have cured before the day on which parts are joined."""
     names = [placed.name for placed in assembled.parts if isinstance(placed.part, Cup)]
     cast = f"{joined_words(names)}: cast and cured as its section under Join the parts says."
-    return [Action(cast)] if names else []
+    return [cast] if names else []
 
 
-def _test_tools(assembled: Assembled) -> list[Tool]:
-    """Return what the joining and the tests of the finished assembly take."""
+def tools_of_assembly(assembled: Assembled) -> list[Tool]:
+    """Return the tools for the joining and the tests of the finished assembly."""
     deploy = assembled.assembly.deploy
     kinds = {type(placed.part) for placed in assembled.parts}
-    rows = []
+    rows = [Tool("Protractor, pen, steel rule", "marks and angles of the parts")]
+    if Cup in kinds:
+        rows.append(Tool("3D printer; scales, vacuum chamber", "mould and casting of the cup"))
     if Magnet in kinds:
         rows.append(Tool("Outer magnet", "finds the face to turn outward; test of the assembly"))
     if Line in kinds or Cup in kinds:
@@ -686,12 +726,31 @@ def _across(placed: PlacedSba) -> str | None:
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:
     """Return rows of the bill of materials for what is not cut from film."""
-    items = [_item(placed, copies) for placed in assembled.parts if placed.made is None]
+    items = [item for placed in assembled.parts for item in _items(placed, copies)]
+    if any(placed.made is not None and placed.made.laminate.inlets for placed in assembled.parts):
+        items.append(THREAD)
     glues = dict.fromkeys(filter(None, map(_adhesive, assembled.parts)))
     for glue in glues:
         joints = [placed.name for placed in assembled.parts if _adhesive(placed) == glue]
         items.append(Item("Adhesive", f"{glue}, for {joined_words(joints)}", "as needed"))
     return items
+
+
+POUR = 10.0
+"""ml of silicone that can be weighed and mixed well: ours."""
+
+
+def _items(placed: PlacedPart, copies: int) -> Iterator[Item]:
+    """Yield what is bought for a part, and for a cup what it is cast from and in."""
+    if placed.made is not None:
+        return
+    yield _item(placed, copies)
+    if isinstance(placed.part, Cup):
+        takes = own_surface(placed).volume / 1000 * copies
+        words = f"both parts of it; the cup takes {takes:.2g} ml"
+        yield Item(placed.part.material, words, f"{max(POUR, 2 * takes):.0f} ml")
+        mould = f"mesh/mould_{placed.name}_lower.stl and mesh/mould_{placed.name}_upper.stl"
+        yield Item(f"Mould of “{placed.name}”", f"printed: {mould}", "1")
 
 
 def _item(placed: PlacedPart, copies: int) -> Item:

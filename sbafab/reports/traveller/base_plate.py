@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from typing import NamedTuple
 
-from sbafab.cutting.fixture import plate_corner
-from sbafab.laminate.base_plate import HOLE_PROCESSES, most_play
+from sbafab.cutting.fixture import plate_corner, whole_plate
 from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Pin
-from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD, RELEASE, UNDERLAY, pad_sheets
+from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import PinHole, pin_holes, push_out
 from sbafab.pressing.schedule import (
     Schedule,
@@ -87,6 +86,15 @@ def holes(work: Work) -> list[PlateHole]:
     ]
 
 
+def size(work: Work) -> str:
+    """Return the base plate's size in words."""
+    press = work.design.press
+    low_x, low_y, high_x, high_y = whole_plate(
+        work.laminate, (press.platen_width, press.platen_length), work.runs.places
+    ).bounds
+    return units.size(high_x - low_x, high_y - low_y)
+
+
 def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
     """Return depth, push-out hole and pins of a hole, as the table has them."""
     if hole is None:
@@ -98,55 +106,6 @@ def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
 def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
     tacks = [] if plan.tacking is None else [plan.tacking.pins]
     return pin_holes([*(step.pin_settings for step in plan.steps), *tacks])
-
-
-def plate_notes(work: Work) -> tuple[str, ...]:
-    """Return how the plate's holes are made, how true they are, and what the rules count for it."""
-    design = work.design
-    registration = design.registration
-    making = HOLE_PROCESSES[registration.plate_made_by]
-    several = len(work.laminate.pins) > 1
-    counted = design.pin_error if several else design.lone_pin_error
-    play = most_play(design.thickest_pin, registration.plate_made_by)
-    fit = (
-        "Bore it 0.005 to 0.01 too narrow and lap it to its own pins, until they go in by hand "
-        "without shake; mark which pins are whose"
-        if making.is_lapped and several
-        else "Ream it H7; choose pins of the pack that go in by hand or with light taps"
-    )
-    how = (
-        "Base plate, as large as the platen. Each hole: drill it through at the push-out diameter; "
-        "widen it from above down to the depth, flat at the bottom: on that shoulder the pin "
-        f"stands. {fit}. Deburr, no more: a burr lifts films. The file has nominal edges."
-    )
-    if not several:
-        return how, (
-            "All layers register on this one pin, so its place on the plate does not matter: a "
-            "drill press is good enough, marked out to 0.2 mm. The rules count "
-            f"{counted:g} mm for its play."
-        )
-    return how, (
-        f"Each hole within {making.position:g} mm of its place in the table, in any direction: "
-        f"which takes {making.words} (registration.plate_made_by). A pin has up to {play:g} mm of "
-        f"play in its hole. The rules count {counted:g} mm for both."
-    )
-
-
-def _underlay_words(work: Work) -> str:
-    """Return the sentences on the underlay; empty where no step has one."""
-    steps = [step.step for step in work.schedule.steps if has_underlay(step)]
-    if not steps:
-        return ""
-    which = joined_words([str(number) for number in steps])
-    thick = units.millimetres(work.design.press.underlay_thickness)
-    pricked = any(has_underlay(step) and step.pin_settings for step in work.schedule.steps)
-    pins = ", which the pin heights allow for" if pricked else ""
-    return (
-        f" In step{'s' if len(steps) > 1 else ''} {which} a fresh print of the underlay, cut out "
-        f"along its dotted line, lies between plate and release film while the press is closed: "
-        f"{thick} of paper{pins}. As large as the plate, it does not change the pressure. Its left "
-        f"and right edges are taped down with {TAPE}, off the films."
-    )
 
 
 def has_underlay(step: Step) -> bool:
@@ -184,45 +143,6 @@ def turns_over(work: Work) -> bool:
     return work.laminate.panel is None and any(s.pin_settings for s in work.schedule.steps)
 
 
-def build_up_notes(work: Work) -> tuple[str, ...]:
-    """Return the one build-up of all steps, and what its force means."""
-    step = work.schedule.steps[-1]
-    thick = {item.part: item for item in step.build_up}
-    newtons, kilopascals = f"{step.force_n:.0f} N", f"{step.pressure_kpa:g} kPa"
-    size = units.size(*step.platen_mm)
-    plate, pad, release = thick[BASE_PLATE], thick[PAD], thick[RELEASE]
-    together = work.runs.together
-    alone = together * work.laminate.layers[-1].profile.area
-    laminates = "laminate" if together == 1 else f"{together} laminates"
-    holes = "has no holes, pins press into it, and it " if work.laminate.pins else ""
-    return (
-        "Every step has the same build-up, from the lower platen up: base plate "
-        f"({plate.material}, {units.millimetres(plate.thickness_mm)}, {size}, as large as the "
-        f"platen), release film ({release.material}), {LAMINATE}, release film, press pad "
-        f"({pad.material}, {units.millimetres(pad.thickness_mm)}, as large as the platen), upper "
-        f"platen. Nothing rigid lies on the films: no second plate.{_underlay_words(work)}",
-        f"{newtons} is {kilopascals} on the whole platen of {size}; the paper gives no force. The "
-        f"pad brings it to the films; without it {newtons} on the {laminates} alone ({alone:.0f} "
-        f"mm²) would be {step.force_n / alone:.1f} MPa. What the paper laid between platen and "
-        "films is not known. The pressures at each step are estimates that no press has confirmed: "
-        "check them once, cold, with pressure-indicating film.",
-        f"The pad {holes}insulates: films are heated from below, through the base plate. Lay up on "
-        "the plate while it is cold, out of the press; it warms with the films on it, and each "
-        "step's clock starts when it is hot.",
-    )
-
-
-def build_up_again(work: Work) -> tuple[str, ...]:
-    """Return the build-up in short, where another design's page has given it in full."""
-    thick = {item.part: item for item in work.schedule.steps[-1].build_up}
-    plate, pad = thick[BASE_PLATE], thick[PAD]
-    return (
-        "Build-up, force and heating are those of the first Press section, with a press pad of "
-        f"{units.millimetres(pad.thickness_mm)} ({pad.material}) and a base plate of "
-        f"{units.millimetres(plate.thickness_mm)}; each step states the pressure on the films.",
-    )
-
-
 RELEASE_FILM = "Release film"
 
 
@@ -240,7 +160,7 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
     piled = f", a pile of {sheets} sheets" if sheets > 1 else ""
     turned = "; one of them for films that are turned over" if turns_over(work) else ""
     holes = (
-        f"; stepped holes from {work.job.fixture} and the hole table"
+        f"; stepped holes from {work.job.fixture} and the table in bench.html"
         if work.job.fixture is not None
         else "; no holes"
     )

@@ -224,8 +224,8 @@ def _plan_basis(work: Work) -> str:
     """Return how far the plan can be trusted, or why there is none."""
     if work.schedule.total_press_minutes is None:
         return (
-            "No plan: nobody stated the minutes in the press for this film (press.minutes_for). "
-            "Generate again once they are known."
+            "No plan: nobody stated the minutes in the press for this film. Tell the designer once "
+            "they are known."
         )
     if not work.schedule.steps:
         return "No plan: nothing is pressed, and nobody stated how fast the seams are made."
@@ -233,9 +233,9 @@ def _plan_basis(work: Work) -> str:
     times = plan_times(work.design, work.laminate, work.schedule)
     holds = most_together(work.laminate, _platen(work))
     at_press = 1 - CUT_SHARE - SORT_SHARE - TUBES_SHARE
-    cure = "the kit's" if cure_hours(work.design) else "ours, read its package: order.cure_hours"
-    cure = "order.cure_hours" if order.cure_hours else cure
-    cool = "measured" if work.design.press.cool_minutes else "an estimate: set press.cool_minutes"
+    cure = "the kit's" if cure_hours(work.design) else "ours: read its package"
+    cure = "as ordered" if order.cure_hours else cure
+    cool = "measured" if work.design.press.cool_minutes else "an estimate"
     warm = "measured" if work.schedule.heating.time_constant_minutes else "an estimate"
     resources = (
         units.count(shop.technicians, "technician"),
@@ -244,10 +244,10 @@ def _plan_basis(work: Work) -> str:
         "one laser",
     )
     return (
-        f"{', '.join(resources)}, shifts of {order.shift_hours:g} h (order.technicians, presses, "
-        "base_plates, shift_hours). A cycle takes no more copies than one person makes in such a "
-        f"shift (the plate has room for {holds}). All sheets are cut and sorted first, as the "
-        f"parts of all cycles lie on them. The minutes are estimates: {times.hands:g} of handling "
+        f"{', '.join(resources)}, shifts of {order.shift_hours:g} h; if it is otherwise, tell the "
+        "designer. A cycle takes no more copies than one person makes in such a shift (the plate "
+        f"has room for {holds}). All sheets are cut and sorted first, as the parts of all cycles "
+        "lie on them. The minutes are estimates: {times.hands:g} of handling "
         f"for each copy, the paper's total less its time in the press"
         f"{'' if work.schedule.is_timed else ' (nobody has timed drawn layers)'}; of these "
         f"{CUT_SHARE:.1%} at the laser, {SORT_SHARE:.1%} to wipe and sort, {TUBES_SHARE:.0%} for "

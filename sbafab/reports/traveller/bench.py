@@ -1,4 +1,4 @@
-"""Practice at the bench: cutting and laying films, heating the plate, pressure, preparation, tools.
+"""bench.html: what is made, measured and read once for a bench; and practice that each page needs.
 
 All of it is ours; the paper gives none.
 """
@@ -6,20 +6,25 @@ All of it is ours; the paper gives none.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 from sbafab.design.sections import HoldDown
-from sbafab.laminate.assembly import AssemblyStep, distinct_layers
+from sbafab.laminate.base_plate import (
+    HOLE_PROCESSES,
+    HoleProcess,
+    for_a_cnc_mill,
+    most_play,
+    pin_error,
+)
 from sbafab.laminate.films import Film
-from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.plate_heating import END, MELTING, PATIENCE, START, Heating, HeatPoint
 from sbafab.pressing.schedule import Step, joined_words
+from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import base_plate, units
 from sbafab.reports.traveller.base_plate import punch
 from sbafab.reports.traveller.bill import kerf_states
-from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.underlay import guides
+from sbafab.reports.traveller.job import HERE, Action, Work, frame
 from sbafab.rules.pin_fit import NAME as PIN_FIT
 from sbafab.rules.pin_fit import most_on_a_pin
 
@@ -184,51 +189,6 @@ def _loose(work: Work) -> tuple[int, int]:
     return loose, spare
 
 
-def underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """Return the printed page below the release film, in steps in which it has a line to lay by.
-
-    One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
-    """
-    patterns = [
-        pattern
-        for guide in guides(work.laminate)
-        if part.number in guide.steps
-        for pattern in guide.patterns
-    ]
-    if work.job.underlay is None or not patterns:
-        return []
-    film, over = "a see-through release film", "flush with the plate's edges"
-    eye = ": lay by eye along them, as each line says"
-    if part.pins:
-        film, over = f"{film}, pricked likewise", "pricked at its grey rings over the pins"
-        eye = ": lay by eye along them what no pin holds"
-    return [
-        Action(
-            f"Tape a fresh print of {work.job.underlay} to the plate, {over}, cut corner at the "
-            f"back right; over it {film}. The print shows the edges of "
-            f"{joined_words(patterns)}{eye}."
-        )
-    ]
-
-
-def reseat(laminate: Laminate, adds: Sequence[int], pinned: bool) -> list[Action]:
-    """Return the remedy for a mask that has slipped; empty for a step that lays none."""
-    if not any(layer.is_mask for layer in distinct_layers(laminate, adds)):
-        return []
-    home = "down on its pin" if pinned else "to its edge"
-    return [
-        Action(
-            f"Has a mask slipped? Lift what lies over it with tweezers, push it {home}, lay the "
-            "rest back and stroke it flat. Once pressed it cannot be moved: cut a new one."
-        )
-    ]
-
-
-def closing(step: Step, heating: Heating, cycles: tuple[str, ...] = ()) -> Action:
-    """Return start of the clock, as the plate goes in cold; a box for each of the ``cycles``."""
-    return Action(closing_words(step, heating), (), cycles)
-
-
 # Warming of the plate: the time-temperature line and its blanks.
 
 
@@ -270,78 +230,7 @@ def _constants(point: HeatPoint, heating: Heating) -> str:
     return f"{heating.constants_to(point.edge_c):.2f} τ"
 
 
-def note(work: Work) -> str:
-    """Return what the paper states of time, what we add, and the line that all steps share."""
-    heating = work.schedule.heating
-    platens, warms = heating.platen_c, heating.platen_c - heating.start_c
-    points = work.schedule.steps[0].time_temperature
-    [start] = [point for point in points if point.point == START]
-    words = (
-        "Time. The paper gives 135 °C and minutes for each step; it does not say when its clock "
-        "starts. Ours: plate and films go in cold, and the clock starts when a thermocouple taped "
-        f"to the plate's edge reads {heating.clock_c:g} °C, not before. A first-order estimate of "
-        f"that edge is T = {platens:g} - {warms:g} exp(-t/τ) °C from {heating.start_c:g} °C, τ of "
-        f"this bench {units.plain(heating.time_constant_minutes)} min (measured as in Before the "
-        "day). After closing, "
-    )
-    starts = f"the clock starts after {_after(start, heating)}"
-    if heating.melting_c is None:
-        words += f"{starts}; the films' melting point is not known."
-    else:
-        [melting] = [point for point in points if point.point == MELTING]
-        molten = (start.after_constants or 0.0) - (melting.after_constants or 0.0)
-        words += (
-            f"the films' melting point, {heating.melting_c:g} °C, is reached after "
-            f"{_after(melting, heating)}, and {starts}: the films are above it for {molten:.2f} τ "
-            "before the clock starts."
-        )
-    return words + (
-        f" Where the edge does not read {heating.clock_c:g} °C within {PATIENCE:g} τ "
-        f"({_patience(heating)}): do not start the clock. Open the press, set these films aside as "
-        "a sample (how long they were hot is not known) and find the cause as in Before the day."
-    )
-
-
-def _after(point: HeatPoint, heating: Heating) -> str:
-    return f"{_constants(point, heating)} = {units.minutes(point.after_minutes)}"
-
-
-def closing_words(step: Step, heating: Heating) -> str:
-    """Return when the clock of a step starts; one line of the page."""
-    return (
-        f"Close the press. Start the clock, {units.minutes(step.minutes)}, only when the plate's "
-        f"edge reads {heating.clock_c:g} °C (see Time, above)."
-    )
-
-
-def _patience(heating: Heating) -> str:
-    tau = heating.time_constant_minutes
-    return units.minutes(None if tau is None else PATIENCE * tau)
-
-
-def heating_lines(heating: Heating, steps: int) -> Iterator[str]:
-    """Yield how τ is measured, and what to do where the plate's edge stays too cold."""
-    hot, ready = units.temperature(heating.platen_c), units.temperature(heating.clock_c)
-    reach = heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1)
-    yield (
-        "Time constant τ of the plate, once for a bench: lay the whole build-up without films, "
-        f"plate at {heating.start_c:g} °C, a thermocouple taped to its edge; close it between "
-        f"platens at {hot} and log the reading every half minute. τ is the time to {reach:.0f} "
-        "°C, 63 % of the way: ________ min. Set press.time_constant to it. Add "
-        f"{heating.constants_to(heating.clock_c):.2f} τ to each of the "
-        f"{units.count(steps, 'press step')}."
-    )
-    yield (
-        f"Edge temperature after {PATIENCE:g} τ: ________ °C. It must be {ready} or more. If it is "
-        "less, check that the thermocouple reads 100 °C in boiling water (at sea level) and is "
-        "taped down, that both platens reach their set temperature by the same thermocouple, that "
-        "the plate lies flat and that the pad covers it. Then set the platens hotter by the "
-        f"difference, {MOST_RAISED:g} °C at most: ________ °C, and measure again. If more is "
-        "missing, do not press."
-    )
-
-
-# Resolution of the press's gauge and of a pressure-indicating film.
+# Pressure-indicating film.
 
 
 class FilmClass(NamedTuple):
@@ -361,8 +250,6 @@ FILM_CLASSES = (
 """Two-sheet films of Fujifilm Prescale, by the ranges that its maker lists as far as we know: the
 list was not opened, so the page has them compared with the box."""
 COLD = "checks the pressure once, cold; compare this range with its box"
-WANTED = 0.05
-"""Share to which a gauge should set the pressure: ours."""
 
 
 def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
@@ -391,22 +278,138 @@ def film_words(works: Sequence[Work]) -> str:
     )
 
 
-def notes(work: Work) -> tuple[str, ...]:
-    """Return what a reading of the press's gauge is worth on the platen."""
-    step = work.schedule.steps[0]
-    pound = step.pressure_kpa / step.force_n * units.NEWTONS_PER_POUND
-    finest = 2 * WANTED * step.pressure_kpa / pound
-    return (
-        f"The gauge must read {units.force(step.force_n)}; 1 lbf is {pound:.2g} kPa. Read to half "
-        f"a division, a gauge sets {step.pressure_kpa:g} kPa to {WANTED:.0%} if it has a division "
-        f"every {finest:.0f} lbf ({finest * units.NEWTONS_PER_POUND:.0f} N) or finer; the "
-        "divisions of the paper's press (Carver 5420) are not known to us. With a coarser gauge, "
-        "set the force by a load cell between the platens, cold, and mark the gauge.",
+# The page.
+
+
+TEMPLATE = "bench.html.j2"
+NAME = "bench.html"
+WANTED = 0.05
+"""Share to which a gauge should set the pressure: ours."""
+
+
+class BasePlatePage(NamedTuple):
+    """The base plate of a design: its file, how true its holes are made, their table.
+
+    ``counted`` mm is what the rules count for it, ``coarse`` what they would for a CNC mill's;
+    ``command`` changes the design for that one, empty where its plate needs no better machine.
+    """
+
+    name: str
+    file: str
+    size: str
+    several: bool
+    making: HoleProcess
+    play: float
+    counted: float
+    coarse: float
+    command: str
+    holes: list[base_plate.PlateHole]
+    places: list[base_plate.PlatePlace]
+    grid: str
+
+
+class Pressed(NamedTuple):
+    """A design's press steps, and what the force would be on its laminate alone."""
+
+    name: str
+    steps: tuple[Step, ...]
+    alone: str
+
+
+def bench_html(
+    title: str,
+    sha256: str,
+    generator: str,
+    works: Sequence[Work],
+    further_tools: Sequence[Tool] = (),
+) -> str:
+    """Return the page of what is done once for a bench, for all designs of a folder."""
+    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
+    materials = list(dict.fromkeys(film.material for film in films))
+    nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
+    hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
+    pressed = [work for work in works if work.schedule.steps]
+    page = frame(title, sha256, generator)
+    values = {
+        "nominal": joined_words(nominal),
+        "warned": joined_words([film.material for film in films if film.warning]),
+        "plates": [_plate(work) for work in works if work.job.fixture is not None],
+        "cnc": HOLE_PROCESSES["cnc-mill"],
+        "unknown_kerf": works[0].design.laser.unknown_kerf,
+        "loupe": min((hand.hand_placement for hand in hands), default=None),
+        "prints": any(work.job.underlay is not None for work in works),
+        "tools": [*tools(works), *further_tools],
+        "program": works[0].design.sheets.program,
+        "designs": [_pressed(work) for work in works],
+        "first": None,
+    }
+    if pressed:
+        values |= _heat_and_force(pressed)
+    return environment(HERE).get_template(TEMPLATE).render(**page, **values, shapes="")
+
+
+def _plate(work: Work) -> BasePlatePage:
+    design, laminate = work.design, work.laminate
+    machine, pin = design.registration.plate_made_by, design.thickest_pin
+    several = len(laminate.pins) > 1
+    finer = several and design.registration.pin_error is None and machine == "jig-borer"
+    assert work.job.fixture is not None
+    return BasePlatePage(
+        design.name,
+        work.job.fixture,
+        base_plate.size(work),
+        several,
+        HOLE_PROCESSES[machine],
+        most_play(pin, machine),
+        design.pin_error if several else design.lone_pin_error,
+        pin_error(pin, "cnc-mill"),
+        for_a_cnc_mill("design.toml") if finer else "",
+        base_plate.holes(work),
+        base_plate.places(work),
+        base_plate.grid(work),
     )
 
 
-UNKNOWN = "not known, the paper gives no time. Measure it once: ________ min."
-"""What stands for a time that the paper does not give."""
+def _pressed(work: Work) -> Pressed:
+    together = work.runs.together
+    area = together * work.laminate.layers[-1].profile.area
+    what = work.laminate.name if together == 1 else f"{together} of {work.laminate.name}"
+    force = work.design.press.pressure_kpa * work.design.press.platen_width
+    newtons = force * work.design.press.platen_length / 1000
+    alone = f"{newtons / area:.1f} MPa on the {area:.0f} mm² of {what}"
+    return Pressed(work.design.name, work.schedule.steps, alone)
+
+
+def _heat_and_force(works: Sequence[Work]) -> dict[str, Any]:
+    """Return what the page says of time, temperature and force."""
+    first, heating = works[0].schedule.steps[0], works[0].schedule.heating
+    points = {point.point: point for point in first.time_temperature}
+    start, melting = points[START], points.get(MELTING)
+    pound = first.pressure_kpa / first.force_n * units.NEWTONS_PER_POUND
+    return {
+        "first": first,
+        "heating": heating,
+        "hot": units.temperature(heating.platen_c),
+        "ready": units.temperature(heating.clock_c),
+        "reach": heating.platen_c - (heating.platen_c - heating.start_c) * math.exp(-1),
+        "patience": PATIENCE,
+        "most_raised": MOST_RAISED,
+        "closings": sum(work.runs.count * len(work.schedule.steps) for work in works),
+        "pressures": pressure_range(works),
+        "indicating": film_words(works),
+        "pound_kpa": pound,
+        "division_lbf": 2 * WANTED * first.pressure_kpa / pound,
+        "start": _after(start, heating),
+        "melting": "" if melting is None else _after(melting, heating),
+        "molten": (start.after_constants or 0) - ((melting or start).after_constants or 0),
+    }
+
+
+def _after(point: HeatPoint, heating: Heating) -> str:
+    return f"{_constants(point, heating)} = {units.minutes(point.after_minutes)}"
+
+
+# Tools.
 
 
 LOUPE = "10x with a scale of 0.1 mm"
@@ -428,60 +431,6 @@ HOLDERS: Mapping[HoldDown, Tool] = {
     ),
     "vacuum": Tool("Vacuum bed, porous sheet", "holds film and parts under the beam"),
 }
-
-
-def before_the_day(works: Sequence[Work]) -> list[Action]:
-    """Return all that must be at hand, cut, dry and measured before the press is switched on."""
-    return [Action(text) for text in _before(works)]
-
-
-def _before(works: Sequence[Work]) -> Iterator[str]:
-    films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
-    materials = list(dict.fromkeys(film.material for film in films))
-    nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
-    if nominal:
-        yield (
-            f"Kerf of {joined_words(nominal)} measured and the files generated again; or it is "
-            "accepted that edges are nominal (warning above)."
-        )
-    if any(film.warning for film in films):
-        yield "Laser's owner permits these films; exhaust tested (warning above)."
-    if any(work.laminate.pins for work in works):
-        yield (
-            "Base plate made and measured (table under Cut): place and depth of each hole; every "
-            "pin goes down to its shoulder by hand or with light taps, and comes out by the punch "
-            "from below. Where none does, lap the hole. The corner that is cut off is marked."
-        )
-    release = sum(base_plate.release_films(work) for work in works)
-    pads = "the press pad" if len(works) == 1 else "every press pad"
-    if release:
-        yield f"Cut to the size under Materials: {release} release films and {pads}."
-    if any(work.job.underlay is not None for work in works):
-        prints = sum(base_plate.prints(work) for work in works if work.job.underlay)
-        yield (
-            f"Underlay printed at 100 %, {units.count(prints, 'time', 'times')}, the bars of each "
-            "print measured, each cut out along its dotted line."
-        )
-    plate = "base plate, pad, release films, " if release else ""
-    yield f"Clean and dry: {plate}film as it comes off the roll."
-    if works[0].schedule.steps:
-        yield from _before_the_press(works)
-    if any(work.laminate.tube_count for work in works):
-        yield "Adhesive in date; curing time on its package: ________ h."
-
-
-def _before_the_press(works: Sequence[Work]) -> Iterator[str]:
-    first = works[0].schedule.steps[0]
-    hot = units.temperature(first.temperature_c)
-    yield (
-        f"Pressure of {first.pressure_kpa:g} kPa checked once, cold, in the whole build-up, at "
-        f"{units.force(first.force_n)}, with {film_words(works)}. Division of the press's "
-        "gauge: ________."
-    )
-    yield f"Warming the platens from cold to {hot}: {UNKNOWN}"
-    steps = sum(work.runs.count * len(work.schedule.steps) for work in works)
-    yield from heating_lines(works[0].schedule.heating, steps)
-    yield f"Cooling the plate until it can be touched: {UNKNOWN} It comes after each step."
 
 
 def tools(works: Sequence[Work]) -> list[Tool]:

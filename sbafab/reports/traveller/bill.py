@@ -5,24 +5,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
-from sbafab.cutting.fixture import fixture
-from sbafab.cutting.properties import (
-    COLOURS,
-    CUT_INNER,
-    CUT_OUTER,
-    CUT_SEQUENCE,
-    CUT_SHEET,
-    ENGRAVE,
-    REFERENCE,
-)
-from sbafab.design.identity import tube_name
+from sbafab.design.identity import cure_hours, tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.pressing.cycles import batch_times
-from sbafab.pressing.work_plan import shop_of, work_plan
-from sbafab.reports.drawing import layer_numbers
+from sbafab.pressing.schedule import joined_words
+from sbafab.pressing.work_plan import plan_times, shop_of, work_plan
+from sbafab.reports.drawing import TIMES, layer_numbers
 from sbafab.reports.traveller import acceptance, base_plate, units
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.shapes import flat_shape, thumbnail
@@ -36,7 +27,8 @@ class Item:
     """A row of the bill of materials.
 
     ``quantity`` is in words, ``number`` what must be at hand, None where it is not counted;
-    ``area`` in m2 is that of all of them, where they are film.
+    ``area`` in m2 is that of all of them, where they are film. ``kind``: film that parts are cut
+    from, or what a sheet is wrapped round its tube with.
     """
 
     name: str
@@ -44,6 +36,11 @@ class Item:
     quantity: str
     number: int | None = None
     area: float | None = None
+    kind: Literal["film", "wrap", "other"] = "other"
+
+
+SPARE_TUBES = 1
+THREAD = Item("Thread", "ties supply tubes, loose enough for them to slide", "as needed")
 
 
 BILL_COLUMNS = ("item", "specification", "needed", "area_m2", "quantity")
@@ -75,18 +72,19 @@ def bill(work: Work) -> list[Item]:
         number = laminate.tube_count * job.copies
         diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
         tube = tube_name(work.design)
-        items.append(
-            Item("Tube", f"{tube}, outer diameter {diameter}", units.count(number, "piece"), number)
-        )
+        pieces = f"{units.count(number, 'piece')} + {SPARE_TUBES} spare"
+        words = f"{tube}, outer diameter {diameter}"
+        items.append(Item("Tube", words, pieces, number + SPARE_TUBES))
         drops = units.count(number, "small drop")
         items.append(Item("Adhesive", acceptance.adhesive_words(work), drops, number))
     wrap = work.design.form.wrap
     if wrap is not None:
         diameter = units.millimetres(wrap.tube_diameter)
         words = f"to wrap the sheet round, outer diameter {diameter}"
-        items.append(Item("Tube to wrap", words, str(job.copies), job.copies))
+        items.append(Item("Tube to wrap", words, str(job.copies), job.copies, kind="wrap"))
         words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
-        items.append(Item("Adhesive of the wrap", words, "as needed"))
+        items.append(Item("Adhesive of the wrap", words, "as needed", kind="wrap"))
+        items.append(replace(THREAD, kind="wrap"))
     width, length = work.design.press.platen_width, work.design.press.platen_length
     for name, what, quantity, count in base_plate.items(work):
         area = count * width * length / 1e6 if name == base_plate.RELEASE_FILM else None
@@ -146,6 +144,7 @@ def _films(work: Work) -> list[Item]:
                 ", ".join(needed) or "see the cut files",
                 len(sheets) or None,
                 sum(sheet.width * sheet.length for sheet in sheets) / 1e6 if sheets else None,
+                "film",
             )
         )
     return items
@@ -252,122 +251,14 @@ def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool
     return states
 
 
-# Notes on opening the cut files in other programs: only what was tried or is documented.
-#
-# Tried with sheets and layer files of this program: LibreCAD 2.2.0 (``librecad dxf2pdf``) and
-# Inkscape 1.2.2 (its DXF import, and ``--query-all``). LightBurn: from its documentation only.
-
-
-COLOUR_NAMES = {1: "red", 5: "blue", 6: "magenta", 7: "black or white", 8: "grey"}
-MEANINGS = {
-    ENGRAVE: "the sheet's label, in its border; leave it out if you like",
-    CUT_INNER: "holes: cut these before the outlines",
-    CUT_OUTER: "outlines of the parts",
-    CUT_SHEET: "cuts the used sheet off a roll; last",
-    REFERENCE: "sheet frame or datum cross; never cut",
-}
-
-
-class CutLayer(NamedTuple):
-    """A row of the table of cut layers."""
-
-    order: str
-    name: str
-    colour: str
-    meaning: str
-
-
-class Program(NamedTuple):
-    """A laser or drawing program, what is known of it, and how (``evidence``)."""
-
-    name: str
-    evidence: str
-    notes: tuple[str, ...]
-
-
-PROGRAMS = (
-    Program(
-        "LightBurn",
-        "from its documentation, not tried",
-        (
-            "Open the .lbrn2 beside each DXF: layers, order and a frame without output are set, "
-            "and lead-ins, overcuts and tabs where the design asks for them. Powers are 0 unless "
-            "its notes name a recipe: set power and speed of each layer. The rest of this list is "
-            "only for the DXF.",
-            "Each colour becomes a layer of its own in the Cuts / Layers window. By default layers "
-            "run in the order of that window, from the top: bring them into the order above.",
-            "Switch Output off for the layer of the grey REFERENCE lines.",
-            "Set every cut layer to Line mode, Kerf Offset 0.",
-            "Optimization Settings count only while Optimize Cut Path is on: keep Order by Layer "
-            "first and Cut inner shapes first on, as they are by default.",
-            "We do not know which units it assumes for a DXF: compare the overall size above "
-            "before you cut.",
-            "Run Preview and watch the order of the holes and outlines.",
-        ),
-    ),
-    Program(
-        "Inkscape",
-        "tried: 1.2.2",
-        (
-            "Use File > Open, not Import: only then the layers keep their names (its own help says "
-            "so). In the DXF dialog choose “Read from file”, or “Manual scale” with 1.0: the size "
-            "is then right.",
-            "Do not choose “Automatic scaling to size A4”: it enlarges the drawing.",
-            "Circles and arcs stay true arcs, layer colours are kept.",
-            "Sizes include the width of the line unless its preferences are set to the geometric "
-            "bounding box.",
-        ),
-    ),
-    Program(
-        "LibreCAD",
-        "tried: 2.2.0",
-        (
-            "Opens the DXF correctly: layers, colours and arcs are right. Printed at scale 1:1 the "
-            "parts have their size, to 0.1 mm.",
-            "REFERENCE does not print: no frame on paper is right.",
-        ),
-    ),
-)
-
-
-def cut_layers() -> list[CutLayer]:
-    """Return the layers in cutting order, what is not cut last."""
-    numbered = {name: str(place) for place, name in enumerate(CUT_SEQUENCE, 1)}
-    return [
-        CutLayer(
-            numbered.get(name, "not cut"),
-            name,
-            f"{COLOUR_NAMES[COLOURS[name]]} ({COLOURS[name]})",
-            MEANINGS[name],
-        )
-        for name in (*CUT_SEQUENCE, REFERENCE)
-    ]
-
-
-def expected_sizes(work: Work) -> list[tuple[str, str]]:
-    """Return file and overall size after opening, for every sheet and the base plate."""
-    expected = [(sheet.path, units.size(sheet.width, sheet.length)) for sheet in work.sheets]
-    press = work.design.press
-    platen = press.platen_width, press.platen_length
-    plate = fixture(work.laminate, platen, work.runs.places)
-    if work.job.fixture is not None and plate is not None:
-        low_x, low_y, high_x, high_y = plate.bounds
-        expected.append((work.job.fixture, units.size(high_x - low_x, high_y - low_y)))
-    return expected
-
-
-def kerf_notes(work: Work) -> list[str]:
-    """Return the kerf setting of the laser's program, a line for each material."""
-    materials = list(dict.fromkeys(layer.film.material for layer in work.laminate.layers))
-    return [
-        f"{material}: {words}. "
-        + (
-            "The paths are compensated already: set kerf offset 0 in the laser's program."
-            if measured
-            else "No offset is known: set kerf offset 0 in the laser's program, and calibrate."
-        )
-        for material, words, measured in kerf_states(work.job, materials)
-    ]
+def kerf_notes(works: Sequence[Work]) -> list[str]:
+    """Return the kerf of the cut files, a line for films of which the same is known."""
+    layers = (layer for work in works for layer in work.laminate.layers)
+    materials = list(dict.fromkeys(layer.film.material for layer in layers))
+    by_words: dict[str, list[str]] = {}
+    for material, words, _ in kerf_states(works[0].job, materials):
+        by_words.setdefault(words, []).append(material)
+    return [f"{joined_words(names)}: {words}" for words, names in by_words.items()]
 
 
 # Times, next to the paper's.
@@ -434,49 +325,80 @@ def _batch(work: Work) -> list[Time]:
 def times(work: Work) -> list[Time]:
     """Return the rows of the time table, the total last but for the paper's."""
     plan = work.schedule
-    # The paper's minutes are those of a stack of balloons.
-    is_drawn = work.design.form.is_drawn
-    handling = plan.hands_minutes if plan.is_timed else None
-    total = plan.estimated_build_minutes
-    basis = (
-        "cutting, lay-up, joining, tubes: nobody has timed this design"
-        if is_drawn
-        else "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, "
-        "assumed equal for every design"
-    )
-    steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
     rows = []
+    if work.sheets:
+        copies = units.count(work.job.copies, "copy", "copies")
+        basis = f"{laser_basis(work)}; all sheets, {copies}"
+        took = units.minutes(laser_minutes(work))
+        rows.append(Time("Laser (within handling)", took, basis))
+    handling = plan.hands_minutes if plan.is_timed else None
+    rows.append(Time("Handling", units.minutes(handling), _handling_basis(work)))
     if plan.steps:
+        steps = " + ".join(units.plain(step.minutes) for step in plan.steps)
         took = units.minutes(plan.total_press_minutes)
         rows.append(Time("In the press", took, f"{steps} min, one actuator"))
     if plan.seams:
         metres = sum(seam.length_mm for seam in plan.seams)
         rows.append(Time("Seams", "", f"{metres:.0f} mm of path; nobody stated their speed"))
-    if work.sheets:
-        copies = units.count(work.job.copies, "copy", "copies")
-        rows.append(
-            Time(
-                "Laser (within handling)",
-                units.minutes(laser_minutes(work)),
-                f"{laser_basis(work)}; all sheets, {copies}",
-            )
-        )
-    papers = Time(
-        "The paper", f"{PAPER_MINUTES:g} min = {units.hours(PAPER_MINUTES)}", "1-DoF or 3-DoF"
+    rows += [*_batch(work), *_waiting(work), total_time(work)]
+    # The paper's minutes are those of a stack of balloons.
+    if not work.design.form.is_drawn:
+        took = units.whole_minutes(PAPER_MINUTES)
+        basis = "1-DoF or 3-DoF: handling and press; nothing on warming, cooling, curing"
+        rows.append(Time("The paper", took, basis))
+    return rows
+
+
+def _handling_basis(work: Work) -> str:
+    if work.design.form.is_drawn:
+        return "cutting, lay-up, joining, tubes: nobody has timed this design"
+    return (
+        "cutting, lay-up, pins, tubes: the paper's total less its 45 min in the press, assumed "
+        "equal for every design"
     )
-    return [
-        *rows,
-        *_batch(work),
-        Time(
-            "Handling",
-            units.minutes(handling),
-            basis,
-        ),
-        Time(
-            "Total, one actuator",
-            units.whole_minutes(total),
-            "not included: heating the press, warming the plate before each clock starts, curing "
-            "the adhesive, leak and proof tests",
-        ),
-        *(() if is_drawn else (papers,)),
-    ]
+
+
+def _waiting(work: Work) -> list[Time]:
+    """Return warming, cooling, curing and tests."""
+    plan, steps = work.schedule, len(work.schedule.steps)
+    each = plan_times(work.design, work.laminate, plan)
+    is_measured = plan.heating.time_constant_minutes is not None
+    rows = []
+    if steps:
+        warm = "by the τ of this bench" if is_measured else "estimate, until τ is measured"
+        cool = "as measured" if work.design.press.cool_minutes else "estimate"
+        rows = [
+            _waits("Warming the plate", steps, each.warm, warm),
+            _waits("Cooling the plate", steps, each.cool, f"{cool}; in still air, to be touched"),
+        ]
+    if each.cure:
+        known = cure_hours(work.design) is not None
+        basis = "as stated" if known else "ours: its package says how long"
+        rows.append(Time("Curing the adhesive", f"{each.cure / 60:g} h", basis))
+    basis = f"leak and proof tests, {units.count(work.laminate.tube_count, 'tube')} (ours)"
+    return [*rows, Time("Tests", units.minutes(each.test), basis)]
+
+
+def _waits(what: str, steps: int, each: float, basis: str) -> Time:
+    return Time(what, units.minutes(steps * each), f"{steps} {TIMES} {each:g} min: {basis}")
+
+
+def total_time(work: Work) -> Time:
+    """Return the days that one actuator takes, and how long the first is."""
+    plan, shift = work.schedule, 60 * work.design.order.shift_hours
+    each, row = plan_times(work.design, work.laminate, plan), "Total, one actuator"
+    handled = plan.estimated_build_minutes
+    if handled is None:
+        basis = "nobody has timed this design; its tests come when the adhesive has cured"
+        return Time(row, f"{units.BLANK} days", basis)
+    worked = handled + len(plan.steps) * (each.warm + each.cool)
+    first = f"{worked / 60:.1f} h until its tubes are glued, warming the press not included"
+    if worked + each.cure + each.test <= shift:
+        return Time(row, "1 day", f"{first}; cured and tested on the same day")
+    days = math.ceil(worked / shift) + max(1, math.ceil(each.cure / DAY))
+    basis = f"{first}; the adhesive cures overnight, tests on the last day"
+    return Time(row, f"{days} days", basis)
+
+
+DAY = 24 * 60.0
+"""Minutes."""

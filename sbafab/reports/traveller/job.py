@@ -1,9 +1,11 @@
-"""The order behind a traveller, what its pages are made from, and a box to tick."""
+"""The order behind a traveller, what its pages share, and a box to tick."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
@@ -11,7 +13,30 @@ from sbafab.geometry.offset import Kerf
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs
 from sbafab.pressing.schedule import Schedule
+from sbafab.reports.traveller import units
 from sbafab.rules.finding import Finding
+
+HERE = Path(__file__).parent
+STYLE = "traveller.css"
+SHORT_HASH = 12
+
+
+def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
+    """Return the values that every page prints: style, head and foot."""
+    short = sha256[:SHORT_HASH]
+    return {
+        "title": title,
+        "short_hash": short,
+        "generator": generator,
+        "running_head": css_string(f"{title}  {short}"),
+        "style": (HERE / STYLE).read_text(encoding="utf-8"),
+        "units": units,
+    }
+
+
+def css_string(words: str) -> str:
+    """Return words as a CSS string that can neither end early nor leave the style element."""
+    return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from sbafab.geometry.region import Region, chain_data, coord, path_data, union
 from sbafab.laminate.films import ink
 from sbafab.laminate.folding import distance_from, unfolded
 from sbafab.laminate.joints import Fold, Seam
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.pressing.schedule import SeamStep, layers_in_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller import units
@@ -71,7 +71,7 @@ def _seams(work: Work) -> Iterator[JointPage]:
             blanks.insert(0, "Temperature")
         else:
             dials.append(("Bonds at", units.temperature(step.temperature_c)))
-        picture = _picture(work.laminate, f"Seam {step.seam} from above", step.layers, seam)
+        picture = _picture(work.laminate, step, seam)
         yield JointPage(
             step.step,
             step.title,
@@ -84,10 +84,7 @@ def _seams(work: Work) -> Iterator[JointPage]:
 
 
 def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
-    for index in step.adds:
-        layer = work.laminate.layer(index)
-        what = f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}"
-        yield Action(f"Lay layer {index}: {what}{face_down(layer)}, by eye.", (index,))
+    yield from _laid_for_a_seam(work.laminate, step)
     if step.tool == "hot-tip":
         yield Action(HOT_TIP)
     yield Action(
@@ -96,11 +93,12 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
     )
     seam = next(seam for seam in work.laminate.seams if seam.name == step.seam)
     path = seam_path(seam)
+    mirrored = ", mirrored left to right" if step.from_below else ""
     yield Action(
-        f"Print {SEAMS} at 100 % and measure its bars. Lay the films over it, edges on the blue "
-        f"lines, and mark the path of step {step.step} on them: it begins at the circle (the dot "
-        f"of the picture), {_start_words(work.laminate, step.layers, seam)}. A machine takes the "
-        "file below."
+        f"Print {SEAMS} at 100 %{mirrored}, and measure its bars. Lay the films over it, edges on "
+        f"the blue lines, and mark the path of step {step.step} on them: it begins at the circle "
+        f"(the dot of the picture), {_start_words(work.laminate, step, seam)}. A machine takes the "
+        f"file below{mirrored}."
     )
     offset = work.design.seam_offsets.get(seam.tool)
     if offset is not None:
@@ -114,10 +112,38 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
     yield Action("Look along the seam: no gap, no hole, nothing bonded beside it.")
 
 
-def _start_words(laminate: Laminate, layers: Sequence[int], seam: Seam) -> str:
-    """Return where a path begins from the left and lower edge of the films in hand."""
+def _laid_for_a_seam(laminate: Laminate, step: SeamStep) -> Iterator[Action]:
+    """Yield the laying of a seam's films: over or under those in hand, or on the turned work."""
+    held = [index for index in step.layers if index not in step.adds]
+    if step.from_below:
+        yield Action(
+            f"Turn the work over, left to right, layer {max(held)} down: from above the tool would "
+            "melt what lies over the seam. The picture shows it so, and the path is mirrored left "
+            "to right."
+        )
+    for index in sorted(step.adds, reverse=step.from_below):
+        layer = laminate.layer(index)
+        what = f"{layer.film.material} {layer.role.replace('-', ' ')} {layer.pattern}"
+        face = _upper_face_down(layer) if step.from_below else face_down(layer)
+        is_under = bool(held) and index < min(held) and not step.from_below
+        under = "; then what is joined on it, as it was" if is_under else ""
+        yield Action(f"Lay layer {index}: {what}{face}, by eye{under}.", (index,))
+
+
+def _upper_face_down(layer: Layer) -> str:
+    """Return which face of a layer is laid down on work that is turned over."""
+    upper, lower = layer.faces
+    if upper != lower:
+        return f", {upper} face down"
+    return "" if layer.turned else ", upper face down"
+
+
+def _start_words(laminate: Laminate, step: SeamStep, seam: Seam) -> str:
+    """Return where a path begins from the left and lower edge of the films as they lie in hand."""
     x, y = seam.path[0][0].start
-    low_x, low_y, *_ = _box([laminate.layer(index).profile for index in layers])
+    low_x, low_y, high_x, _ = _box([laminate.layer(index).profile for index in step.layers])
+    if step.from_below:
+        x, low_x = -x, -high_x
     across = f"{_apart(x - low_x)} {'right' if x >= low_x else 'left'} of the films' left edge"
     return f"{across} and {_apart(y - low_y)} {'above' if y >= low_y else 'below'} their lower edge"
 
@@ -228,9 +254,10 @@ def _box(regions: Sequence[Region]) -> Bounds:
     return box_round([region.bounds for region in regions])
 
 
-def _picture(laminate: Laminate, words: str, layers: tuple[int, ...], seam: Seam) -> str:
-    """Return the films in hand from above, the seam as wide as it is, and its path."""
-    stack = [laminate.layer(index) for index in layers]
+def _picture(laminate: Laminate, step: SeamStep, seam: Seam) -> str:
+    """Return the films in hand as they lie, the seam as wide as it is, and its path."""
+    stack = [laminate.layer(index) for index in step.layers]
+    words = f"Seam {step.seam} {'from below, turned over' if step.from_below else 'from above'}"
     low_x, low_y, high_x, high_y = _box([*(layer.profile for layer in stack), seam.region])
     margin = 0.03 * max(high_x - low_x, high_y - low_y)
     width, height = high_x - low_x + 2 * margin, high_y - low_y + 2 * margin
@@ -242,11 +269,12 @@ def _picture(laminate: Laminate, words: str, layers: tuple[int, ...], seam: Seam
     )
     path = "".join(chain_data(chain) for chain in seam.path)
     x, y = map(coord, seam.path[0][0].start)
-    box = " ".join(map(coord, (low_x - margin, -high_y - margin, width, height)))
+    left, over = (-high_x, -1) if step.from_below else (low_x, 1)
+    box = " ".join(map(coord, (left - margin, -high_y - margin, width, height)))
     return (
         f'<svg class="picture" role="img" aria-label="{words}" viewBox="{box}" '
         f'width="{coord(width * scale)}mm" height="{coord(height * scale)}mm">'
-        f'<g transform="scale(1 -1)" fill-rule="evenodd" stroke-width="{coord(0.2 / scale)}">'
+        f'<g transform="scale({over} -1)" fill-rule="evenodd" stroke-width="{coord(0.2 / scale)}">'
         f'{films}<path d="{path_data(seam.region)}" fill="{SEAM_INK}" fill-opacity="0.5"/>'
         f'<path d="{path}" fill="none" stroke="{PATH_INK}"/>'
         f'<circle cx="{x}" cy="{y}" r="{coord(START / scale)}" fill="{PATH_INK}"/></g></svg>'

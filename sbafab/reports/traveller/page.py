@@ -10,7 +10,6 @@ from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from pathlib import Path
 from string import ascii_uppercase
 from typing import Any
 
@@ -18,7 +17,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import cited, departures, tube_name
 from sbafab.design.records import Design
 from sbafab.laminate.assembly import pins_when_added
-from sbafab.laminate.films import Film, Material
+from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.formulas import sizes
 from sbafab.pressing.schedule import Schedule, joined_words, layers_in_words
@@ -28,21 +27,22 @@ from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import acceptance, base_plate, bench, bill, panel, process, units
 from sbafab.reports.traveller.acceptance import wrapping
 from sbafab.reports.traveller.batch import batch_page
-from sbafab.reports.traveller.bench import before_the_day, tools
 from sbafab.reports.traveller.bill import kerf_states
-from sbafab.reports.traveller.job import Job, Work
+from sbafab.reports.traveller.job import HERE, Job, Work, frame
 from sbafab.reports.traveller.joints import joint_pages
-from sbafab.reports.traveller.process import order_of
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS, record_tables
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
-from sbafab.reports.traveller.sheet_map import marked, part_regions, picture_note, sheet_map
+from sbafab.reports.traveller.sheet_map import (
+    is_long,
+    marked,
+    part_regions,
+    picture_note,
+    sheet_map,
+)
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import CHECKED_AGAINST
 
-HERE = Path(__file__).parent
 TEMPLATE = "traveller.html.j2"
-STYLE = "traveller.css"
-SHORT_HASH = 12
 BY_HAND = "none (by hand)"
 
 
@@ -77,35 +77,32 @@ def context(work: Work) -> dict[str, Any]:
         "family": work.design.form.words,
         "facts": _facts(work),
         "kit": cited(work.design),
-        "departures": departures(work.design),
+        "departures": len(departures(work.design)),
         "code": code_svg(text),
         "code_text": text,
         "legend": _legend(laminate),
         "solid": None if job.solid_png is None else b64encode(job.solid_png).decode("ascii"),
         "cautions": [*cautions(work), *for_the_designer(job.findings)],
+        "step_rows": process.step_rows(work),
+        "lay_up": _lay_up(work),
+        "lay_up_notes": notes if is_drawn else (),
+        "turned": _turned(laminate),
         "before_cutting": bench.before_cutting([work]),
         "after_cutting": bench.after_cutting([work]),
         "bill": bill.bill(work),
-        "before_the_day": before_the_day([work]),
-        "tools": tools([work]),
+        **to_be_ready([work]),
         "others": other_marks,
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **other_marks}),
+        "program": work.design.sheets.program,
         "cuts": bill.cut_list(work),
         "laser_minutes": bill.laser_minutes(work),
         "laser_basis": bill.laser_basis(work),
-        "lay_up": _lay_up(work),
-        "lay_up_notes": notes if is_drawn else (),
+        "kerf_notes": bill.kerf_notes([work]),
         "trim_notes": () if is_drawn else notes,
-        "force_notes": _force_notes(work),
-        "plate_holes": base_plate.holes(work),
-        "plate_notes": base_plate.plate_notes(work),
-        "plate_places": base_plate.places(work),
-        "plate_grid": base_plate.grid(work),
         "batch": batch_page(work),
+        **process.every_step(work),
         "step_pages": process.step_pages(work),
         "joint_pages": joint_pages(work),
-        "turned": _turned(laminate),
-        "taking_down": order_of(work.schedule.steps) if work.schedule.steps else None,
         "finishing": acceptance.finishing(work),
         "tubing": acceptance.tubing(work),
         "leak_test": acceptance.leak_test(work),
@@ -113,11 +110,25 @@ def context(work: Work) -> dict[str, Any]:
         "leak_words": acceptance.leak_words(work),
         "proof_words": acceptance.proof_words(work),
         "times": bill.times(work),
-        "kerf_notes": bill.kerf_notes(work),
-        "expected_sizes": bill.expected_sizes(work),
+        "total_time": bill.total_time(work),
+        "castings": (),
+        "in_chapter": False,
+        "again": False,
         "record_fields": HISTORY_FIELDS,
         "record_tables": record_tables(work.design, laminate, work.schedule),
         **panel.chapter(work),
+    }
+
+
+def to_be_ready(works: Sequence[Work]) -> dict[str, Any]:
+    """Return what must be cut, printed and dry before films are laid up."""
+    pressed = [work for work in works if work.schedule.steps]
+    underlaid = [work for work in works if work.job.underlay is not None]
+    return {
+        "release_films": sum(base_plate.release_films(work) for work in pressed),
+        "prints": sum(base_plate.prints(work) for work in underlaid),
+        "is_glued": any(work.laminate.tube_count for work in works),
+        "is_pressed": bool(pressed),
     }
 
 
@@ -126,12 +137,6 @@ def _turned(laminate: Laminate) -> str:
     roots = {laminate.cut_with(layer) for layer in laminate.layers if layer.turned}
     turned = [index for index in sorted(roots) if laminate.layer(index).turned]
     return layers_in_words(turned) if turned else ""
-
-
-def _force_notes(work: Work) -> tuple[str, ...]:
-    if not work.schedule.steps:
-        return ()
-    return (*base_plate.build_up_notes(work), *bench.notes(work), bench.note(work))
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:
@@ -150,24 +155,6 @@ def _other_marks(work: Work) -> dict[str, str]:
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
-
-
-def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
-    """Return the values that every page prints: style, head and foot."""
-    short = sha256[:SHORT_HASH]
-    return {
-        "title": title,
-        "short_hash": short,
-        "generator": generator,
-        "running_head": css_string(f"{title}  {short}"),
-        "style": (HERE / STYLE).read_text(encoding="utf-8"),
-        "units": units,
-        "notes": bill,
-    }
-
-
-def materials(laminate: Laminate) -> list[Material]:
-    return list(dict.fromkeys(layer.film.material for layer in laminate.layers))
 
 
 def films(laminate: Laminate) -> list[Film]:
@@ -212,6 +199,7 @@ class SheetRow:
     size: str
     minutes: str
     note: str
+    is_long: bool
 
 
 def sheet_rows(
@@ -238,6 +226,7 @@ def sheet_rows(
                 units.size(sheet.width, sheet.length),
                 units.minutes(sheet.minutes),
                 picture_note(sheet),
+                is_long(sheet),
             )
         )
     return rows
@@ -295,11 +284,6 @@ def _round_rows(laminate: Laminate, pins_of: Mapping[int, str], turn: Round) -> 
             )
         )
     return rows
-
-
-def css_string(words: str) -> str:
-    """Return words as a CSS string that can neither end early nor leave the style element."""
-    return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
 # The QR code: which design this sheet of paper belongs to.
@@ -363,8 +347,8 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     if job.waived:
         yield (
             "Waived rules",
-            f"made although the design waives {', '.join(job.waived)}. Findings: "
-            + " / ".join(f.message for f in job.findings if f.by_user),
+            f"made although the design waives {', '.join(job.waived)}: ask the designer whether "
+            "this is intended (findings.html).",
         )
     if job.lowered:
         yield (
@@ -376,9 +360,8 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     if nominal:
         yield (
             f"{joined_words(nominal)} kerf uncalibrated",
-            "edges are nominal, so outlines come out smaller and holes larger by half a kerf. "
-            "Cut, measure and compute a calibration piece (“sbafab new coupon”, “sbafab kerf”), "
-            "and generate again.",
+            "edges are nominal, so outlines come out smaller and holes larger by half a kerf. A "
+            "calibration piece tells by how much (bench.html).",
         )
     if job.underlay is not None:
         yield (

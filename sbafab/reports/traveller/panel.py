@@ -21,10 +21,9 @@ from sbafab.reports.traveller.bill import (
     Time,
     bill,
     cut_list,
-    expected_sizes,
 )
 from sbafab.reports.traveller.job import Action, Work
-from sbafab.reports.traveller.process import COVER, StepPage
+from sbafab.reports.traveller.process import StepPage
 from sbafab.reports.traveller.shapes import Picture, label
 
 WIDEST, TALLEST = 62.0, 74.0
@@ -45,37 +44,17 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel": panel,
         "panel_size": units.size(*panel.size),
         "panel_untried": UNTRIED,
+        "panel_kpa": max(step.film_kpa for step in work.schedule.steps),
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
-        "taking_down": None,
         "finishing": _cut_free(panel),
         "tubing": [*_each(panel, "Fit the tubes"), *acceptance.tubing(work)],
         "leak_test": [*_each(panel, "Test"), *acceptance.leak_test(work)],
-        "force_notes": _force_notes(work, panel),
         "bill": _bill(work, panel),
         "cuts": _cuts(work, panel),
         "times": _times(work, panel),
-        "expected_sizes": [
-            ("every file in layers/", units.size(*panel.size)),
-            (f"{SECOND_CUT}, with its frame", units.size(*panel.size)),
-            *expected_sizes(work),
-        ],
     }
-
-
-def _force_notes(work: Work, panel: SheetPanel) -> tuple[str, ...]:
-    """Return the meaning of the force on sheets that are smaller than the platen."""
-    highest = max(step.film_kpa for step in work.schedule.steps)
-    step = work.schedule.steps[0]
-    return (
-        f"{step.force_n:.0f} N is {step.pressure_kpa:g} kPa on the whole platen of "
-        f"{units.size(*step.platen_mm)}, as the paper gives it. The sheets take "
-        f"{units.size(*panel.size)}; through the press pad, which fills the platen, up to about "
-        f"{highest:.0f} kPa reach them. That is an estimate, which no press has confirmed.",
-        "Sheets of every film lie round the parts at every height, so that these share the "
-        "pressure; what each part gets of it nobody has measured.",
-    )
 
 
 def _pairs(laminate: Laminate) -> list[tuple[Layer, tuple[Layer, ...]]]:
@@ -174,8 +153,8 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
         lay = f"Lay the sheet of layer {films[0][0].index}, the cap, on the pins over the stack."
     start = [
         Action(
-            f"Lay the base plate down, cold, cut corner at the back right. {process.SET_PINS} "
-            "Prick a release film over them."
+            "Base plate down, cold, cut corner at the back right; pins in on their shoulders, "
+            "heights gauged (above); prick a release film over them."
         )
     ]
     end = [
@@ -192,18 +171,13 @@ def _pressing(work: Work, page: StepPage, last: bool) -> list[Action]:
             Action("Take off the lower release film. You now hold all sheets as one stack."),
         ]
     return [
-        Action(
-            f"Heat both platens to {units.temperature(step.temperature_c)}; set the force to "
-            f"{units.force(step.force_n)}."
-        ),
         *start,
         Action(lay, tuple(i for i in step.adds), ticks if len(ticks) > 1 else ()),
         Action(
             "Check: every sheet's cut corner lies over the next, no sheet is stretched between its "
             "pins or folded, and every pin reaches through the highest sheet."
         ),
-        Action(COVER),
-        bench.closing(step, work.schedule.heating),
+        process.closing(work, step),
         Action("Take it out on its plate and let it cool flat before you touch it."),
         *end,
     ]

@@ -1,23 +1,33 @@
-"""The technician's actions in order, with boxes to tick: press steps, tubes, tests, wrapping."""
+"""The press steps in order, with boxes to tick, and the table of all steps on the first page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Any, Literal, NamedTuple
 
-from sbafab.geometry.edges import Point
-from sbafab.laminate.assembly import AssemblyStep, assembly, laying, stack_count
+from sbafab.geometry.edges import Arc, Point
+from sbafab.geometry.region import Region
+from sbafab.laminate.assembly import (
+    AssemblyStep,
+    assembly,
+    distinct_layers,
+    laying,
+    stack_count,
+)
 from sbafab.laminate.films import FIRST
 from sbafab.laminate.laminate import Laminate, Layer, Pin
 from sbafab.pressing.build_up import BASE_PLATE, LAMINATE, PAD
 from sbafab.pressing.cycles import Runs, cycle_name
-from sbafab.pressing.schedule import Step, joined_words, layers_in_words
+from sbafab.pressing.plate_heating import PATIENCE
+from sbafab.pressing.schedule import FoldStep, SeamStep, Step, joined_words, layers_in_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.traveller import bench, units
-from sbafab.reports.traveller.base_plate import has_underlay, punch
-from sbafab.reports.traveller.bench import HeatBlank, closing, reseat, underlay
+from sbafab.reports.traveller.base_plate import TAPE, has_underlay, punch
+from sbafab.reports.traveller.bench import HeatBlank
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.lay_up import (
     PiecePlace,
@@ -36,15 +46,8 @@ from sbafab.reports.traveller.shapes import (
     rounds,
 )
 from sbafab.reports.traveller.step_pictures import INKS, build_up_svg, exploded, pin_lines, plan
+from sbafab.reports.underlay import guides
 
-COVER = (
-    "Cover with a release film and the press pad, flush with the platen all round. No second plate "
-    "on top."
-)
-SET_PINS = (
-    "Set the pins on the shoulders of their holes, by hand or with light taps; gauge their heights "
-    "(above), change one that is wrong."
-)
 MOST_LINES = 12
 """Single layers up to which each has a line of its own."""
 
@@ -54,6 +57,10 @@ BONDS = {
 }
 FULL_OF_OTHERS = "Full bond: films that face each other melt into one, but where a mask lies."
 LOOSE = "No bond: one film and masks, which nothing holds together."
+
+
+SETTLED = 1e-6
+"""mm by which an edge may lie off a circle round its pin, so that a turn about it moves nothing."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +74,6 @@ class StepPage:
     bond: str
     dials: tuple[tuple[str, str], ...]
     heat: tuple[HeatBlank, ...]
-    build_up: str
     pins: str
     notes: tuple[str, ...]
     places: tuple[PiecePlace, ...]
@@ -93,14 +99,13 @@ def step_pages(work: Work) -> list[StepPage]:
                 _bond(work, part),
                 _dials(step, runs.together),
                 tuple(bench.heat_blanks(step, work.schedule.heating)),
-                build_up_svg(step, f"build-up-{step.step}"),
                 pin_lines(step),
                 (*_notes_of_design(work, part), *_place_notes(runs), *_loose_notes(work, part)),
                 placed,
                 pitch(placed),
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
-                _bench_actions(work, part, step, lying, runs),
+                tuple(_actions(work, part, step, lying, runs)),
                 _is_loose(work, part),
             )
         )
@@ -108,15 +113,148 @@ def step_pages(work: Work) -> list[StepPage]:
 
 
 def _dials(step: Step, together: int) -> tuple[tuple[str, str], ...]:
-    width, length = step.platen_mm
     return (
         ("Both platens", units.temperature(step.temperature_c)),
-        ("Force on the whole platen", units.force(step.force_n)),
-        (f"Pressure on {units.size(width, length)}", units.pressure(step.pressure_kpa)),
-        ("On the films (estimate)", f"about {step.film_kpa:.0f} kPa"),
+        ("Force on the platen", units.force(step.force_n)),
+        ("That is", units.pressure(step.pressure_kpa)),
+        ("On the films", f"about {step.film_kpa:.0f} kPa"),
         ("Clock", units.minutes(step.minutes)),
         ("Pins", _pin_count(step, together)),
     )
+
+
+class StepRow(NamedTuple):
+    """A row of the table of all steps: what is laid, the press's settings, what is held then."""
+
+    step: int
+    parts: str
+    heat: str
+    force: str
+    minutes: str
+    pins: str
+    product: str
+
+
+def step_rows(work: Work) -> list[StepRow]:
+    """Return presses, seams and folds by their number, a row each."""
+    plan = work.schedule
+    parts = zip(assembly(work.laminate), plan.steps, strict=True)
+    rows = [_press_row(work, part, step) for part, step in parts]
+    rows += [_seam_row(seam) for seam in plan.seams]
+    rows += [_fold_row(fold) for fold in plan.folds]
+    return sorted(rows)
+
+
+def _press_row(work: Work, part: AssemblyStep, step: Step) -> StepRow:
+    whole = len(part.layers) == len(work.laminate.layers)
+    product = "the whole laminate" if whole else layers_in_words(part.layers)
+    if _is_loose(work, part):
+        product = f"leave it out: nothing bonds in it; {product} are loose"
+    elif part.bond == "flash":
+        product += ", tacked"
+    return StepRow(
+        step.step,
+        "; ".join(_laid(bed) for bed in beds(laying(work.laminate), part)),
+        units.temperature(step.temperature_c),
+        f"{step.force_n:.0f} N",
+        units.minutes(step.minutes),
+        _pins_in_and_out(work, step),
+        product,
+    )
+
+
+def _laid(bed: Bed) -> str:
+    words = layers_in_words(bed.layers)
+    return words if bed.made_in is None else f"{words} from step {bed.made_in}"
+
+
+def _pins_in_and_out(work: Work, step: Step) -> str:
+    """Return the pins of a step by size, and when they come out."""
+    sizes: dict[tuple[float, float], list[str]] = {}
+    for pin in step.pin_settings:
+        sizes.setdefault((pin.diameter_mm, pin.length_mm), []).append(pin.pin)
+    if not sizes:
+        return "none"
+    pins = "; ".join(
+        f"{joined_words(names)} ⌀{diameter:g} {draw.TIMES} {length:g} mm"
+        for (diameter, length), names in sizes.items()
+    )
+    stay = work.laminate.panel is not None and step is not work.schedule.steps[-1]
+    return f"{pins}: in, and {'they stay' if stay else 'out after it'}"
+
+
+def _seam_row(seam: SeamStep) -> StepRow:
+    heat = units.BLANK if seam.temperature_c is None else units.temperature(seam.temperature_c)
+    turned = ", turned over" if seam.from_below else ""
+    return StepRow(
+        seam.step,
+        f"{layers_in_words(seam.layers)}{turned}",
+        f"{seam.tool}, {heat}",
+        "",
+        "",
+        "none",
+        f"layers {seam.joins[0]} and {seam.joins[1]} joined along {seam.seam}",
+    )
+
+
+def _fold_row(fold: FoldStep) -> StepRow:
+    lower, upper = fold.layers
+    laid = layers_in_words(range(lower + 1, upper))
+    parts = f"half {lower}" + (f"; {laid}" if upper > lower + 1 else "")
+    return StepRow(fold.step, parts, "", "", "", "none", f"half {upper} folded onto it")
+
+
+def every_step(work: Work) -> dict[str, Any]:
+    """Return what all press steps have in common."""
+    steps = work.schedule.steps
+    if not steps:
+        return {"press": None}
+    parts = {item.part: item for item in steps[-1].build_up}
+    heating, tau = work.schedule.heating, work.schedule.heating.time_constant_minutes
+    papered = [step for step in steps if has_underlay(step)]
+    masks = {
+        bool(part.pins)
+        for part in assembly(work.laminate)
+        if any(layer.is_mask for layer in distinct_layers(work.laminate, part.adds))
+    }
+    return {
+        "press": steps[0],
+        "heating": heating,
+        "parts": parts,
+        "papered": joined_words([str(step.step) for step in papered]),
+        "papered_pins": any(step.pin_settings for step in papered),
+        "tape": TAPE,
+        "is_pinned": any(step.pin_settings for step in steps),
+        "slipped": [words for pinned, words in SLIPPED.items() if pinned in masks],
+        "patience": f"{PATIENCE:g} τ ({units.minutes(None if tau is None else PATIENCE * tau)})",
+        "build_ups": build_ups(work),
+        "taking_down": order_of(steps),
+    }
+
+
+SLIPPED = {True: "down on its pin", False: "to its edge"}
+"""Where a mask that has slipped is pushed, in steps with pins and without."""
+
+
+class BuildUp(NamedTuple):
+    """A build-up between the platens as a picture, and the steps that have it."""
+
+    steps: str
+    picture: str
+
+
+def build_ups(work: Work) -> list[BuildUp]:
+    """Return one picture for steps with pins and one for those without, with paper and without."""
+    kinds: dict[tuple[bool, bool], list[Step]] = {}
+    for step in work.schedule.steps:
+        kinds.setdefault((bool(step.pin_settings), has_underlay(step)), []).append(step)
+    return [
+        BuildUp(
+            f"step{'s' * (len(steps) > 1)} {joined_words([str(step.step) for step in steps])}",
+            build_up_svg(steps[0], f"build-up-{steps[0].step}"),
+        )
+        for steps in kinds.values()
+    ]
 
 
 def _pin_count(step: Step, together: int) -> str:
@@ -187,57 +325,81 @@ def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
     )
 
 
-def _bench_actions(
-    work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
-) -> tuple[Action, ...]:
-    """Return a step's actions; what it is laid up on comes between base plate and release film."""
-    heat, *rest = _actions(work, part, step, lying, runs)
-    laid = underlay(work, part)
-    pinned = any(step.pin_settings for step in work.schedule.steps)
-    down = taking_down(step, _product(work.laminate, part), pinned)
-    return (heat, _plate(part, bool(laid)), *laid, *rest, *down)
-
-
 def _plate(part: AssemblyStep, is_underlaid: bool) -> Action:
     """Return the laying of base plate and pins, and of the release film unless an underlay comes
     first.
     """
-    text = "Lay the base plate down, cold, cut corner at the back right"
+    text = "Base plate down, cold, cut corner at the back right"
     if part.pins:
-        film = "" if is_underlaid else " Prick a release film over them."
-        return Action(f"{text}. {SET_PINS}{film}")
-    film = "" if is_underlaid else ", and a release film on it"
+        film = "" if is_underlaid else "; prick a release film over them"
+        return Action(f"{text}; pins in on their shoulders, heights gauged (above){film}.")
+    film = "" if is_underlaid else "; a release film on it"
     by_eye = " Lay by eye, as each line says." if part.adds and not is_underlaid else ""
     return Action(f"{text}, no pins in it{film}.{by_eye}")
+
+
+def _underlay(work: Work, part: AssemblyStep) -> list[Action]:
+    """Return the printed page below the release film, in steps in which it has a line to lay by.
+
+    One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
+    """
+    patterns = [
+        pattern
+        for guide in guides(work.laminate)
+        if part.number in guide.steps
+        for pattern in guide.patterns
+    ]
+    if work.job.underlay is None or not patterns:
+        return []
+    film, over = "a see-through release film", "flush with its edges and cut corner"
+    eye = ": lay by eye along them, as each line says"
+    if part.pins:
+        film, over = f"{film}, pricked likewise", "pricked at its grey rings over the pins"
+        eye = ": lay by eye along them what no pin holds"
+    return [
+        Action(
+            f"Tape a fresh print of {work.job.underlay} to the plate, {over}; over it {film}. The "
+            f"print shows the edges of {joined_words(patterns)}{eye}."
+        )
+    ]
 
 
 def _actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
+    """Yield a step's actions; what it is laid up on comes between base plate and release film."""
     laminate = work.laminate
     things = Things(laminate, lying)
-    yield Action(
-        f"Heat both platens to {units.temperature(step.temperature_c)}; set the force to "
-        f"{units.force(step.force_n)}."
-    )
+    laid = _underlay(work, part)
+    yield _plate(part, bool(laid))
+    yield from laid
     for bed in lying:
         yield from _lay(things, bed, part.pins)
-    if not _is_loose(work, part):
-        yield from reseat(laminate, part.adds, bool(part.pins))
     many = stack_count(laminate, part.layers)
     lies = "stack lies" if many == 1 else f"{many} stacks lie"
     yield Action(
-        f"Check: {_tabs(laminate, part.layers)}edges lie as in the picture, {_flat(laminate)}no "
-        f"dust or hair between the films, the {lies} flat (about {_height(laminate, part)})"
+        f"Check: {_tabs(laminate, part.layers)}edges as in the picture, {_flat(laminate)}no dust "
+        f"or hair between films, the {lies} flat (about {_height(laminate, part)})"
         + (", every pin reaches through the highest layer with its hole." if part.pins else ".")
     )
-    yield Action(COVER)
-    cycles = tuple(f"cycle {cycle_name(n)}" for n in range(1, runs.count + 1))
-    yield closing(step, work.schedule.heating, cycles if 1 < len(cycles) <= MOST_LINES else ())
+    yield closing(work, step)
+    pinned = any(step.pin_settings for step in work.schedule.steps)
+    yield from taking_down(step, _product(laminate, part), pinned)
+
+
+def closing(work: Work, step: Step) -> Action:
+    """Return cover and start of the clock; a box for each cycle of a batch that has a few."""
+    cycles = tuple(f"cycle {cycle_name(n)}" for n in range(1, work.runs.count + 1))
+    return Action(
+        f"Cover and close the press. Start the clock, {units.minutes(step.minutes)}, only when the "
+        f"plate's edge reads {work.schedule.heating.clock_c:g} °C.",
+        (),
+        cycles if 1 < len(cycles) <= MOST_LINES else (),
+    )
 
 
 def _flat(laminate: Laminate) -> str:
-    return "" if laminate.folds else "nothing is folded, "
+    return "" if laminate.folds else "nothing folded, "
 
 
 def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
@@ -289,24 +451,57 @@ def _lay_many(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> A
 
 
 def _by_eye(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> str:
-    """Return sentences on those of the layers that none of the pins in the plate holds."""
+    """Return sentences on those of the layers that no pin in the plate holds, or one alone."""
     if not pins:
         return "".join(_along(things, layer) for layer in layers[:1])
+    hands = {layer.pattern: _hand(things.laminate, layer, pins) for layer in layers}
     # A pattern may lie on a larger film here and on a smaller one there.
     lines: dict[str, dict[str, list[int]]] = {}
     for layer in layers:
-        if not set(pins).intersection(things.laminate.pins_holding(layer)):
+        # The lowest on a step's only pin gives the angle that the others are turned to.
+        gives_the_angle = len(pins) == 1 and things.is_lowest(layer.index)
+        hand = hands[layer.pattern]
+        if hand == "lay" or (hand == "turn" and not gives_the_angle):
             line = things.line_up(layer.index, numbered=False)
             lines.setdefault(layer.pattern, {}).setdefault(line, []).append(layer.index)
     sentences = []
     for pattern, indices_by_line in lines.items():
+        held, task = HAND_WORDS[hands[pattern]]
         for line, indices in indices_by_line.items():
             many = "layers" if len(indices) > 1 else "layer"
             where = f" in {many} {layer_numbers(indices)}" if len(indices_by_line) > 1 else ""
-            sentences.append(
-                f" No pin holds {pattern}{where}: lay by eye{', ' if line else ''}{line}."
-            )
+            sentences.append(f" {held} {pattern}{where}: {task}{', ' if line else ''}{line}.")
     return "".join(sentences)
+
+
+HandTask = Literal["none", "turn", "lay"]
+"""What of a layer the hand decides beside its pins: nothing, its angle, its place."""
+HAND_WORDS: Mapping[HandTask, tuple[str, str]] = {
+    "lay": ("No pin holds", "lay by eye"),
+    "turn": ("One pin holds", "turn by eye"),
+}
+
+
+def _hand(laminate: Laminate, layer: Layer, pins: Sequence[Pin]) -> HandTask:
+    """Return what a layer on these pins leaves to the hand; a disc turned on its pin is the same
+    disc.
+    """
+    held = [pin for pin in pins if pin in laminate.pins_holding(layer)]
+    if not held:
+        return "lay"
+    for piece in layer.profile.pieces:
+        outline = Region(piece.outers)
+        inside = [pin for pin in held if outline.contains(pin.centre)]
+        if len(inside) == 1 and not _is_round(outline, inside[0].centre):
+            return "turn"
+    return "none"
+
+
+def _is_round(outline: Region, centre: Point) -> bool:
+    return all(
+        isinstance(edge, Arc) and math.dist(edge.centre, centre) <= SETTLED
+        for edge in outline.edges
+    )
 
 
 def _along(things: Things, layer: Layer) -> str:
@@ -341,7 +536,7 @@ def _tabs(laminate: Laminate, layers: Sequence[int]) -> str:
     if not there:
         return ""
     points = joined_words([f"{inlet.chamber} {units.toward(inlet)}" for inlet in there])
-    return f"inlet tabs point as in the picture ({points}), "
+    return f"inlet tabs ({points}) and "
 
 
 def _product(laminate: Laminate, part: AssemblyStep) -> str:
@@ -373,8 +568,9 @@ def order_of(steps: Sequence[Step]) -> TakingDown:
     """Return order of taking down after every press step, by the numbers that the steps name."""
     pinned = any(step.pin_settings for step in steps)
     lines = [
-        "Pad off first, straight up. The upper release film stays on until the plate is as cool as "
-        "your hand: hot films still flow.",
+        "Take plate, films and pad out together, level: all are hot. Pad off first, straight up. "
+        "The upper release film stays on until the plate is as cool as your hand: hot films still "
+        "flow.",
         "Upper release film: hold the films down with a fingertip and fold the release film back "
         "on itself, low, away from the finger. "
         + ("Pins may have pierced it: take" if pinned else "Take")
@@ -404,14 +600,11 @@ def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
     ``is_pinned``: some step of the design has pins, and the order five numbers, not three.
     """
     last = 5 if is_pinned else 3
-    yield Action(
-        "Take plate, films and pad out together, level; all are hot. Pad off (1). Let the plate "
-        "cool. Upper release film off (2)."
-    )
+    yield Action("All out together, hot. Pad off (1); let it cool; upper release film off (2).")
     if step.pin_settings:
         yield Action(
-            f"Turn over onto a clean release film on {_soft(step)} and push the pins out of their "
-            f"seats (3): {_punches(step)}. Turn back, hold the films down and draw the pins (4)."
+            f"Turn over onto a clean release film on {_soft(step)}, push the pins out of their "
+            f"seats (3): {_punches(step)}. Turn back, hold the films down, draw the pins (4)."
         )
     away = "; underlay off the plate, discard it" if has_underlay(step) else ""
     yield Action(f"Lower release film off ({last}){away}. You now hold {product}.")

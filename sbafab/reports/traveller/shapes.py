@@ -38,7 +38,8 @@ def definitions(regions: Iterable[tuple[str, Region]]) -> str:
 
 
 def pattern_id(pattern: str) -> str:
-    return f"shape-{pattern}"
+    """Return the id of a pattern's outline; "A P03" has a space, which an id has not."""
+    return f"shape-{pattern.replace(' ', '-')}"
 
 
 def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
@@ -61,7 +62,8 @@ class Picture:
     """
 
     def __init__(self, name: str, width: float, height: float, words: str) -> None:
-        self.name, self.width, self.height, self.words = name, width, height, words
+        self.name = name.replace(" ", "-")
+        self.width, self.height, self.words = width, height, words
         self._elements: list[str] = []
         self._hatches: dict[tuple[float, Ink], str] = {}
 

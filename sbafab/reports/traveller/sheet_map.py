@@ -16,8 +16,8 @@ from sbafab.nesting.records import Placement
 from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.shapes import Picture, label
 
-HIGHEST = 118.0
-"""mm on the page that a sheet which is not long may take down."""
+HIGHEST, BESIDE = 118.0, 90.0
+"""mm on the page that a sheet which is not long may take, down and across: two side by side."""
 ROW, TALLEST, LARGEST = 180.0, 210.0, 0.7
 """mm on the page that a long sheet may take across and down, and its largest scale."""
 LONG = 2.0
@@ -125,7 +125,7 @@ def _strips(sheet: SheetFile) -> list[_Strip]:
     width, length = sheet.width, sheet.length
     if not is_long(sheet):
         used = _used(sheet)
-        scale = min(ROW / width, HIGHEST / used)
+        scale = min(BESIDE / width, HIGHEST / used)
         return [_Strip((0.0, 0.0, width, used), (EDGE, EDGE), scale, False)]
     long, short = max(width, length), min(width, length)
     count = 1

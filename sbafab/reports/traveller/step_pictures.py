@@ -124,15 +124,17 @@ def _shared(a: Bounds, b: Bounds) -> float:
 # The step seen from above: plate, layers, pins in or out, inlet tabs.
 
 
-WIDEST, TALLEST = 64.0, 36.0
+WIDEST, TALLEST = 64.0, 28.0
 NARROWEST = 66.0
 """mm: room for the words under the picture."""
-EDGE, HEAD, FOOT = 5.0, 5.0, 9.0
+EDGE, HEAD, FOOT = 5.0, 5.0, 5.5
 NAMES = 2.0
 """Height of the names of pins and chambers, mm."""
 FREE = 6.0
 """mm of air round a laminate that has no base plate."""
 
+KEY = 19.0
+"""mm of the line under the picture that the marks of pins take."""
 AT_DATUM = 1e-3
 """mm from the datum within which a pin hides it."""
 
@@ -209,7 +211,7 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
     at_datum = next((pin.name for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
     if at_datum is None:
         picture.add(*_datum(view))
-    datum = "+ datum" if at_datum is None else f"the datum is the middle of pin {at_datum}"
+    datum = "+ datum" if at_datum is None else f"datum: middle of pin {at_datum}"
     picture.add(*_captions(view, plate is not None, bool(step.pins), datum))
     return picture.svg()
 
@@ -266,18 +268,20 @@ def _datum(view: _View) -> list[str]:
 
 def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
     """Return the key of the marks under the picture, and the words on the plate above it."""
-    y = view.height - 4.6
-    parts = [draw.text((EDGE, view.height - 1.2), f"seen from above; {datum}", size=2.2)]
+    y = view.height - 1.2
+    parts = [draw.text((EDGE + KEY * plate, y), datum, size=2.2)]
     if not plate:
         return parts
     mark = '<circle cx="{}" cy="{}" r="0.8" fill="{}" stroke="#1a1a1a" stroke-width="0.3"/>'
     parts += [
         mark.format(coord(EDGE + 0.8), coord(y - 0.8), draw.DARK),
-        draw.text((EDGE + 2.4, y), "pin in", size=2.2),
-        mark.format(coord(EDGE + 13.0), coord(y - 0.8), "#ffffff"),
-        draw.text((EDGE + 14.6, y), "no pin", size=2.2),
+        draw.text((EDGE + 2.4, y), "pin", size=2.2),
+        mark.format(coord(EDGE + 8.0), coord(y - 0.8), "#ffffff"),
+        draw.text((EDGE + 9.6, y), "no pin", size=2.2),
     ]
-    words = "on the base plate, cut corner back right" if pinned else "no pins in"
+    words = (
+        "from above, on the base plate, cut corner back right" if pinned else "from above, no pins"
+    )
     parts.append(draw.text((EDGE, HEAD - 1.2), words, size=2.2))
     return parts
 
@@ -289,8 +293,8 @@ WIDE = 58.0
 TILT = 0.34
 """How much of its depth a layer keeps, seen from the front and above."""
 LABELS = 50.0
-TALLEST_STACK = 64.0
-NEAREST, FARTHEST, TWO_LINES = 4.0, 12.0, 6.0
+TALLEST_STACK = 40.0
+NEAREST, FARTHEST, TWO_LINES = 4.0, 10.0, 6.0
 COLUMN, BRACKET = 4.0, 13.0
 """mm from the layers to their labels, and for a bracket with its count."""
 BOLD = 1.25
@@ -299,7 +303,7 @@ PAGE = 1.1
 """mm on the page between the layers of a finished stack."""
 MOST = 20
 TOP, STACK_FOOT = 5.0, 2.0
-DEEP = 50.0
+DEEP = 32.0
 STANDS_OUT = 4.0
 """mm on the page of a pin above the highest level."""
 

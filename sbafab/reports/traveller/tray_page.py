@@ -9,8 +9,7 @@ from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.batch import cycles_of
-from sbafab.reports.traveller.job import Work
-from sbafab.reports.traveller.page import HERE, SHORT_HASH
+from sbafab.reports.traveller.job import HERE, SHORT_HASH, Work
 from sbafab.reports.traveller.shapes import (
     definitions,
     flat_shape,
