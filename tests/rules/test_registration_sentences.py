@@ -83,7 +83,7 @@ def test_a_plate_that_takes_a_jig_borer_names_the_command_for_a_mill(good: Good)
     milled = Limits(plate="cnc-mill", tolerances=Tolerances(pin=0.029))
     bond, _ = worst_of(tip, milled)
     assert bond.verdict == "fail"
-    assert bond.message.endswith(f"make bond.width larger ({command} finds by how much)")
+    assert bond.message.endswith(f" wider ({command} finds by how much)")
     # The place of a plate's only pin does not matter.
     assert command not in worst_of(one, Limits(plate="jig-borer"))[0].message
     assert command not in worst_of(tip, Limits())[0].message
