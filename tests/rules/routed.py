@@ -534,7 +534,7 @@ def groups_by_raster(laminate: Laminate) -> tuple[set[frozenset[str]], set[str]]
     for inlet in laminate.inlets:
         near = np.abs(grid_y - inlet.mouth[1]) <= inlet.width / 2 + PAST
         near &= grid_x < low_x + PIXEL
-        met = [(n, *at) for n in levels[inlet.chamber] for at in np.argwhere(rims[n] & near)]
+        met = [(n, *at) for n in levels[inlet.chamber] for at in np.argwhere(rim & voids[n] & near)]
         joined_labels = {labels[n][row, column] for n, row, column in met}
         for label in labels:
             label[np.isin(label, [*joined_labels])] = max(joined_labels, default=0)
