@@ -27,7 +27,7 @@ from sbafab.rules.limits import TOLERANCE
 INSET: Final = 1e-5
 """mm from an edge at which a point surely lies on one side of it."""
 PAST_MOUTH: Final = 0.025
-"""mm by which an opening may reach past either end of its mouth; ours."""
+"""mm by which an opening may reach past either end of its mouth, and lie off its line; ours."""
 
 
 class Void(NamedTuple):
@@ -316,7 +316,7 @@ def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | N
         return None
     low, high = sorted((side - start) / (end - start) for side in (-reach, reach))
     low, high = max(0.0, low), min(1.0, high)
-    if low >= high or any(abs(inlet.depth(edge.at(t))) > TOLERANCE for t in (low, high)):
+    if low >= high or any(abs(inlet.depth(edge.at(t))) > PAST_MOUTH for t in (low, high)):
         return None
     return low, high
 
@@ -345,7 +345,7 @@ def past_mouth(laminate: Laminate, level: int, p: Point) -> str | None:
     interface = laminate.interfaces[level - 1]
     for inlet in laminate.inlets if interface.kind == "chamber" else ():
         for low, high in mouth_openings(inlet, interface):
-            if abs(inlet.depth(p)) <= TOLERANCE and low <= inlet.offset(p) <= high:
+            if abs(inlet.depth(p)) <= PAST_MOUTH and low <= inlet.offset(p) <= high:
                 return (
                     f"the opening there is {high - low:.3f} mm wide and reaches "
                     f"{max(high, -low) - inlet.width / 2:.3f} mm past the end of the mouth of "
