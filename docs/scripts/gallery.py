@@ -22,7 +22,7 @@ DESIGNS = Path(__file__).parents[1] / "gallery"
 PIXELS = (720, 540)
 FIGURES = (
     ("outline diameter", "across", 1),
-    ("deflated height", "flat", 2),
+    ("folded height", "flat", 2),
     ("free stroke at 10 kPa", "stroke at 10 kPa", 1),
     ("reference stroke", "reference stroke", 1),
     ("blocked force at 10 kPa, flat", "blocked force at 10 kPa", 2),
@@ -35,7 +35,7 @@ FIGURES = (
 
 NUMBERS = (
     ("outline diameter", "inflated diameter"),
-    ("free stroke at 10 kPa", "reference stroke", "deflated height"),
+    ("free stroke at 10 kPa", "reference stroke", "folded height"),
     (
         "bend at 10 kPa in one chamber, the others empty",
         "blocked force at 10 kPa, flat",

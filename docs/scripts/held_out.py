@@ -21,6 +21,7 @@ from sbafab.calibration.fit import (
     film_of,
     left_out_fits,
     sampled_curve,
+    sizes_of_groups,
     usable_curves,
 )
 from sbafab.calibration.posterior import Posterior, SampledCurve
@@ -104,7 +105,11 @@ def _print_progress(step: str, done: int, total: int) -> None:
 def _stated(
     source: Evidence, measured: MeasuredCurve, posterior: Posterior
 ) -> Sequence[tuple[float, float] | None]:
-    calibration = as_calibration(NAME, "", film_of(measured), [source], posterior, [])
+    rest, _ = usable_curves([source])
+    sizes = sizes_of_groups(
+        [c for c in rest if (c.group or c.id) != (measured.group or measured.id)]
+    )
+    calibration = as_calibration(NAME, "", film_of(measured), [source], posterior, [], sizes)
     intervals = curve_intervals(measured, uncertainty_for(measured, calibration))
     return intervals or [None] * len(measured.y)
 

@@ -14,6 +14,7 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface
 from sbafab.models.figures import Prediction, PredictionRequest
+from sbafab.models.formulas import usual_pressures
 from sbafab.models.intervals import factors_of
 from sbafab.models.pneumatics import FLUIDS, Line
 from sbafab.models.prediction import predict as predict_design
@@ -29,7 +30,7 @@ from sbafab.reports.inflated import gripping
 def predict(
     source: Source,
     *changes: Change,
-    pressures_kpa: float | Sequence[float] = PredictionRequest.pressures_kpa,
+    pressures_kpa: float | Sequence[float] | None = None,
     flow_ml_min: float = PredictionRequest.flow_ml_min,
     volumes_ul: float | Sequence[float] = PredictionRequest.volumes_ul,
     press_factor: float | None = None,
@@ -42,7 +43,8 @@ def predict(
 ) -> Prediction:
     """Predict what a design will do; each figure has a unit and names its model and its trust.
 
-    Forces and works are at ``pressures_kpa``, times at ``flow_ml_min`` into each chamber, strokes
+    Forces and works are at ``pressures_kpa`` (gauge; by default 10 and 100, of a design that works
+    under a vacuum -10 and -100), times at ``flow_ml_min`` into each chamber, strokes
     with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
     elastic stack, which take seconds; ``laminate`` is the design's, where it is built already.
     The user's own ``press_factor`` and ``contact_factor`` (ratios), ``pocket_loss`` in mm and
@@ -51,8 +53,10 @@ def predict(
     Raises DesignError for what is out of every model's range. Models: the paper's Eqs. 1-4 (Sec.
     3), and elastic balloons of axisymmetric film in balance.
     """
+    design = load(source, *changes, **tables)
+    usual = usual_pressures(design.form)
     request = PredictionRequest(
-        numbers("pressures_kpa", pressures_kpa),
+        usual if pressures_kpa is None else numbers("pressures_kpa", pressures_kpa),
         flow_ml_min,
         numbers("volumes_ul", volumes_ul),
         overrides={
@@ -62,7 +66,7 @@ def predict(
             "modulus_mpa": modulus_mpa,
         },
     )
-    return predict_design(load(source, *changes, **tables), request, laminate, quick)
+    return predict_design(design, request, laminate, quick)
 
 
 @command

@@ -9,7 +9,7 @@ from typing import Any
 from sbafab.api.designs import Source, command, load, numbers
 from sbafab.design.files import Change, changed_keys
 from sbafab.design.records import Design, Free
-from sbafab.search.compare import PRESSURES, DesignComparison, load_compared, write_page
+from sbafab.search.compare import DesignComparison, load_compared, write_page
 from sbafab.search.compare import compare as run_compare
 from sbafab.search.find import FindRequest, FoundDesign
 from sbafab.search.find import find as run_find
@@ -73,16 +73,16 @@ def compare(
     first: Source,
     second: Source,
     *,
-    pressures_kpa: float | Sequence[float] = PRESSURES,
+    pressures_kpa: float | Sequence[float] | None = None,
     flow_ml_min: float = 35.0,
     out: str | Path | None = None,
 ) -> DesignComparison:
     """Compare two designs: keys and rules that differ, and the figures of each with 90 % intervals.
 
     Each is a design, or the name of a template, a design file, an output folder, or a row of a
-    sweep such as ``"out/1dof-5mm-sweep/sweep.csv:12"``. Figures are at ``pressures_kpa``, times at
-    ``flow_ml_min``. With ``out``, ``out/compare/compare.html`` is written, with pictures of both.
-    Raises DesignError, and OutputError.
+    sweep such as ``"out/1dof-5mm-sweep/sweep.csv:12"``. Figures are at ``pressures_kpa``, by
+    default 10, times at ``flow_ml_min``. With ``out``, ``out/compare/compare.html`` is written,
+    with pictures of both. Raises DesignError, and OutputError.
     """
     designs = [
         source if isinstance(source, Design) else load_compared(source)
@@ -95,7 +95,7 @@ def compare(
         designs[0],
         designs[1],
         (names[0], names[1]),
-        numbers("pressures_kpa", pressures_kpa),
+        None if pressures_kpa is None else numbers("pressures_kpa", pressures_kpa),
         flow_ml_min,
     )
     if out is not None:

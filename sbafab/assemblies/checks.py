@@ -14,7 +14,9 @@ from sbafab.design.records import Discs
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.laminate import outline_diameter
 from sbafab.meshing.surface import Surface, Vector
-from sbafab.models.formulas import LOBES, deflated_diameter, folded_diameter, reached_diameter
+from sbafab.models.formulas import LOBES, deflated_diameter, folded_diameter
+from sbafab.models.formulas import sizes as sizes_of
+from sbafab.models.intervals import factors_of
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import holds, weakened
 
@@ -359,12 +361,8 @@ def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun
 # Ways of the whole: through an aperture, into a lumen, against its wall.
 
 
-PRESSED = 0.95 / 1.865
-"""Ratio of measured to nominal thickness of the paper's 15-balloon 3-DoF actuator (Sec. 4)."""
-
-
 class _Passage(NamedTuple):
-    """The diameter that a part needs, mm, with nominal films and films pressed as the paper's."""
+    """The diameter that a part needs, mm, with films as bought and at its folded height."""
 
     name: str
     nominal: float
@@ -389,8 +387,7 @@ def aperture(assembled: Assembled) -> Iterator[Finding]:
     elif holds(hole, worst.pressed):
         remedy = "try it in the aperture first"
         message = (
-            f"{remedy}: {message}, or {worst.pressed:.2f} if pressed as thin as the paper's, which "
-            "passed 9.25"
+            f"{remedy}: {message} with films as bought, or {worst.pressed:.2f} at its folded height"
         )
         yield Finding("aperture", "warn", hole, worst.nominal, "mm", WHOLE, message, remedy=remedy)
     else:
@@ -406,16 +403,17 @@ def _passage(placed: PlacedPart) -> _Passage:
         return _Passage(
             placed.name, size, 0.0 if soft else size, "squeezed" if soft else "as it is"
         )
-    form, laminate = placed.made.design.form, placed.made.laminate
+    design, laminate = placed.made.design, placed.made.laminate
+    form = design.form
     if form.wrap is not None:
-        size = deflated_diameter(form.wrap, laminate)
+        size = deflated_diameter(form.wrap, laminate.thickness)
         return _Passage(placed.name, size, size, "deflated")
     lobe = _lobe_width(placed)
     if lobe is not None:
         return _Passage(
             placed.name,
             folded_diameter(lobe, laminate.thickness),
-            folded_diameter(lobe, PRESSED * laminate.thickness),
+            folded_diameter(lobe, factors_of(design).folded(laminate).height),
             "folded",
         )
     return _Passage(placed.name, _flat_diameter(placed), 0.0, "unfolded")
@@ -460,7 +458,10 @@ def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
     ]
     widest, part, how = max(sizes, key=lambda entry: (round(entry[0], 6), entry[1].radius is None))
     good = widest < lumen
-    message = f"deflated, {part.name} is the widest part, {widest:.2f} in a lumen of {lumen:g}"
+    message = (
+        f"deflated, with films as bought, {part.name} is the widest part, {widest:.2f} in a lumen "
+        f"of {lumen:g}"
+    )
     if how:
         message += f", {how}"
         if part.radius is None and reach(part) > lumen:
@@ -476,7 +477,7 @@ def _deflated(placed: PlacedPart, assembled: Assembled) -> float:
         return _girth(placed)
     wrap, laminate = placed.made.design.form.wrap, placed.made.laminate
     if wrap is not None:
-        return deflated_diameter(wrap, laminate)
+        return deflated_diameter(wrap, laminate.thickness)
     if placed.radius is not None:
         return 2 * (placed.radius + laminate.thickness)
     return _flat_diameter(placed)
@@ -491,7 +492,7 @@ def lumen_brace(assembled: Assembled) -> Iterator[Finding]:
         (reached, placed.name)
         for placed in assembled.parts
         if placed.made is not None
-        and (reached := reached_diameter(placed.made.design.form, placed.made.laminate))
+        and (reached := sizes_of(placed.made.design, placed.made.laminate).get("reached_diameter"))
     ]
     if not sizes:
         message = (

@@ -6,11 +6,12 @@ import math
 from functools import cache
 from typing import TYPE_CHECKING
 
-from sbafab.calibration.fit import GROUP_OF, film_of, relative_errors, term_of
-from sbafab.calibration.model_values import ModelValue, NoModel, model_values
+from sbafab.calibration.fit import GROUP_OF, MIDDLES, relative_errors, term_of
+from sbafab.calibration.model_values import ModelledActuator, ModelValue, NoModel, model_values
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import SHARE, deviations
-from sbafab.models.intervals import Uncertainty, for_film
+from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
+from sbafab.models.unknowns import factors_at
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,12 +25,15 @@ Ends = tuple[float, float]
 
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
-    """Return a calibration as it holds for the film of the actuator that was measured."""
+    """Return a calibration as it holds for the actuator that was measured."""
+    if not curve.actuator.is_described:
+        return Uncertainty(calibration, {})
+    of = ModelledActuator(curve.actuator, factors_at(MIDDLES))
     try:
-        product = film_of(curve) if curve.actuator.is_described else calibration.film
+        subject = ActuatorSizes.of(of.design.form, of.laminate, calibration.film)
     except DesignError:
-        product = calibration.film
-    return Uncertainty(for_film(calibration, product), {})
+        return Uncertainty(calibration, {})
+    return Uncertainty(for_film(calibration, of.design.films.tpe.product), {}, subject)
 
 
 def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends | None] | None:

@@ -5,7 +5,7 @@ whose points are then predicted.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,7 +23,8 @@ from sbafab.calibration.posterior import (
 )
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration
+from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
+from sbafab.models.intervals import sizes_of
 from sbafab.models.unknowns import UNKNOWNS, factors_at
 from sbafab.process import Progress
 
@@ -149,7 +150,7 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress, about: str =
     posterior = sampled(curves)
     points = held_out(usable, curves, progress)
     return Fit(
-        as_calibration(name, about, films[0], sources, posterior, points),
+        as_calibration(name, about, films[0], sources, posterior, points, sizes_of_groups(usable)),
         tuple(points),
         tuple(open_set_ups(usable, curves, posterior)),
         tuple(left_out),
@@ -249,6 +250,16 @@ def predicted_points(
     ]
 
 
+def sizes_of_groups(curves: Sequence[MeasuredCurve]) -> dict[str, SizeRange]:
+    """Return the sizes of the actuators that were measured, by group of quantities."""
+    by_group: dict[str, SizeRange] = {}
+    for curve in curves:
+        of = ModelledActuator(curve.actuator, factors_at(MIDDLES))
+        sizes, group = sizes_of(of.design.form, of.laminate), GROUP_OF[curve.quantity]
+        by_group[group] = by_group[group].joined(sizes) if group in by_group else sizes
+    return by_group
+
+
 def as_calibration(
     name: str,
     about: str,
@@ -256,6 +267,7 @@ def as_calibration(
     sources: Sequence[Evidence],
     posterior: Posterior,
     points: Sequence[HeldOutPoint],
+    sizes: Mapping[str, SizeRange],
 ) -> ModelCalibration:
     """Return the calibration that a posterior stands for."""
     sentences = tuple(
@@ -272,6 +284,7 @@ def as_calibration(
             tuple(round(float(value), DIGITS + 2) for value in row) for row in posterior.covariance
         ),
         discrepancy={group: round(value, DIGITS) for group, value in posterior.discrepancy.items()},
+        sizes=sizes,
         points=len(points),
         inside=sum(point.is_inside for point in points),
         sentences=sentences,

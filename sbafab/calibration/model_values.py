@@ -23,7 +23,7 @@ from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import Factors, Figure, PredictionRequest
-from sbafab.models.formulas import burst_pressure, modulus, second_moments
+from sbafab.models.formulas import modulus, second_moments, usual_pressures
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
 from sbafab.models.prediction import plate_of, predict
@@ -171,7 +171,7 @@ class ModelledActuator:
         """The elastic stack. Raises DesignError for pockets that are not round."""
         if self.shares_maps:
             together, base = drawn_stack(self.measured, self.factors.pocket_loss)
-            moved = elastic.moved_stack(together, base, self.factors)
+            moved = elastic.moved_stack(together, self.laminate, base, self.factors)
             if moved is not None:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
@@ -183,7 +183,8 @@ class ModelledActuator:
 
     def figure(self, name: str) -> Figure:
         """Return the prediction's figure of a name. Raises DesignError where it has none."""
-        request = PredictionRequest((100.0,), calibration=self.factors)
+        pressures = usual_pressures(self.design.form)[-1:]
+        request = PredictionRequest(pressures, calibration=self.factors)
         prediction = predict(self.design, request, self.laminate, quick=True)
         for figure in prediction.figures:
             if figure.name == name:
@@ -571,27 +572,19 @@ def _sizes(name: str) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues
     return answer
 
 
-def _bursts(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-    value = burst_pressure(of.actuator.form, of.laminate)
-    if value is None:
-        return NoModel("no burst pressure was measured of such films or pockets")
-    model = "the paper's burst pressure, film stress in proportion"
-    return ModelValues(model, {"": (value,) * len(curve.y)})
-
-
 ANSWERS: dict[str, Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]] = {
     "force_n": _forces,
     "stroke_mm": _strokes,
     "height_mm": _strokes,
     "balloon_stroke_mm": _balloon_strokes,
     "bend_deg": _bends,
-    "flat_height_mm": _sizes("deflated height"),
+    "flat_height_mm": _sizes("folded height"),
     "energy_mj": _energies,
     "loss_mj": _losses,
     "loss_share": _loss_shares,
     "time_s": _times,
     "modulus_kpa": _moduli,
-    "burst_kpa": _bursts,
+    "burst_kpa": _sizes("burst pressure"),
     "deflated_diameter_mm": _sizes("deflated diameter"),
     "inflated_diameter_mm": _sizes("inflated diameter"),
     "folded_diameter_mm": _sizes("folded diameter"),

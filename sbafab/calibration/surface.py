@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from sbafab.models.figures import Factors
     from sbafab.models.film_elements import Array
 
-NODES = (11, 6, 2)
+NODES = (11, 6, 6)
 """Nodes by modulus ratio, pocket loss and press factor."""
 IMPOSSIBLE = 1e-3
 """Share of a curve's measured values that stands for a state which an actuator cannot reach."""

@@ -19,7 +19,6 @@ from sbafab.cli.printing import console, print_json, print_line, print_verdict
 from sbafab.cli.progress import shown_progress
 from sbafab.search.compare import (
     PAGE,
-    PRESSURES,
     DesignComparison,
     load_compared,
     margin_text,
@@ -63,7 +62,7 @@ def compare(
     designs = [load_compared(source, assignments) for source in (first, second)]
     with shown_progress(as_json) as progress:
         comparison = compared(
-            designs[0], designs[1], (first, second), pressures or PRESSURES, flow_ml_min, progress
+            designs[0], designs[1], (first, second), pressures or None, flow_ml_min, progress
         )
         folder = write_page(comparison, out)
     if as_json:

@@ -29,6 +29,7 @@ from sbafab.cli.printing import (
 from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
+from sbafab.models.figures import FLAGS
 from sbafab.output.schema_ids import FIND_SCHEMA
 from sbafab.search.find import (
     FOUND,
@@ -270,6 +271,7 @@ def as_json(result: FoundDesign, origin: str, target: Path) -> dict[str, Any]:
         "sure": result.problem.sure,
         "best": trial_json(result.best),
         "intervals": {label: list(ends) for label, ends in result.intervals.items()},
+        "flags": {label: list(flags) for label, flags in result.flags.items()},
         "requirements": [_requirement_json(result, row) for row in result.problem.requirements],
         "measured": {name: row.as_dict() for name, row in result.measured.items()},
         "missed": result.missed,
@@ -366,6 +368,8 @@ def _interval_text(result: FoundDesign, subject: Requirement | Goal) -> str:
 
 
 def _print_measured(result: FoundDesign, quantity: RequestedQuantity) -> None:
+    for flag in result.flags.get(quantity.label, ()):
+        print_wrapped(f"({FLAGS[flag]})", indent="    ")
     measured = result.measured.get(quantity.label)
     if measured is not None:
         print_wrapped(f"({measured.sentence()})", indent="    ")

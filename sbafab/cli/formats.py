@@ -21,7 +21,7 @@ from sbafab.laminate.joints import FaceBond, Fold, Net, Port, PortKind, Seam
 from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
 from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
-from sbafab.models.figures import Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
@@ -626,9 +626,15 @@ def _batch() -> dict[str, Any]:
     )
 
 
+FLAG_LIST = {
+    **array({"enum": list(FLAGS)}),
+    "description": "; ".join(f"{flag}: {words}" for flag, words in FLAGS.items()),
+}
+
+
 def _predict() -> dict[str, Any]:
     loss = {**number(), "description": "mm"}
-    factors = of(Factors, pocket_loss=loss)["properties"]
+    factors = of(Factors, "press_film", pocket_loss=loss)["properties"]
     asked = of(PredictionRequest, "calibration", **factors)
     design_with = {
         "type": "boolean",
@@ -662,6 +668,8 @@ def _predict() -> dict[str, Any]:
         measured=measured,
         between=between,
         interval=interval,
+        pressure_kpa={**number("null"), "description": "gauge, a vacuum below 0; null at none"},
+        flags=FLAG_LIST,
     )
     relation = table(
         name=TEXT,
@@ -733,6 +741,11 @@ def _find() -> dict[str, Any]:
             "type": "object",
             "description": "90 % intervals of the best, by quantity, where a calibration says so",
             "additionalProperties": ends,
+        },
+        flags={
+            "type": "object",
+            "description": "what figures of the best are not to be trusted for, by quantity",
+            "additionalProperties": FLAG_LIST,
         },
         requirements=array(requirement),
         measured={

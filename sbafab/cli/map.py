@@ -7,13 +7,13 @@ from typing import Any
 
 import click
 
-from sbafab.actuators import load_design
+from sbafab.actuators import build, load_design
 from sbafab.cli import options
 from sbafab.cli.options import PRESSURE, calibration_options, refuse_options, set_option
 from sbafab.cli.printing import print_verdict
 from sbafab.cli.progress import print_result
 from sbafab.errors import DesignError, OutputError
-from sbafab.models.formulas import force
+from sbafab.models.formulas import refuse_beyond_burst, refuse_pressure
 from sbafab.models.intervals import factors_of
 from sbafab.models.map_files import FORMATS, map_text
 from sbafab.models.stack import stack
@@ -79,8 +79,9 @@ def map_(
         refuse_options("is for a MuJoCo model; give --to FILE.xml, or leave it out", "pressures")
     if pressure <= 0:
         raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
-    force(pressure, 0.0)  # raises past the burst pressure
     design = load_design(source, assignments, ())
+    refuse_pressure(pressure)
+    refuse_beyond_burst(build(design), pressure)
     actuator = stack(design, most_pressure=pressure, factors=factors_of(design, factors))
     if form == MUJOCO:
         each = _listed(pressures, actuator.chambers)

@@ -36,8 +36,16 @@ from sbafab.design.records import Design, Drawn
 from sbafab.errors import OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form
-from sbafab.models.figures import LEFT_OUT, Figure, Model, Prediction, PredictionRequest
-from sbafab.models.formulas import size_phrases
+from sbafab.models.figures import (
+    FLAGS,
+    LEFT_OUT,
+    NEAR_BURST,
+    Figure,
+    Model,
+    Prediction,
+    PredictionRequest,
+)
+from sbafab.models.formulas import size_phrases, usual_pressures
 from sbafab.models.prediction import predict as predicted
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
@@ -62,7 +70,8 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
     type=PRESSURE.read,
     multiple=True,
     metavar="P",
-    help="Pressure for force and work, kPa or with a unit. Repeatable.  [default: 10, 100]",
+    help="Gauge pressure of force and work, kPa or with a unit; a vacuum is negative. Repeatable.  "
+    "[default: 10, 100; of a design that works under a vacuum -10, -100]",
 )
 @flow_option("Flow for the actuation time")
 @click.option(
@@ -78,7 +87,8 @@ FORMULA_OPTIONS = ("flow_ml_min", "volumes", "contact_factor")
     type=float,
     callback=finite,
     metavar="F",
-    help="Measured ratio of pressed thickness to film thickness.  [default: the calibration's]",
+    help="Measured thickness after the press over that before, of films that melt in it.  "
+    "[default: the calibration's]",
 )
 @click.option(
     "--contact-factor",
@@ -130,7 +140,7 @@ def predict(
         return
     _refuse_for_design(design)
     wish = PredictionRequest(
-        pressures or PredictionRequest.pressures_kpa, flow_ml_min, volumes, overrides=factors
+        pressures or usual_pressures(design.form), flow_ml_min, volumes, overrides=factors
     )
     with shown_progress(request.as_json) as progress:
         progress("predicting", 0, 1)
@@ -155,8 +165,7 @@ def predict(
         folder = None if run.occupied else str(run.folder)
         print_json({**document, "failed": failed, "folder": folder})
     else:
-        pressed = prediction.asked.factors.press_factor
-        print_listed("size", size_phrases(design, run.laminate, pressed))
+        print_listed("size", size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
         if sensitivity:
             _print_sensitivity(rows, wish.pressures_kpa[0])
@@ -349,6 +358,8 @@ def print_assembly_prediction(prediction: AssemblyPrediction) -> None:
         print_wrapped(f"{'; '.join(dict.fromkeys(names))}: {measured}")
     for reason in prediction.left_out:
         print_line(f"left out: {reason}")
+    for part in prediction.near_burst:
+        print_line(f"{part}: {FLAGS[NEAR_BURST]}")
     for sentence in prediction.met():
         print_line(sentence)
     pressure = f"at {prediction.pressure_kpa:g} kPa"

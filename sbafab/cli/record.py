@@ -509,10 +509,6 @@ def _add_records(
 # Printing: records as lines, the four tables of the report.
 
 
-FACTORS = {"height_mm": ("--press-factor", 1.0), "force_n": ("--contact-factor", 10.0)}
-"""Options of ``sbafab predict`` for a measured ratio, and its largest value."""
-
-
 class Shown(NamedTuple):
     """Records and entries to print, all those among which corrections are looked for, designs."""
 
@@ -681,19 +677,16 @@ def _advice(report: Report) -> Iterable[str]:
                 f"{errors.highest:.3g} {tolerance.unit} covers {errors.errors} measurements"
             )
     for compared in report.comparisons:
-        factor, most = FACTORS.get(compared.quantity, ("", 0.0))
-        value = (compared.ratio or 0.0) * _predicted_factor(compared)
-        if factor and 0 < value <= most and compared.verdict == "differs":
+        if compared.verdict != "differs":
+            continue
+        value = compared.ratio or 0.0
+        if compared.quantity == "force_n" and 0 < value <= 10:
             yield (
-                f"{compared.design}: sbafab predict {factor} {value:.3f} uses the measured "
-                f"{compared.quantity}"
+                f"{compared.design}: sbafab predict --contact-factor {value:.3f} uses the measured "
+                "force_n"
             )
-
-
-def _predicted_factor(compared: Comparison) -> float:
-    """Return the press factor that a prediction has in it already; 1 without one."""
-    found = re.search(r" x press factor ([\d.]+)", compared.model)
-    return float(found[1]) if found else 1.0
+        if compared.quantity == "height_mm":
+            yield f"{compared.design}: sbafab calibrate fits the press factor to its height_mm"
 
 
 def _print_table(title: str, names: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -29,6 +29,7 @@ LATER: Mapping[str, Sequence[str]] = {
     "order": ("success_rate", "certainty", "shift_hours"),
     "laser": ("hold_tpe", "hold_ptfe"),
     "panel": ("carrier_adhesive", "carrier_limit_c"),
+    "acceptance": ("safety_factor",),
 }
 """Keys that came after the first hashes, which have none of them."""
 
@@ -80,7 +81,7 @@ def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
     for section, keys in LATER.items():
         current = getattr(design, section)
         default = type(current)()
-        for key in keys:
+        for key in keys if table[section] is not None else ():
             if getattr(current, key) == getattr(default, key):
                 table[section][key] = None
 

@@ -69,6 +69,7 @@ SECTIONS = (
 OF_A_DESIGN = (
     "registration.method",
     "registration.experimental",
+    "acceptance.working_pressure_kpa",
     "rules.waive",
     "rules.target_yield",
     "rules.yield_builds",

@@ -394,6 +394,11 @@ class Form:
         return self.stacks > 1 and self.wrap is None
 
     @property
+    def works_under_vacuum(self) -> bool:
+        """True if its pressures are below that of the atmosphere: negative, as gauges show them."""
+        return self.mechanism is not None and self.mechanism.kind == "jamming"
+
+    @property
     def pushing(self) -> int:
         """Number of stacks that push one way: all on common plates, one of those round a tube."""
         return self.stacks if self.wrap is None else 1

@@ -185,6 +185,7 @@ RuleName = Literal[
     "scrap",
     "film-limits",
     "press-fit",
+    "pressure-rating",
     "registration-nominal",
     "registration-worst-case",
     "registration-yield",
@@ -495,9 +496,17 @@ class Press(Section):
 
 
 class Acceptance(Section):
-    """What an actuator must stand before it is handed on: all ours but the burst that it stays
-    below.
+    """What an actuator works at, and must stand before it is handed on: all ours but the burst that
+    it stays below.
     """
+
+    working_pressure_kpa: float | None = Field(default=None, ge=-101.325, le=10000)
+    """The most that it works at, as a gauge shows it: a vacuum is negative. By default none is
+    stated, and the rule pressure-rating warns where it would not do for 100 kPa, at which the paper
+    gives forces."""
+    safety_factor: float = Field(default=2.0, ge=1, le=100)
+    """The estimated burst pressure over the most that it works at. Ours: the estimate is of three
+    actuators, and nobody knows how many strokes a film stands."""
 
     leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
     """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""

@@ -26,8 +26,8 @@ from sbafab.geometry.edges import (
     meeting_points,
 )
 from sbafab.geometry.nearby import ALONGSIDE, BoundarySide, EdgeIndex, Foot, widened
-from sbafab.geometry.offset import Kerf, Lost, widths
-from sbafab.geometry.region import Region
+from sbafab.geometry.offset import Kerf, Lost, shrink, widths
+from sbafab.geometry.region import Region, centroid
 
 SHORTER = 1e-9
 """mm by which a segment must be shorter than another to be the narrowest."""
@@ -632,3 +632,40 @@ def _has_near(contour: Contour, contours: Sequence[Contour], reach: float) -> bo
         ):
             return True
     return False
+
+
+# The widest place of a region.
+
+
+class InscribedDisc(NamedTuple):
+    """The largest disc within a region: its radius in mm and centre."""
+
+    radius: float
+    centre: Point
+
+
+@cached
+def inscribed_disc(region: Region) -> InscribedDisc:
+    """Return the largest disc within a region that is not empty: of a circle itself, of others
+    within 1e-4 of its radius, where the centre of what is left by an offset is not exactly it.
+    """
+    circles = [None if region.holes else outer.circle for outer in region.outers]
+    widest = max((c for c in circles if c), key=lambda c: c[1], default=((0.0, 0.0), 0.0))
+    low, high, core = widest[1], 0.0, Region()
+    for outer, circle in zip(region.outers, circles, strict=True):
+        x, y, u, v = outer.bounds
+        high = max(high, 0.0 if circle else min(u - x, v - y) / 2)
+    while high > low * (1 + DISC_SHARE):
+        middle = (low + high) / 2
+        left = shrink(region, middle)
+        low, high, core = (low, middle, core) if left.is_empty else (middle, high, left)
+    if core.is_empty:
+        return InscribedDisc(widest[1], widest[0])
+    centre = centroid(max(core.pieces, key=lambda piece: piece.area))
+    if not region.contains(centre) or region.distance_to_edge(centre) < low:
+        centre = core.contours[0].edges[0].at(0.5)  # What is left may lie round a hole.
+    return InscribedDisc(max(low, region.distance_to_edge(centre)), centre)
+
+
+DISC_SHARE = 1e-4
+"""Share of a radius to which an inscribed disc is known."""

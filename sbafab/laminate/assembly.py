@@ -1,4 +1,5 @@
-"""Assembly steps: the stacks laid on each other in each closing of the press, and its pins.
+"""Assembly steps: the stacks laid on each other in each closing of the press, its pins; what the
+press leaves of the films.
 
 The paper's four steps (Sec. 2) without those that have nothing to press. Ears register layers in
 the full bonds too: a flash bond on the pins comes first, and the full bond after it without them.
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from sbafab.geometry.cache import stored
+from sbafab.laminate.films import Film
 from sbafab.laminate.joining import Joining, is_only_pressed, joinings
 from sbafab.laminate.joints import PRESS
 from sbafab.laminate.laminate import Laminate, Layer, Pin
@@ -191,6 +193,48 @@ def pressed_layers(laminate: Laminate) -> list[Layer]:
     """Return the layers that lie in the press in some step."""
     pressed = {index for step in assembly(laminate) for index in step.layers}
     return [layer for layer in laminate.layers if layer.index in pressed]
+
+
+@dataclass(frozen=True)
+class FoldedHeight:
+    """Height of a flat laminate after the press: ``solid`` mm of masks, of films that do not melt
+    in a press step and of the ``unmeasured`` ones, of whose flow nothing is known; ``factor`` is
+    what the press leaves of the others, ``molten`` mm as bought.
+    """
+
+    solid: float
+    molten: float
+    factor: float
+    unmeasured: tuple[Film, ...]
+
+    @property
+    def height(self) -> float:
+        """The height in mm."""
+        return self.solid + self.factor * self.molten
+
+    @property
+    def nominal(self) -> float:
+        """The sum of the films as bought in mm."""
+        return self.solid + self.molten
+
+    @property
+    def remark(self) -> str:
+        """What is not known of the flow of its films, in words; else empty."""
+        names = sorted({film.product for film in self.unmeasured})
+        return f"{' and '.join(names)} as bought: no press factor is known" if names else ""
+
+
+def folded_height(laminate: Laminate, factor: float, product: str = "") -> FoldedHeight:
+    """Return the folded height of a laminate: the only one, of all commands, pages and files.
+
+    ``factor`` is what the press leaves of the thickness of films that melt in it, of one
+    ``product``, or of all where that is empty; 1 where nobody says.
+    """
+    melts = [layer.film for layer in pressed_layers(laminate) if layer.film.melts]
+    known = [film for film in melts if product in ("", film.product)]
+    molten = sum(film.thickness for film in known)
+    unknown = () if factor == 1 else dict.fromkeys(film for film in melts if film not in known)
+    return FoldedHeight(laminate.thickness - molten, molten, factor, tuple(unknown))
 
 
 def is_laid_by_hand(laminate: Laminate, step: AssemblyStep) -> bool:

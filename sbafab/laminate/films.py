@@ -24,6 +24,8 @@ PAPER_TPE = (10.0, 0.2)
 """Young's modulus in MPa and Poisson's ratio of the paper's model (Sec. 3.2.1)."""
 PAPER_PRODUCT, PAPER_THICKNESS = "Stretchlon 200", 0.038
 """The film that the paper bonded, and its thickness in mm (Sec. 2)."""
+PAPER_BURST = (367.0, 18.0)
+"""kPa at which pockets of 5 mm in that film burst, and its error (Sec. 4)."""
 GAUGE = 0.1
 """Tolerance of a film's thickness, as a share: our estimate of what is sold."""
 
@@ -71,6 +73,14 @@ class Film:
     def is_the_papers(self) -> bool:
         """True for the film of the actuators that the paper measured, as thick and as stiff."""
         return self.is_a(PAPER_PRODUCT, PAPER_THICKNESS) and self.elastic == PAPER_TPE
+
+    @property
+    def melts(self) -> bool:
+        """True if it melts through where a press bonds it: no mask, no sheet that stays solid, and
+        no sheet with a coating, whose faces are of two materials.
+        """
+        is_coated = self.faces is not None and self.faces[0] != self.faces[1]
+        return not (self.is_mask or self.stays_solid or is_coated)
 
     @property
     def is_mask(self) -> bool:

@@ -4,18 +4,19 @@ that designs and kits name, and the 90 % intervals of predictions that follow fr
 Unknowns have a normal posterior in their coordinates. A prediction is linear in them: its
 logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
 change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
-deviation for each group of quantities.
+deviation for each group of quantities; farther from the evidence of a group, in size, film or
+number of balloons, more is assumed to be missed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from sbafab.models.unknowns import UNKNOWNS, factors_at
 if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
 
-SCHEMA = "sbafab/calibration@1"
+SCHEMA = "sbafab/calibration@2"
 NONE: Literal["none"] = "none"
 """The name of no calibration: the films as drawn and bought, and no intervals."""
 FILE = "calibration.toml"
@@ -36,12 +37,32 @@ GROUPS = ("force", "motion", "flat height", "time", "work", "stiffness", "loss")
 """Groups of quantities, each with a discrepancy of its own."""
 SHARE = 0.9
 """Probability that an interval holds the measured value."""
-FIRST_UNKNOWNS = 5
-"""Unknowns of files that older versions wrote; the others have their priors."""
-UNKNOWN_LOSS = 0.15
-"""Discrepancy of the group "loss" in such files: the middle of its prior."""
 DESIGN_UNKNOWNS = 3
 """The first of UNKNOWNS, which change an actuator; the others change its supply."""
+
+
+Ends = tuple[float, float]
+"""Least and largest value."""
+
+
+class SizeRange(NamedTuple):
+    """Least and largest diameter of round pockets and thickness of films that bond, mm, and number
+    of balloons in a stack: of an actuator, or of several.
+    """
+
+    diameters: Ends | None
+    thicknesses: Ends
+    balloons: Ends
+
+    def joined(self, other: SizeRange) -> SizeRange:
+        """Return the sizes of both."""
+        return SizeRange(*(_hull(a, b) for a, b in zip(self, other, strict=True)))  # type: ignore[arg-type]
+
+
+def _hull(first: Ends | None, second: Ends | None) -> Ends | None:
+    if first is None or second is None:
+        return first or second
+    return min(first[0], second[0]), max(first[1], second[1])
 
 
 @dataclass(frozen=True)
@@ -49,9 +70,9 @@ class ModelCalibration:
     """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``UNKNOWNS``, and
     ``discrepancy``, the relative standard deviation that the models miss, by group.
 
-    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to;
-    ``inside`` of ``points`` left-out points lay in their intervals. ``sentences`` say what the
-    evidence cannot tell apart.
+    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
+    ``sizes`` those of its actuators by group of quantities; ``inside`` of ``points`` left-out
+    points lay in their intervals. ``sentences`` say what the evidence cannot tell apart.
     """
 
     name: str
@@ -61,6 +82,7 @@ class ModelCalibration:
     mean: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
     discrepancy: Mapping[str, float]
+    sizes: Mapping[str, SizeRange]
     points: int
     inside: int
     sentences: tuple[str, ...]
@@ -73,7 +95,10 @@ class ModelCalibration:
     @cached_property
     def factors(self) -> Factors:
         """The factors at the median."""
-        return factors_at(self.values)
+        return self._factors_at(self.values)
+
+    def _factors_at(self, values: Mapping[str, float]) -> Factors:
+        return replace(factors_at(values), press_film=self.film)
 
     def bounds(self, field: str) -> tuple[float, float]:
         """Return the 90 % interval of an unknown."""
@@ -94,7 +119,7 @@ class ModelCalibration:
             if abs(unknown.coordinate(value) - self.mean[row]) < step / 2:
                 value = unknown.value(self.mean[row] - step)
             change = unknown.coordinate(value) - unknown.coordinate(start)
-            moved.append((change, factors_at({**self.values, unknown.field: value})))
+            moved.append((change, self._factors_at({**self.values, unknown.field: value})))
         return moved
 
     def variance(self, slopes: Sequence[float]) -> float:
@@ -106,21 +131,24 @@ class ModelCalibration:
         return float(rates @ np.array(self.covariance) @ rates)
 
     def interval(
-        self, group: str, value: float, slopes: Sequence[float], is_log: bool, share: float = SHARE
+        self,
+        group: str,
+        value: float,
+        slopes: Sequence[float],
+        is_log: bool,
+        share: float = SHARE,
+        farther: float = 0.0,
     ) -> tuple[float, float]:
         """Return the interval that holds the measured value with a probability of ``share``.
 
         ``slopes`` are those of the logarithm of the value (``is_log``) or of the value, by
-        coordinate.
+        coordinate; ``farther`` is the relative standard deviation assumed off the evidence.
         """
-        half = deviations(share) * self._deviation(group, value, slopes, is_log)
+        missed = math.hypot(self.discrepancy[group], farther) * (1.0 if is_log else abs(value))
+        half = deviations(share) * math.sqrt(self.variance(slopes) + missed**2)
         if is_log:
             return value * math.exp(-half), value * math.exp(half)
         return value - half, value + half
-
-    def _deviation(self, group: str, value: float, slopes: Sequence[float], is_log: bool) -> float:
-        missed = self.discrepancy[group] * (1.0 if is_log else abs(value))
-        return math.sqrt(self.variance(slopes) + missed**2)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the tables of the file."""
@@ -135,8 +163,13 @@ class ModelCalibration:
             "covariance": [list(row) for row in self.covariance],
             "sentences": list(self.sentences),
             "discrepancy": dict(self.discrepancy),
+            "sizes": {group: _listed(sizes) for group, sizes in self.sizes.items()},
             "held_out": {"points": self.points, "inside": self.inside},
         }
+
+
+def _listed(sizes: SizeRange) -> dict[str, list[float]]:
+    return {name: list(ends) for name, ends in sizes._asdict().items() if ends is not None}
 
 
 @cache
@@ -213,32 +246,32 @@ KEYS = {
     "covariance": list,
     "sentences": list,
     "discrepancy": dict,
+    "sizes": dict,
     "held_out": dict,
 }
 
 
 def _check_keys(tables: Mapping[str, Any]) -> None:
+    if tables.get("schema") != SCHEMA:
+        raise DesignError(f"schema = {shown(tables.get('schema'))} must be {SCHEMA!r}")
     for key in tables:
         if key not in KEYS:
             raise DesignError(f"{shown(key)} is no key of a calibration; it has {listed(KEYS)}")
     for key, kind in KEYS.items():
         if not isinstance(tables.get(key), kind):
             raise DesignError(f"{key} is missing or not a {kind.__name__}")
-    if tables["schema"] != SCHEMA:
-        raise DesignError(f"schema = {shown(tables['schema'])} must be {SCHEMA!r}")
 
 
 def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
     _check_keys(tables)
     fields = [unknown.field for unknown in UNKNOWNS]
-    if tables["unknowns"] not in (fields, fields[:FIRST_UNKNOWNS]):
+    if tables["unknowns"] != fields:
         raise DesignError(f"unknowns must be {listed(fields)}, in this order")
     count = len(tables["unknowns"])
     mean = _numbers(tables["mean"], "mean", (count,))
     covariance = _numbers(tables["covariance"], "covariance", (count, count))
     if not np.allclose(covariance, covariance.T) or np.linalg.eigvalsh(covariance).min() <= 0:
         raise DesignError("covariance must be symmetric and positive definite")
-    mean, covariance = _with_priors(mean, covariance)
     for unknown, coordinate in zip(UNKNOWNS, mean, strict=True):
         low, high = unknown.coordinate(unknown.least or 1e-9), unknown.coordinate(unknown.most)
         if not low - 1e-9 <= coordinate <= high + 1e-9:
@@ -246,8 +279,7 @@ def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
                 f"mean of {unknown.field} must be from {low:.3g} to {high:.3g}"
                 + (" (a logarithm)" if unknown.is_log else "")
             )
-    given = {"loss": UNKNOWN_LOSS, **tables["discrepancy"]}
-    spreads: dict[str, Any] = {group: given.get(group) for group in GROUPS}
+    spreads: dict[str, Any] = {group: tables["discrepancy"].get(group) for group in GROUPS}
     for group, value in spreads.items():
         if not isinstance(value, int | float) or not 0 <= value <= 10:
             raise DesignError(f'discrepancy."{group}" must be a number from 0 to 10')
@@ -263,19 +295,29 @@ def _checked(tables: Mapping[str, Any]) -> ModelCalibration:
         tuple(mean.tolist()),
         tuple(tuple(row) for row in covariance.tolist()),
         spreads,
+        {group: _sizes(group, table) for group, table in tables["sizes"].items()},
         points,
         inside,
         tuple(map(str, tables["sentences"])),
     )
 
 
-def _with_priors(mean: Array, covariance: Array) -> tuple[Array, Array]:
-    """Return mean and covariance of all unknowns; those that a file lacks have their priors."""
-    for unknown in UNKNOWNS[len(mean) :]:
-        mean = np.append(mean, unknown.coordinate(unknown.middle))
-        covariance = np.pad(covariance, (0, 1))
-        covariance[-1, -1] = unknown.spread**2
-    return mean, covariance
+def _sizes(group: str, table: object) -> SizeRange:
+    """Return the sizes of a group's evidence. Raises DesignError."""
+    names = SizeRange._fields
+    if group not in GROUPS or not isinstance(table, dict) or not set(table) <= set(names):
+        raise DesignError(f"sizes.{shown(group)} must be a table of {listed(names)}, by group")
+    ends: list[Ends | None] = []
+    for name in names:
+        given = table.get(name)
+        if given is None and name == "diameters":
+            ends.append(None)
+            continue
+        low, high = _numbers(given, f"sizes.{shown(group)}.{name}", (2,)).tolist()
+        if not 0 < low <= high:
+            raise DesignError(f"sizes.{shown(group)}.{name} must be two numbers above 0, in order")
+        ends.append((low, high))
+    return SizeRange(*ends)  # type: ignore[arg-type]
 
 
 def _numbers(values: object, key: str, shape: tuple[int, ...]) -> Array:

@@ -153,4 +153,6 @@ def flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figu
     area = actuator.form.pushing * read_outline(drawing).area
     for pressure in request.pressures_kpa:
         name = f"blocked force at {pressure:g} kPa, flat, at most"
-        yield Figure("force", name, float(force(pressure, area)), "N", FLAT_PLATES)
+        yield Figure(
+            "force", name, float(force(pressure, area)), "N", FLAT_PLATES, pressure_kpa=pressure
+        )

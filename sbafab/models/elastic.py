@@ -37,6 +37,7 @@ from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from sbafab.laminate.laminate import Laminate
     from sbafab.models.balloon_map import BalloonMap
     from sbafab.models.film_elements import Array
 
@@ -96,11 +97,18 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
             continue
         height = actuator.thickness + rise.stroke
         volume = rise.volume / actuator.balloons
-        yield Figure("stroke", f"free stroke {at}", rise.stroke, "mm", model)
-        yield Figure("stroke", f"free height {at}", height, "mm", model)
-        yield Figure("stroke", f"volume a balloon {at}", volume, "ul", model)
+        yield Figure("stroke", f"free stroke {at}", rise.stroke, "mm", model, pressure_kpa=pressure)
+        yield Figure("stroke", f"free height {at}", height, "mm", model, pressure_kpa=pressure)
+        yield Figure("stroke", f"volume a balloon {at}", volume, "ul", model, pressure_kpa=pressure)
         work = rise.energy * actuator.form.stacks / 1000
-        yield Figure("actuation", f"pneumatic input work {at}, free", work, "mJ", model)
+        yield Figure(
+            "actuation",
+            f"pneumatic input work {at}, free",
+            work,
+            "mJ",
+            model,
+            pressure_kpa=pressure,
+        )
     if request.factors.loss_share:
         yield Figure("actuation", paper.LOST_WORK, 100 * request.factors.loss_share, "%", model)
 
@@ -240,15 +248,19 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
         return LeftOut("elastic stack", str(error))
 
 
-def moved_stack(together: Stack, factors: Factors, moved: Factors) -> Stack | None:
-    """Return a stack of ``factors`` at other ones without new maps; None where it needs them."""
+def moved_stack(
+    together: Stack, laminate: Laminate, factors: Factors, moved: Factors
+) -> Stack | None:
+    """Return a laminate's stack of ``factors`` at other ones without new maps; None where it needs
+    them.
+    """
     if (moved.pocket_loss, moved.modulus_mpa) != (factors.pocket_loss, factors.modulus_mpa):
         return None
     ratio = moved.modulus_ratio / factors.modulus_ratio
     return replace(
         together,
         maps=tuple(kind.stiffened(ratio) for kind in together.maps),
-        pitch=together.pitch * moved.press_factor / factors.press_factor,
+        pitch=moved.folded(laminate).height / len(together.levels),
     )
 
 
@@ -317,7 +329,8 @@ def _forces(
             pose = _level_pose(stack, pressure, stroke)
             if pose and not pose.stable:
                 model = replace(model, trust=f"{BUCKLES}; {model.trust}")
-            yield Figure("force", name, actuator.form.pushing * value, "N", model), pose
+            value *= actuator.form.pushing
+            yield Figure("force", name, value, "N", model, pressure_kpa=pressure), pose
 
 
 def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
@@ -343,29 +356,25 @@ def chamber_count(number: int) -> str:
 
 
 def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
-    model, bent = calibrated(BEND, request.factors), {}
+    bent: list[tuple[float, str, Pose]] = []
     for pressure, chambers in product(request.pressures_kpa, range(1, stack.chambers)):
         where = f"{pressure:g} kPa in {chamber_count(chambers)}, the others empty"
         try:
-            bent[where] = stack.pose(_pressures(stack, chambers, pressure))
+            pose = stack.pose(_pressures(stack, chambers, pressure))
+            bent.append((pressure, where, pose))
         except DesignError as error:
             yield LeftOut(f"bend at {where}", str(error)), None
-    rooms = chamber_clearances(stack, tuple(bent.values()))
-    for (where, pose), room in zip(bent.items(), rooms.tolist(), strict=True):
-        yield Figure("bending", f"bend at {where}", pose.bend, "deg", model), pose
-        for figure in _clearances(where, request, rim_gap(stack, pose), room):
-            yield figure, pose
+    rooms = chamber_clearances(stack, [pose for _, _, pose in bent])
+    bends, contacts = (calibrated(model, request.factors) for model in (BEND, CONTACT))
+    for (pressure, where, pose), room in zip(bent, rooms.tolist(), strict=True):
         aside = float(np.hypot(*pose.tip[:2]))
-        yield Figure("bending", f"lateral tip displacement at {where}", aside, "mm", model), pose
-
-
-def _clearances(
-    where: str, request: PredictionRequest, rims: float, chambers: float
-) -> Iterator[Figure]:
-    """Yield the clearances of a bent stack in mm: between ``rims``, and between ``chambers``."""
-    model = calibrated(CONTACT, request.factors)
-    yield Figure("bending", f"room between rims on the inner side, {where}", rims, "mm", model)
-    yield Figure("bending", f"clearance between chambers, {where}", chambers, "mm", model)
+        for name, value, unit, model in (
+            (f"bend at {where}", pose.bend, "deg", bends),
+            (f"room between rims on the inner side, {where}", rim_gap(stack, pose), "mm", contacts),
+            (f"clearance between chambers, {where}", room, "mm", contacts),
+            (f"lateral tip displacement at {where}", aside, "mm", bends),
+        ):
+            yield Figure("bending", name, value, unit, model, pressure_kpa=pressure), pose
 
 
 def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
@@ -417,7 +426,7 @@ def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem
             except DesignError as error:
                 yield LeftOut(name, str(error)), None
                 continue
-            yield Figure("force", name, pressed.force, "N", model), pressed
+            yield Figure("force", name, pressed.force, "N", model, pressure_kpa=pressure), pressed
 
 
 def _three(values: Array) -> tuple[float, float, float]:
@@ -464,9 +473,19 @@ def _times(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     except DesignError as error:
         yield LeftOut(name, str(error)), None
         return
-    yield Figure("actuation", name, time + request.factors.water_delay, "s", model), pose
+    yield (
+        Figure(
+            "actuation",
+            name,
+            time + request.factors.water_delay,
+            "s",
+            model,
+            pressure_kpa=paper.FULL_KPA,
+        ),
+        pose,
+    )
     name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
-    yield Figure("actuation", name, pose.height, "mm", model), pose
+    yield Figure("actuation", name, pose.height, "mm", model, pressure_kpa=paper.FULL_KPA), pose
 
 
 def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
@@ -479,7 +498,17 @@ def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
             yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request), start
             shut, _ = shut_stiffness(stack, pressure)
             model = calibrated(CHAMBERS_SHUT, request.factors)
-            yield Figure("stiffness", f"{name}, chambers shut", shut, "N/mm", model), start
+            yield (
+                Figure(
+                    "stiffness",
+                    f"{name}, chambers shut",
+                    shut,
+                    "N/mm",
+                    model,
+                    pressure_kpa=pressure,
+                ),
+                start,
+            )
         except DesignError as error:
             yield LeftOut(name, str(error)), None
 
@@ -497,7 +526,8 @@ def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
 
 def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:
     value = PROBE_FORCE / float(pose.tip[0])
-    return Figure("stiffness", name, value, "N/mm", calibrated(model, request.factors))
+    model = calibrated(model, request.factors)
+    return Figure("stiffness", name, value, "N/mm", model, pressure_kpa=pose.pressures[0])
 
 
 def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:

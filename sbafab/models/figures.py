@@ -9,9 +9,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from sbafab.errors import DesignError
+from sbafab.laminate.assembly import folded_height
 from sbafab.models import paper, printed
 from sbafab.models.paper import EQ_4, Counterpart, is_calibrated
 from sbafab.notebook import data_frame, table_html
@@ -19,8 +20,19 @@ from sbafab.notebook import data_frame, table_html
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from sbafab.laminate.assembly import FoldedHeight
+    from sbafab.laminate.laminate import Laminate
+
 MEASURED = "measured (paper)"
 """Stands for a model's name."""
+Flag = Literal["extrapolation", "near-burst"]
+EXTRAPOLATION: Flag = "extrapolation"
+NEAR_BURST: Flag = "near-burst"
+FLAGS: Mapping[Flag, str] = {
+    EXTRAPOLATION: "an extrapolation: nothing like it was measured",
+    NEAR_BURST: "above half of the estimated burst pressure",
+}
+"""What a figure's flags say."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +61,8 @@ class Figure:
     ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
     The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
     What would be measured lies in the ``interval``, in the same ``unit``, with a probability of
-    90 %, where a calibration says so.
+    90 %, where a calibration says so. It is at ``pressure_kpa`` (gauge, a vacuum below 0), if at
+    any. ``flags`` say what it is not to be trusted for.
     """
 
     group: str
@@ -61,6 +74,8 @@ class Figure:
     measured: Counterpart | None = None
     between: tuple[float, float] | None = None
     interval: tuple[float, float] | None = None
+    pressure_kpa: float | None = None
+    flags: tuple[Flag, ...] = ()
 
     @property
     def counterpart(self) -> str:
@@ -79,13 +94,15 @@ class Figure:
 
     @property
     def aside(self) -> str:
-        """Bounds and measured counterpart in parentheses; empty without either."""
-        bounds = ""
+        """Bounds, flags and measured counterpart in parentheses; empty without any."""
+        parts = [FLAGS[flag] for flag in self.flags]
         if self.between is not None:
             low, high = self.between
-            bounds = f"(between {low:.4g} and {high:.4g} {self.unit} by discs within and round it)"
-        measured = f"({self.counterpart})" if self.measured else ""
-        return f"{bounds} {measured}".strip()
+            parts.append(
+                f"between {low:.4g} and {high:.4g} {self.unit} by discs within and round it"
+            )
+        parts += [self.counterpart] if self.measured else []
+        return " ".join(f"({part})" for part in parts)
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -99,6 +116,8 @@ class Figure:
             "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
             "between": self.between and [_rounded(end) for end in self.between],
             "interval": self.interval and [_rounded(end) for end in self.interval],
+            "pressure_kpa": self.pressure_kpa,
+            "flags": list(self.flags),
         }
 
 
@@ -215,7 +234,8 @@ class LeftOut:
 class Factors:
     """Calibration factors from the user's own measurements; the defaults leave models unchanged.
 
-    ``press_factor`` is the films' thickness after pressing over that before, ``contact_factor`` the
+    ``press_factor`` is the thickness of films that melt in the press after it over that before, of
+    the product ``press_film`` (of all that melt, where it is empty); ``contact_factor`` the
     measured force over that of the paper's own models. The elastic balloon takes ``pocket_loss``,
     by how many mm the press leaves pockets smaller in radius than drawn, ``modulus_mpa``, the
     film's modulus where it is not the one of the design, and ``modulus_ratio``, the modulus of the
@@ -231,6 +251,7 @@ class Factors:
     water_delay: float = 0.0
     air_delay: float = 0.0
     loss_share: float = 0.0
+    press_film: str = ""
     calibration: str = ""
     """Name of the calibration that the others come from, unless it is the user's own values."""
 
@@ -247,17 +268,25 @@ class Factors:
         if self.modulus_mpa is not None and not 0.1 <= self.modulus_mpa <= 1e4:
             raise DesignError(f"modulus = {self.modulus_mpa:g} MPa must be from 0.1 to 10000 MPa")
 
+    def folded(self, laminate: Laminate) -> FoldedHeight:
+        """Return the folded height of a laminate with these factors."""
+        return folded_height(laminate, self.press_factor, self.press_film)
+
+
+USUAL_PRESSURES = (10.0, 100.0)
+"""kPa at which predictions are made unless others are asked for."""
+
 
 @dataclass(frozen=True)
 class PredictionRequest:
-    """Conditions of a prediction: pressures in kPa, flow in ml/min into each chamber or all,
+    """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul a balloon, and factors.
 
     Without ``calibration`` the factors are those of the design's calibration, with the user's own
     values (``overrides``, by field of ``Factors``) in place of its own.
     """
 
-    pressures_kpa: tuple[float, ...] = (10.0, 100.0)
+    pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
     flow_ml_min: float = 35.0
     volumes_ul: tuple[float, ...] = ()
     calibration: Factors | None = None
@@ -386,6 +415,8 @@ LEFT_OUT = "left out"
 STROKES = ("reference stroke", "free stroke at ", "reached diameter", "free contraction")
 CALIBRATED_STROKES = ("free stroke at ", "reference stroke", "reached diameter", "free contraction")
 BENDS = ("bend at ", "bend with one chamber", "free bend")
+BURST = "burst pressure"
+"""Name of a figure."""
 PULLS = ("pull", "moment", "load")
 """Beginnings of the names of drawn mechanisms' forces."""
 RADIUS = 2.5
@@ -403,7 +434,7 @@ SCALED_NOTE = (
 
 
 class VerdictLine(NamedTuple):
-    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force" or "left out"), its
+    """One line of a verdict: the ``quantity`` ("stroke", "bend", "force", "burst"...), its
     ``figure``, and its validity in ``note``.
     """
 
@@ -442,17 +473,19 @@ def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
         if item.name.startswith("blocked force") and ", flat" in item.name
     ]
     blocked = [item for item in blocked if not item.name.endswith("at most")] or blocked
-    if blocked:
-        # Of the highest pressure that was asked for.
-        at = f"at {max(prediction.asked.pressures_kpa):g} kPa"
-        yield "force", next(item for item in blocked if at in item.name)
+    yield from (("force", item) for item in _strongest(blocked))
     for begins in PULLS:
         pulls = [item for item in to_design_with if item.name.startswith(begins)]
-        at = f" {max(prediction.asked.pressures_kpa, default=0):g} kPa"
-        at_highest = [item for item in pulls if at in item.name]
         # Where the film does not stand the highest pressure, at the most it stands.
-        for item in (at_highest or pulls)[:1]:
+        for item in _strongest(pulls):
             yield "moment" if item.unit == "N mm" else "force", item
+    yield from (("burst", item) for item in _first(to_design_with, BURST))
+
+
+def _strongest(figures: list[Figure]) -> list[Figure]:
+    """Return the first figure at the highest pressure, or the largest vacuum; none of none."""
+    highest = max((abs(figure.pressure_kpa or 0.0) for figure in figures), default=0.0)
+    return [f for f in figures if abs(f.pressure_kpa or 0.0) == highest][:1]
 
 
 def _first(figures: list[Figure], begins: str) -> list[Figure]:
@@ -467,10 +500,10 @@ def _shown(figure: Figure) -> str:
 
 
 def _note(figure: Figure) -> str:
-    """Return the measured counterpart, else the interval of measurements, else the validity."""
-    if figure.measured or figure.between:
+    """Return flags and counterpart, else the interval of measurements, else the validity."""
+    if figure.measured or figure.between or figure.flags:
         return figure.aside
-    if figure.interval is not None:
+    if figure.interval is not None and figure.name != BURST:
         return INTERVAL_NOTE
     if figure.model.name == SCALED:
         return SCALED_NOTE

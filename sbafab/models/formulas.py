@@ -1,4 +1,4 @@
-"""Closed formulas: bend of parallel chambers, burst pressure, folded diameter, force by virtual
+"""Closed formulas: bend of parallel chambers, range of pressures, folded diameter, force by virtual
 work, inlet tubes, tip stiffness, and overall sizes.
 """
 
@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sbafab.design.records import Design, Discs, Form, Slots, Wrap
-from sbafab.errors import DesignError
+from sbafab.errors import BeyondError, DesignError
 from sbafab.geometry.region import Region, centroid
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS
+from sbafab.laminate.burst import RADIUS, burst
 from sbafab.laminate.laminate import (
     Laminate,
     beyond_the_outline,
     outline_diameter,
     overall_diameter,
 )
+from sbafab.models.figures import USUAL_PRESSURES, Factors
+from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest
-from sbafab.models.paper import BURST, FLAT_HEIGHT_OF_FILMS, counterpart
+from sbafab.models.paper import BALLOONS, FLAT_HEIGHT_OF_FILMS, FOLDED_HEIGHT, counterpart
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -59,34 +61,53 @@ def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
     return Bend(angle, towards, length, tip)
 
 
-# Burst pressure, scaled from the paper's three actuators: for a proof test, not to design with.
-#
-# The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa
-# (Sec. 4, 7). A thin film of radius r and thickness t under p carries p r / 2 t where it is a
-# sphere's and p r / t where it is a cylinder's. Taken in proportion, nothing else is known.
+# Pressures: those of gauges, in kPa, a vacuum below 0.
 
 
-RADIUS = 2.5
-"""mm, of the pockets that burst."""
+MOST_PRESSURE = 1000.0
+"""kPa, nearly three times what burst the paper's actuators."""
+ATMOSPHERE = 101.325
+"""kPa, the largest vacuum."""
 
 
-def burst_pressure(form: Form, laminate: Laminate) -> float | None:
-    """Return an estimate in kPa of the pressure at which the widest pocket bursts.
-
-    An oblong pocket of width w becomes a cylinder of radius w / pi, whose film carries twice what
-    a sphere's does. None for a film of another product, or a drawn pocket: nothing was measured.
+def usual_pressures(form: Form) -> tuple[float, ...]:
+    """Return the pressures in kPa of a design's prediction; of one that works under a vacuum they
+    are negative.
     """
-    films = {layer.film for layer in laminate.layers if not layer.is_mask}
-    if any(film.product != PAPER_PRODUCT for film in films):
-        return None
-    if isinstance(form.pockets, Discs):
-        radius = max(form.pockets.diameters) / 2
-    elif isinstance(form.pockets, Slots):
-        radius = 2 * form.pockets.width / math.pi
-    else:
-        return None
-    thickness = min(film.thickness for film in films)
-    return BURST.value * RADIUS / radius * thickness / PAPER_THICKNESS
+    return tuple(-kpa if form.works_under_vacuum else kpa for kpa in USUAL_PRESSURES)
+
+
+def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False) -> None:
+    """Raise DesignError for a pressure in kPa that no model takes: pressures of inflated pockets
+    are from 0 up, those of pockets that work under a vacuum from 0 down.
+    """
+    low, high = (-ATMOSPHERE, 0.0) if is_vacuum else (0.0, MOST_PRESSURE)
+    for each in np.atleast_1d(np.asarray(kpa, dtype=float)).tolist():
+        if low <= each <= high:
+            continue
+        hint = f"; a vacuum is negative: write {-each:g}" if is_vacuum and each > 0 else ""
+        hint = "; it is inflated, and a vacuum does nothing" if not is_vacuum and each < 0 else hint
+        raise DesignError(
+            f"pressure = {each:g} kPa is out of range; give {low:g} to {high:g} kPa, as a gauge "
+            f"shows it{hint}"
+        )
+
+
+def refuse_beyond_burst(laminate: Laminate, kpa: float) -> None:
+    """Raise BeyondError for a pressure in kPa past the estimated burst pressure of a laminate."""
+    estimate = burst(laminate)
+    if estimate is not None and kpa > estimate.kpa:
+        raise BeyondError(
+            f"{kpa:g} kPa is past the estimated burst pressure, {estimate.kpa:.3g} kPa; give less "
+            "pressure, or take narrower pockets or thicker film",
+            kpa / estimate.kpa - 1,
+        )
+
+
+def is_near_burst(laminate: Laminate, kpa: float) -> bool:
+    """Return True for a pressure in kPa above half of the estimated burst pressure."""
+    estimate = burst(laminate)
+    return estimate is not None and kpa > estimate.kpa / 2
 
 
 # Diameter of a folded actuator (paper, Sec. 2: three lobes pass a channel of 9.25 mm).
@@ -109,15 +130,9 @@ def folded_diameter(width: float, thickness: float) -> float:
 
 
 def force(pressure_kpa: ArrayLike, rate: ArrayLike) -> NDArray[np.float64]:
-    """Return N from kPa and dv/dh in mm2. Raises DesignError past the burst pressure."""
-    pressure = np.asarray(pressure_kpa, dtype=float)
-    good = (pressure >= 0) & (pressure <= BURST.value)
-    if not good.all():
-        raise DesignError(
-            f"pressure = {float(pressure[~good].flat[0]):g} kPa is out of range; give 0 to "
-            f"{BURST.value:g} kPa, where the paper's actuators burst"
-        )
-    return np.asarray(pressure * np.asarray(rate, dtype=float) / 1000)
+    """Return N from kPa and dv/dh in mm2. Raises DesignError for a pressure out of range."""
+    refuse_pressure(pressure_kpa)
+    return np.asarray(np.asarray(pressure_kpa, dtype=float) * np.asarray(rate, dtype=float) / 1000)
 
 
 def work_uj(pressure_kpa: float, volume_ul: float) -> float:
@@ -175,29 +190,40 @@ def second_moments(region: Region) -> tuple[float, float]:
 # Overall sizes, each with the paper's figure.
 
 
-def sizes(design: Design, laminate: Laminate, press_factor: float = 1.0) -> dict[str, float]:
+def is_the_papers_3dof(form: Form, laminate: Laminate) -> bool:
+    """Return True for the actuator of which the paper measured heights and bends."""
+    return (
+        form.wrap is None
+        and form.stacks == LOBES
+        and form.pockets == Discs((2 * RADIUS,) * BALLOONS)
+        and all(layer.film.is_the_papers for layer in laminate.tpe_layers)
+    )
+
+
+def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) -> dict[str, float]:
     """Return sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
 
     Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
-    that of the films without tabs and ears. ``press_factor`` is the films' thickness after the
-    press over that before; the laminate is in diameters round the tube twice.
+    that of the films without tabs and ears. The thickness is the sum of the films as bought, the
+    folded height that after the press, which is in diameters round the tube twice; ``factors`` are
+    by default those of the design's calibration. Raises DesignError where there is none such.
     """
-    thickness = laminate.thickness * press_factor
-    thinner = 2 * (laminate.thickness - thickness)
+    height = (factors or factors_of(design)).folded(laminate).height
     low_x, low_y, high_x, high_y = laminate.bounds
     sizes_mm = {
-        "thickness": thickness,
+        "thickness": laminate.thickness,
+        "folded_height": height,
         "width": high_x - low_x,
         "length": high_y - low_y,
     }
     form = design.form
     if form.wrap is not None:
         sizes_mm["pitch"] = form.wrap.pitch
-        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, laminate) - thinner
-        reached, inflated = reached_diameter(form, laminate), inflated_diameter(form, laminate)
+        sizes_mm["deflated_diameter"] = deflated_diameter(form.wrap, height)
+        reached = reached_diameter(form, laminate.balloons, height)
+        inflated = inflated_diameter(form, laminate.balloons, height)
         if reached is not None and inflated is not None:
-            sizes_mm["reached_diameter"] = reached - thinner
-            sizes_mm["inflated_diameter"] = inflated - thinner
+            sizes_mm |= {"reached_diameter": reached, "inflated_diameter": inflated}
     else:
         if not laminate.outline.is_empty:
             sizes_mm["outline_diameter"] = outline_diameter(laminate)
@@ -205,49 +231,48 @@ def sizes(design: Design, laminate: Laminate, press_factor: float = 1.0) -> dict
     return sizes_mm
 
 
-def deflated_diameter(wrap: Wrap, laminate: Laminate) -> float:
-    """Return the diameter in mm of tube and flat laminate; the paper's is 15.33 (Sec. 2.1)."""
-    return wrap.tube_diameter + 2 * laminate.thickness
+def deflated_diameter(wrap: Wrap, height: float) -> float:
+    """Return the diameter in mm of tube and flat laminate of a height in mm; with the films as
+    bought the paper's is 15.33 (Sec. 2.1).
+    """
+    return wrap.tube_diameter + 2 * height
 
 
-def reached_diameter(form: Form, laminate: Laminate) -> float | None:
-    """Return the diameter in mm of the tube with SBAs at their largest volume: the reach to rely
-    on.
+def reached_diameter(form: Form, balloons: int, height: float) -> float | None:
+    """Return the diameter in mm of the tube with SBAs at their largest volume, their flat laminate
+    of a height in mm: the reach to rely on.
 
     None without a tube, or for pockets of another shape. Balloons are lenses of two arcs
-    (``models.lens``); the paper's reach 27.29, about 28 (Sec. 2.1).
+    (``models.lens``); the paper's, its films as bought, reach 27.29, about 28 (Sec. 2.1).
     """
-    if not isinstance(form.pockets, Slots):
+    if not isinstance(form.pockets, Slots) or form.wrap is None:
         return None
-    return _round_the_tube(form, laminate, fullest(form.pockets.width, form.pockets.run).stroke)
+    rise = fullest(form.pockets.width, form.pockets.run).stroke
+    return deflated_diameter(form.wrap, height) + 2 * balloons * rise
 
 
-def inflated_diameter(form: Form, laminate: Laminate) -> float | None:
+def inflated_diameter(form: Form, balloons: int, height: float) -> float | None:
     """Return the diameter in mm of the tube with SBAs as wide as can be: the clearance to provide.
 
     None without a tube, or for pockets of another shape. A flat pocket of width w whose films do
     not stretch becomes a cylinder of diameter 2 w / pi where its ends do not hold it back: 28.06
-    for the paper's, about 28 (Sec. 2.1).
+    for the paper's, its films as bought, about 28 (Sec. 2.1).
     """
-    if not isinstance(form.pockets, Slots):
+    if not isinstance(form.pockets, Slots) or form.wrap is None:
         return None
-    return _round_the_tube(form, laminate, 2 * form.pockets.width / math.pi)
+    rise = 2 * form.pockets.width / math.pi
+    return deflated_diameter(form.wrap, height) + 2 * balloons * rise
 
 
-def _round_the_tube(form: Form, laminate: Laminate, rise: float) -> float | None:
-    """Return the diameter in mm with every balloon ``rise`` mm high."""
-    if form.wrap is None:
-        return None
-    return form.wrap.tube_diameter + 2 * (laminate.balloons * rise + laminate.thickness)
-
-
-def size_phrases(design: Design, laminate: Laminate, press_factor: float = 1.0) -> tuple[str, ...]:
-    """Return the size in phrases: overall diameter, outline diameter, flat extent, and height.
-
-    Films flow in the press: ``press_factor`` is their thickness after it over that before. Beside
-    the sum of the films stands the paper's measured height.
+def size_phrases(
+    design: Design, laminate: Laminate, factors: Factors | None = None
+) -> tuple[str, ...]:
+    """Return the size in phrases: overall diameter, outline diameter, flat extent, and height;
+    ``factors`` as in ``sizes``. Beside the sum of the films of the paper's own actuator stands the
+    height that it measured.
     """
-    sizes_mm = sizes(design, laminate, press_factor)
+    factors = factors or factors_of(design)
+    sizes_mm = sizes(design, laminate, factors)
     phrases = []
     if "overall_diameter" in sizes_mm:
         over = beyond_the_outline(laminate)
@@ -259,8 +284,10 @@ def size_phrases(design: Design, laminate: Laminate, press_factor: float = 1.0) 
     form = design.form
     flat = "flat, " if form.wrap is not None else ""
     phrases.append(f"{flat}{sizes_mm['width']:.2f} x {sizes_mm['length']:.2f} mm")
-    height = f"folded height {sizes_mm['thickness']:.3f} mm"
-    if press_factor == 1:
-        row = counterpart(form, "deflated height", FLAT_HEIGHT_OF_FILMS)
-        height += f" {row.brief}" if row else ""
-    return (*phrases, height)
+    folded = factors.folded(laminate)
+    height = f"folded height {folded.height:.3f} mm"
+    row = None
+    if factors.press_factor == 1 and is_the_papers_3dof(form, laminate):
+        row = counterpart(form, FOLDED_HEIGHT, FLAT_HEIGHT_OF_FILMS, of_papers=True)
+    remark = row.brief if row else f"({folded.remark})" if folded.remark else ""
+    return (*phrases, f"{height} {remark}".rstrip())

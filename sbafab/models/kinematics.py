@@ -17,6 +17,7 @@ import numpy as np
 from sbafab.design.records import Design, Discs, Form, Slots
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
+from sbafab.laminate.assembly import FoldedHeight
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, PAPER_TPE, film_name
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import lens, parabola, printed
@@ -183,8 +184,7 @@ class Actuator:
     pockets, empty for oblong ones. ``kinematics`` begins with the preferred model; it is empty for
     drawn outlines. ``reference_stroke`` mm is what shares of a stroke are of, ``reference_height``
     mm the height then: what the paper measured, scaled, or of oblong pockets that at the largest
-    volume; ``thickness`` mm the flat laminate's, the press factor included. ``press_factor`` is 1
-    for sheets that stay solid and are not the paper's film, on which it was measured.
+    volume; ``folded`` is the height of the flat laminate after the press.
     """
 
     design: Design
@@ -195,8 +195,12 @@ class Actuator:
     kinematics: tuple[Kinematics, ...]
     reference_stroke: float
     reference_height: float
-    thickness: float
-    press_factor: float
+    folded: FoldedHeight
+
+    @property
+    def thickness(self) -> float:
+        """The folded height in mm."""
+        return self.folded.height
 
     def lengths(self, stroke: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a chamber's length at a stroke, from flat to the reference height."""
@@ -255,13 +259,11 @@ def actuator(
     radii: tuple[float, ...] = ()
     kinematics: tuple[Kinematics, ...] = ()
     stroke = height = 0.0
-    flows = isinstance(form.pockets, Slots | Discs) or _has_the_papers_film(laminate)
-    press_factor = calibration.press_factor if flows else 1.0
-    thickness = laminate.thickness * press_factor
+    folded = calibration.folded(laminate)
     if isinstance(form.pockets, Slots):
         kinematics = slot_stack(form.pockets.width, form.pockets.run, balloons)
         stroke = kinematics[0].largest_stroke
-        height = thickness + stroke
+        height = folded.height + stroke
     elif isinstance(form.pockets, Discs):
         radii = tuple(d / 2 for d in form.pockets.diameters)
         kinematics = round_stack(radii)
@@ -276,6 +278,5 @@ def actuator(
         kinematics,
         stroke,
         height,
-        thickness,
-        press_factor,
+        folded,
     )

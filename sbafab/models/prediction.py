@@ -14,8 +14,10 @@ import numpy as np
 
 from sbafab.actuators import build
 from sbafab.design.records import Design, Slots, Wrap
-from sbafab.errors import DesignError, GeometryError
+from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.geometry.region import Region
+from sbafab.laminate.assembly import FoldedHeight
+from sbafab.laminate.burst import NOT_BURST, burst
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models import elastic, mechanisms, paper
 from sbafab.models.drawn_pockets import (
@@ -27,12 +29,15 @@ from sbafab.models.drawn_pockets import (
 )
 from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
+    BURST,
+    NEAR_BURST,
     REACHED,
     SCALED,
     STACK,
     WIDEST,
     Factors,
     Figure,
+    Flag,
     LeftOut,
     Model,
     Points,
@@ -47,17 +52,30 @@ from sbafab.models.formulas import (
     bend,
     folded_diameter,
     force,
+    is_near_burst,
+    is_the_papers_3dof,
     largest_tube,
+    refuse_beyond_burst,
+    refuse_pressure,
     second_moments,
     sizes,
     tip_stiffness,
     work_uj,
 )
-from sbafab.models.intervals import factors_of, uncertainty_of
+from sbafab.models.intervals import (
+    PAPER_3DOF,
+    burst_uncertainty,
+    factors_of,
+    farther,
+    flags_at,
+    sizes_of,
+    uncertainty_of,
+)
 from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics
 from sbafab.models.kinematics import actuator as actuator_of
 from sbafab.models.mechanisms import mechanism_figures
-from sbafab.models.paper import counterpart
+from sbafab.models.paper import BURST as BURST_MEASURED
+from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, counterpart
 from sbafab.models.parabola import fullest
 from sbafab.models.pneumatics import seconds
 from sbafab.models.stack import Stack
@@ -70,7 +88,7 @@ SAMPLES = 61
 
 def check_request(actuator: Actuator, request: PredictionRequest) -> None:
     """Raise DesignError for pressures, flows or volumes out of every model's range."""
-    force(request.pressures_kpa, 0.0)
+    refuse_pressure(request.pressures_kpa, actuator.form.works_under_vacuum)
     seconds(0.0, request.flow_ml_min)
     if actuator.kinematics:
         widest = max(actuator.kinematics, key=lambda k: k.largest_volume)
@@ -95,8 +113,16 @@ def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure |
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     if actuator.has_reference:
         model = reference_model(actuator)
-        yield Figure("stroke", "reference stroke", actuator.reference_stroke, "mm", model)
-        yield Figure("stroke", "reference height", actuator.reference_height, "mm", model)
+        scaled = {
+            "reference stroke": actuator.reference_stroke,
+            "reference height": actuator.reference_height,
+        }
+        flags: tuple[Flag, ...] = ()
+        if actuator.radii:
+            sizes_here = sizes_of(actuator.form, actuator.laminate)
+            flags = flags_at(farther(sizes_here, PAPER_3DOF, False))
+        for name, value in scaled.items():
+            yield Figure("stroke", name, value, "mm", model, flags=flags)
         for k in actuator.kinematics:
             at_full = float(k.volume(actuator.reference_stroke))
             yield Figure(
@@ -136,7 +162,8 @@ def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.reference_stroke, request)
                 name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
-                yield Figure("force", name, float(value), "N", _force_model(actuator, k, request))
+                model = _force_model(actuator, k, request)
+                yield Figure("force", name, float(value), "N", model, pressure_kpa=pressure)
 
 
 def _force(
@@ -203,7 +230,9 @@ def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) 
     )
     for pressure in request.pressures_kpa:
         name = f"pneumatic input work at {pressure:g} kPa"
-        yield Figure("actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound)
+        yield Figure(
+            "actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound, pressure_kpa=pressure
+        )
     if request.pressures_kpa and mass_g is not None:
         yield _power_density(actuator, request, whole, mass_g)
 
@@ -230,6 +259,7 @@ def _power_density(
         watts / (mass_g / 1000),
         "W/kg",
         model,
+        pressure_kpa=highest,
     )
 
 
@@ -368,7 +398,7 @@ def folding(actuator: Actuator, request: PredictionRequest) -> Figure | LeftOut:
         "our geometry; the paper reports 9.25",
         "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
         "paper measures, between which its 9.25 lies",
-    ).times("press factor", request.factors.press_factor)
+    ).times("press factor", actuator.folded.factor)
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
     return Figure("size", "folded diameter", value, "mm", model)
@@ -437,7 +467,7 @@ def workspace_relation(actuator: Actuator) -> Relation:
 # The whole prediction of one design.
 
 
-GROUPS = ("size", "inlet", "stroke", "force", "actuation", "bending", "stiffness")
+GROUPS = ("size", "inlet", "strength", "stroke", "force", "actuation", "bending", "stiffness")
 GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
@@ -445,7 +475,8 @@ ROUND_THE_TUBE = {
     "deflated_diameter": Model(
         "tube and films",
         "Sec. 2.1",
-        "the paper's 15.33 is this sum; the sheet is taken to lie close to the tube",
+        "the paper's 15.33 is the sum of tube and films as bought; the sheet is taken to lie close "
+        "to the tube",
     ),
     "reached_diameter": Model(
         REACHED,
@@ -459,11 +490,8 @@ ROUND_THE_TUBE = {
         "28.06 for the paper's design, which says about 28",
     ),
 }
-NOMINAL = Model(
-    "sum of the films",
-    "Sec. 2",
-    "nominal: films flow in the press; the paper's 15 balloons measure 0.95 mm, not 1.865",
-)
+AS_BOUGHT = "nominal: films that melt in the press flow, and no press factor is given"
+SOLID = "masks and films that do not melt in a press step keep their thickness"
 
 
 def predict(
@@ -481,10 +509,6 @@ def predict(
     """
     wish = request or PredictionRequest()
     uncertainty, checks_maps = None, wish.calibration is None
-    if wish.calibration is None:
-        uncertainty = uncertainty_of(design, wish.overrides)
-        factors = factors_of(design, wish.overrides) if uncertainty is None else uncertainty.factors
-        wish = replace(wish, calibration=factors)
     try:
         flat = laminate or build(design)
     except GeometryError as error:
@@ -492,8 +516,14 @@ def predict(
     discs = near_discs(design)
     if discs is not None and not discs.is_round:
         discs = None
-    subject = actuator_of(design, flat, wish.factors, discs and discs.form(design, discs.equal))
+    form = discs and discs.form(design, discs.equal)
+    if wish.calibration is None:
+        uncertainty = uncertainty_of(design, wish.overrides, flat, form)
+        factors = factors_of(design, wish.overrides) if uncertainty is None else uncertainty.factors
+        wish = replace(wish, calibration=factors)
+    subject = actuator_of(design, flat, wish.factors, form)
     check_request(subject, wish)
+    asked, (wish, past) = wish, _within_burst(wish, flat)
     together = None if quick else elastic.elastic_stack(subject, wish)
     items = _figures(subject, wish, together, checks_maps=checks_maps)
     if uncertainty is not None:
@@ -510,22 +540,76 @@ def predict(
         items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
     to_come = (STACK,) if quick and subject.radii else ()
+    items = [*(_flagged(item, flat) for item in items), *past]
     figures = chosen(
         (item for item in items if isinstance(item, Figure)), to_come, uncertainty is not None
     )
     return Prediction(
-        wish,
+        asked,
         tuple(
             replace(
                 figure,
                 measured=counterpart(
-                    subject.form, figure.name, figure.model.name, wish.factors.calibration
+                    subject.form,
+                    figure.name,
+                    figure.model.name,
+                    wish.factors.calibration,
+                    is_the_papers_3dof(subject.form, flat),
                 ),
             )
             for figure in figures
         ),
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
+    )
+
+
+def _within_burst(
+    request: PredictionRequest, laminate: Laminate
+) -> tuple[PredictionRequest, list[LeftOut]]:
+    """Return a request without the pressures past the estimated burst pressure, and what is said of
+    those.
+    """
+    within, past = [], []
+    for pressure in request.pressures_kpa:
+        try:
+            refuse_beyond_burst(laminate, pressure)
+            within.append(pressure)
+        except BeyondError as error:
+            past.append(LeftOut(f"all figures at {pressure:g} kPa", str(error)))
+    return replace(request, pressures_kpa=tuple(within)), past
+
+
+def _flagged(item: Figure | LeftOut, laminate: Laminate) -> Figure | LeftOut:
+    """Return a figure marked where it is at a pressure near the estimated burst, or what is left
+    out past that.
+    """
+    if isinstance(item, LeftOut) or item.pressure_kpa is None:
+        return item
+    try:
+        refuse_beyond_burst(laminate, item.pressure_kpa)
+    except BeyondError as error:
+        return LeftOut(item.name, str(error))
+    if is_near_burst(laminate, item.pressure_kpa):
+        return replace(item, flags=(*item.flags, NEAR_BURST))
+    return item
+
+
+def _burst(laminate: Laminate) -> Figure | LeftOut:
+    """Return the burst pressure with its interval, which is ours."""
+    estimate = burst(laminate)
+    if estimate is None:
+        return LeftOut(BURST, NOT_BURST)
+    interval, missed = burst_uncertainty(estimate)
+    pocket = "round pocket" if estimate.is_round else "pocket, taken for a long one,"
+    model = Model(
+        "film stress in proportion",
+        f"Sec. 4: {BURST_MEASURED}, pockets of d = 5",
+        f"of its widest {pocket} and thinnest film; less where bonds peel or seams give way first. "
+        "The interval has the paper's scatter, and what is assumed for other sizes and shapes",
+    )
+    return Figure(
+        "strength", BURST, estimate.kpa, "kPa", model, interval=interval, flags=flags_at(missed)
     )
 
 
@@ -540,7 +624,7 @@ def _moved_figures(
     moved = replace(request, calibration=factors)
     other: Stack | LeftOut | None = together
     if isinstance(together, Stack):
-        other = elastic.moved_stack(together, request.factors, factors)
+        other = elastic.moved_stack(together, actuator.laminate, request.factors, factors)
         other = other or elastic.elastic_stack(subject, moved)
     return _figures(subject, moved, other, checks_films=False)
 
@@ -570,13 +654,15 @@ def _geometric_figures(
 ) -> Iterator[Figure | LeftOut]:
     mass = _mass(actuator.laminate)
     grams = None if isinstance(mass, LeftOut) else mass.value
-    yield from _sizes(actuator)
+    yield from _sizes(actuator, request.factors)
     if actuator.kinematics and actuator.form.is_parallel:
         yield folding(actuator, request)
     yield mass
     if isinstance(mass, LeftOut) and actuator.kinematics:
         yield LeftOut("power density", mass.reason)
     yield from _tubes(actuator)
+    if not actuator.form.works_under_vacuum:
+        yield _burst(actuator.laminate)
     pushed = list(flat_forces(actuator, request))
     yield from pushed
     mechanism = actuator.form.mechanism
@@ -634,19 +720,24 @@ def _relations(
         yield _diameter_relation(actuator, actuator.form.wrap)
 
 
-def _sizes(actuator: Actuator) -> Iterator[Figure]:
+def _sizes(actuator: Actuator, factors: Factors) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
-    factor = actuator.press_factor
-    pressed = NOMINAL.times("press factor", factor)
-    for name, value in sizes(actuator.design, actuator.laminate, factor).items():
-        shown = name.replace("_", " ")
-        if name == "thickness":
-            yield Figure("size", "deflated height", value, "mm", pressed)
-        elif name in ROUND_THE_TUBE:
-            model = ROUND_THE_TUBE[name].times("press factor", factor)
-            yield Figure("size", shown, value, "mm", model)
-        else:
-            yield Figure("size", shown, value, "mm", GEOMETRY)
+    folded = actuator.folded
+    factor = folded.factor if folded.molten else 1.0
+    models = {name: model.times("press factor", factor) for name, model in ROUND_THE_TUBE.items()}
+    models["folded_height"] = _folded_model(folded).times("press factor", factor)
+    for name, value in sizes(actuator.design, actuator.laminate, factors).items():
+        if name != "thickness":
+            model = models.get(name, GEOMETRY)
+            yield Figure("size", name.replace("_", " "), value, "mm", model)
+
+
+def _folded_model(folded: FoldedHeight) -> Model:
+    """Return the model of a folded height, without its factor."""
+    trust = AS_BOUGHT if folded.molten and folded.factor == 1 else SOLID
+    trust += ", the others this share of it" if folded.molten and folded.factor != 1 else ""
+    trust += f"; {folded.remark}" if folded.remark else ""
+    return Model(FLAT_HEIGHT_OF_FILMS, "Sec. 2", trust)
 
 
 def _mass(laminate: Laminate) -> Figure | LeftOut:

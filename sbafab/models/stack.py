@@ -135,7 +135,7 @@ def stack(
         tuple(_mapped(kind, most_pressure / ratio).stiffened(ratio) for kind in kinds),
         np.array([kinds.index(balloon) for balloon in row]),
         axes,
-        flat.thickness * factors.press_factor / len(row),
+        factors.folded(flat).height / len(row),
         reach,
         film_mass(flat) * GRAVITY / len(row) if has_densities else None,
         factors.calibration,

@@ -74,11 +74,12 @@ UNKNOWNS = (
         "press factor",
         "",
         True,
+        0.32,
         0.7,
-        0.35,
-        0.3,
+        0.05,
         1.0,
-        "assumed: films flow in the press, from not at all to a third of the thickness left",
+        "assumed: films that melt flow in the press, from not at all to a tenth of their thickness "
+        "left; masks and films that stay solid keep theirs",
     ),
     Unknown(
         "water_delay",

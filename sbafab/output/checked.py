@@ -145,6 +145,8 @@ def limits(design: Design) -> Limits:
         target_yield=design.rules.target_yield,
         yield_builds=design.rules.yield_builds,
         minutes_for=tuple(map(named_film, design.press.minutes_for)),
+        working_pressure=design.acceptance.working_pressure_kpa,
+        safety_factor=design.acceptance.safety_factor,
         waive=frozenset(design.rules.waive),
         plate=None if is_set else design.registration.plate_made_by,
     )

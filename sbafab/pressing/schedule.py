@@ -124,13 +124,11 @@ def _minutes_of_another_temperature(
     paper's. Minutes that differ from the paper's, and those of films that it did not press, were
     stated by the user, who tried them as set.
     """
-    films = {layer.film for layer in laminate.layers if not layer.is_mask}
     paper = PressSettings()
     usual = [
         str(part.number) for part in parts if press.minutes(part.name) == paper.minutes(part.name)
     ]
-    is_the_papers = any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
-    if press.temperature_c == STATED_C or not (usual and is_the_papers):
+    if press.temperature_c == STATED_C or not (usual and _is_the_papers(laminate)):
         return
     some = "" if len(usual) == len(parts) else f" of step{'s' * (len(usual) > 1)} "
     yield Caution(
@@ -138,6 +136,12 @@ def _minutes_of_another_temperature(
         f"is set to {press.temperature_c:g} C: nobody stated minutes for that, so try the bond on "
         "scrap first, and set the press minutes to what held"
     )
+
+
+def _is_the_papers(laminate: Laminate) -> bool:
+    """Return True if a film is the paper's, so that what it tried in the press bears on it."""
+    films = {layer.film for layer in pressed_layers(laminate)}
+    return any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
 
 
 def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
@@ -814,7 +818,7 @@ def _other_temperatures(
     """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
     if not films_without_minutes(laminate, press):
         yield from _minutes_of_another_temperature(laminate, press, parts)
-    if press.temperature_c > HOTTEST_TRIED:
+    if press.temperature_c > HOTTEST_TRIED and _is_the_papers(laminate):
         yield Caution(
             f"{press.temperature_c:g} C is hotter than the {HOTTEST_TRIED:g} C of earlier work, "
             "which already over-melted more than 135 C does"

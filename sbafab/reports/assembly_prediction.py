@@ -14,6 +14,7 @@ from sbafab.design.records import Discs, Slots
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import free_rise
 from sbafab.models.figures import REACHED, WIDEST
+from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
 from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart
@@ -283,7 +284,8 @@ class Touch(NamedTuple):
 
 class AssemblyPrediction(NamedTuple):
     """Figures at ``pressure_kpa``; ``touches`` are parts in each other's way when all stand up
-    straight, ``bent_touches`` what arms meet when bent; ``left_out`` says what no model reaches.
+    straight, ``bent_touches`` what arms meet when bent; ``left_out`` says what no model reaches,
+    ``near_burst`` which parts are above half of their estimated burst pressure.
     """
 
     name: str
@@ -293,6 +295,7 @@ class AssemblyPrediction(NamedTuple):
     touches: tuple[Touch, ...]
     left_out: tuple[str, ...]
     bent_touches: tuple[BentTouch, ...] = ()
+    near_burst: tuple[str, ...] = ()
 
     def met(self) -> list[str]:
         """Sentences on what inflated parts meet, and what would mend it."""
@@ -356,8 +359,13 @@ def predict_assembly(
     """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
 
     ``pause`` is called between parts of the work, which takes seconds; what it raises ends it.
-    Raises DesignError for pressures that the models do not reach.
+    Raises DesignError for pressures that the models do not reach, or past a part's estimated burst.
     """
+    near = []
+    for placed in assembled.parts:
+        if isinstance(placed, PlacedSba):
+            refuse_beyond_burst(placed.made.laminate, pressure_kpa)
+            near += [placed.name] if is_near_burst(placed.made.laminate, pressure_kpa) else []
     figures: list[AssemblyFigure] = []
     touches: list[Touch] = []
     left_out: list[str] = []
@@ -400,6 +408,7 @@ def predict_assembly(
         tuple(touches),
         tuple(left_out),
         tuple(bent),
+        tuple(near),
     )
 
 
@@ -420,17 +429,17 @@ def _arm(
     for figure in _figures_of_arm(placed, arm_stack, pressure, load_g):
         name, model = _as_predicted(figure.name, pressure)
         calibration = arm_stack.calibration
-        beside = counterpart(placed.made.design.form, name, model, calibration)
-        # A calibration has a press factor, with which the flat height is near.
-        is_near = bool(calibration) and model == FLAT_HEIGHT_OF_FILMS
-        yield figure._replace(measured=beside.sentence() if beside and not is_near else "")
+        form = placed.made.design.form
+        of_papers = is_the_papers_3dof(form, placed.made.laminate)
+        beside = counterpart(form, name, model, calibration, of_papers)
+        yield figure._replace(measured=beside.sentence() if beside else "")
 
 
 def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
     """Return the name and the model of the same figure in a design's own prediction."""
     at = f"at {pressure:g} kPa"
     figures = {
-        "height, flat": ("deflated height", FLAT_HEIGHT_OF_FILMS),
+        "height, flat": ("folded height", FLAT_HEIGHT_OF_FILMS),
         "height, inflated": (f"free height {at}", BALLOON),
         "push at 75 % of its stroke": (
             f"blocked force {at}, at 75 % of the reference stroke",
@@ -482,13 +491,14 @@ def _free_stroke(placed: PlacedSba, pressure: float) -> float:
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
     """Return hold of a radial actuator in the assembly's lumen; None for one of another form."""
-    form, laminate = placed.made.design.form, placed.made.laminate
+    design, laminate = placed.made.design, placed.made.laminate
+    form = design.form
     pockets = form.pockets
     if not isinstance(pockets, Slots):
         return None
     tube = form.wrap.tube_diameter if form.wrap is not None else 2 * (placed.radius or 0.0)
     balloons = laminate.balloons
-    deflated = tube + 2 * laminate.thickness
+    deflated = tube + 2 * factors_of(design).folded(laminate).height
     rise, widest = fullest(pockets.width, pockets.run).stroke, 2 * pockets.width / math.pi
     free, most = (deflated + 2 * balloons * high for high in (rise, widest))
     lumen = assembled.assembly.deploy.lumen_diameter
@@ -509,7 +519,7 @@ def _grip_figures(
     """Diameter of a radial actuator, and how hard its stacks hold in the assembly's lumen."""
     name, paper = hold.part, "about 28 (Sec. 2.1)"
     diameters = (
-        ("diameter, deflated", hold.deflated, "films", "15.33 (Sec. 2.1)"),
+        ("diameter, deflated", hold.deflated, "tube and films", "15.33 (Sec. 2.1)"),
         ("diameter, inflated free", hold.free, REACHED, paper),
         ("diameter, inflated at most", hold.most, WIDEST, paper),
     )

@@ -23,7 +23,7 @@ from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.solid import Slab, fuse
 from sbafab.meshing.surface import Surface
 from sbafab.models.balloon import Balloon, inflate
-from sbafab.models.formulas import inflated_diameter
+from sbafab.models.formulas import sizes
 
 if TYPE_CHECKING:
     import manifold3d
@@ -362,7 +362,7 @@ def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
     """
     widest = None
     if placed.made is not None:
-        widest = inflated_diameter(placed.made.design.form, placed.made.laminate)
+        widest = sizes(placed.made.design, placed.made.laminate).get("inflated_diameter")
     if widest is None:
         surface = placed_surface(placed, filled=True)
         return [manifold(replace(surface, points=surface.points + lift))]

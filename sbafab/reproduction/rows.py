@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sbafab.actuators import build, load_design
+from sbafab.laminate.assembly import FoldedHeight
 from sbafab.models import paper, parabola, printed
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import air_time, pose_bent_by, time_to_fill
@@ -146,9 +147,9 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "3-DoF of 15 balloons, deflated",
         paper.FLAT_HEIGHT,
-        three.value("deflated height"),
+        three.value("folded height"),
         tall,
-        "films flow in the press; the paper gives no factor, and we apply none",
+        "films that melt flow in the press; the paper gives no factor, and none is applied here",
     )
     chords = "three lobes as chords of a circle"
     yield Row(
@@ -158,7 +159,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
         f"{chords}, nominal thickness",
         "the pressed lobes are thinner than the films' sum",
     )
-    pressed = predicted("3dof-15mm", Factors(press_factor(three)))
+    pressed = predicted("3dof-15mm", Factors(press_factor()))
     yield Row(
         "the same",
         paper.FOLDED,
@@ -219,8 +220,14 @@ def strokes() -> Iterator[Row]:
     )
 
 
-def press_factor(three: Prediction) -> float:
-    return paper.FLAT_HEIGHT.value / three.value("deflated height")
+def press_factor() -> float:
+    """Return what the press left of the films of the 3-DoF, if its masks kept their thickness."""
+    folded = _films()
+    return (paper.FLAT_HEIGHT.value - folded.solid) / folded.molten
+
+
+def _films() -> FoldedHeight:
+    return Factors().folded(build(load_design("3dof-15mm")))
 
 
 def simulators() -> Iterator[Row]:
@@ -500,10 +507,10 @@ def fuller() -> Iterator[Row]:
 
 def factors(single: Prediction, three: Prediction) -> Iterator[str]:
     """Lines of the table of factors."""
-    flat = three.value("deflated height")
+    folded = _films()
     yield (
-        f"| press factor | 3-DoF deflated: {paper.FLAT_HEIGHT.value:g} over {flat:g} | "
-        f"{paper.FLAT_HEIGHT.value / flat:.3f} |"
+        f"| press factor | 3-DoF deflated: {paper.FLAT_HEIGHT.value:g}, less masks of "
+        f"{folded.solid:g}, over films of {folded.molten:g} | {press_factor():.3f} |"
     )
     for name, prediction, measured in (
         ("1-DoF", single, paper.FORCE_1DOF),

@@ -14,9 +14,9 @@ from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_
 from sbafab.design.identity import actuator_sha256, design_sha256, kit_of
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError
-from sbafab.models.figures import Prediction, PredictionRequest
-from sbafab.models.formulas import burst_pressure
-from sbafab.models.paper import BURST
+from sbafab.models.figures import BURST, Prediction, PredictionRequest
+from sbafab.models.formulas import usual_pressures
+from sbafab.models.paper import FOLDED_HEIGHT
 from sbafab.models.prediction import predict
 from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
@@ -187,9 +187,10 @@ def check_number(quantity: Measurand, value: float, place: str, least: str) -> N
 
 
 FIGURES = {
+    "burst_kpa": (BURST, ""),
     "stroke_mm": ("reference stroke", ""),
     "force_n": ("blocked force at 100 kPa, flat", ""),
-    "height_mm": ("deflated height", ""),
+    "height_mm": (FOLDED_HEIGHT, ""),
     "mass_g": ("mass", ""),
 }
 """The prediction's figure that a measured quantity is held against, of the model to design with,
@@ -215,10 +216,7 @@ def promised(design: Design) -> Build:
         family=design.family,
         method=registration.method,
         toml=design_toml(design),
-        predicted=_predicted(
-            predict(design, PredictionRequest(pressures_kpa=(100.0,))),
-            burst_pressure(design.form, laminate),
-        ),
+        predicted=_predicted(predict(design, PredictionRequest(usual_pressures(design.form)[-1:]))),
         tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
         good_builds=(share.good, share.builds),
         actuator_sha256=actuator_sha256(design),
@@ -255,14 +253,9 @@ def kit_name(design: Design) -> str:
     return kit_of(design).name
 
 
-def _predicted(prediction: Prediction, burst: float | None) -> dict[str, tuple[float, str]]:
-    """Return the prediction of each quantity and its model; the paper's burst pressure, scaled
-    to the design's pockets.
-    """
+def _predicted(prediction: Prediction) -> dict[str, tuple[float, str]]:
+    """Return the prediction of each quantity and its model."""
     figures = {}
-    if burst is not None:
-        model_text = f"the paper's balloons of 5 mm ({BURST.where}), film stress in proportion"
-        figures["burst_kpa"] = (burst, model_text)
     for quantity, (name, model) in FIGURES.items():
         for figure in prediction.figures:
             is_other = figure.other or not figure.model.title.startswith(model)

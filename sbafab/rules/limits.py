@@ -67,7 +67,8 @@ class Limits:
     that may open a channel; ``dead_end``: widths that a blind branch may be long. ``minutes_for``:
     product and thickness of the films that the press minutes were stated for. ``plate``: the
     machine that makes the base plate's holes, None where it does not set the pins' error, or bonds
-    are as drawn.
+    are as drawn. ``working_pressure``: gauge, kPa, a vacuum below 0 (None: not stated), of which
+    the burst pressure must be ``safety_factor`` times.
     """
 
     bond_width: float = 0.75
@@ -88,6 +89,8 @@ class Limits:
     target_yield: float | None = None
     yield_builds: int | None = None
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
+    working_pressure: float | None = None
+    safety_factor: float = 2.0
     waive: frozenset[str] = frozenset()
     plate: PlateMachine | None = None
 
@@ -151,6 +154,7 @@ KEYS = (
     _Key("sheet_error", WORST, lambda lim: lim.tolerances.sheet, "default"),
     _Key("opening_pressure_kpa", ("nets",), lambda lim: lim.opening_pressure, "default", True),
     _Key("dead_end", ("nets",), lambda lim: lim.dead_end, "default", True),
+    _Key("safety_factor", ("pressure-rating",), lambda lim: lim.safety_factor, "default"),
     _Key("second_cut_error", ("bridges",), lambda lim: lim.tolerances.second_cut, "default"),
 )
 """Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""

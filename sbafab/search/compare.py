@@ -19,6 +19,7 @@ from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import Figure, PredictionRequest
+from sbafab.models.formulas import refuse_beyond_burst, usual_pressures
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.stack import stack
@@ -33,12 +34,10 @@ from sbafab.search.measure import RuleMargin, margins
 from sbafab.search.sweep_report import CSV, JOURNAL
 from sbafab.version import GENERATOR
 
-PRESSURES = (10.0,)
-"""kPa, unless others are asked for."""
 FOLDER, PAGE = "compare", "compare.html"
 TEMPLATE = "compare.html.j2"
 MAIN = re.compile(
-    r"(outline|overall|reached) diameter|deflated height|mass|free stroke at .*|reference stroke"
+    r"(outline|overall|reached) diameter|folded height|mass|free stroke at .*|reference stroke"
     r"|bend at .* in one chamber, .*|blocked force at .*, flat|time to .* at the pump, water .*"
     r"|lateral tip stiffness .*, chambers shut"
 )
@@ -236,20 +235,22 @@ def compare(
     first: Design,
     second: Design,
     sources: tuple[str, str] = ("A", "B"),
-    pressures_kpa: Sequence[float] = PRESSURES,
+    pressures_kpa: Sequence[float] | None = None,
     flow_ml_min: float = PredictionRequest.flow_ml_min,
     progress: Progress = ignore_progress,
 ) -> DesignComparison:
-    """Return what differs between two designs. Raises DesignError where one cannot be built, and
-    for pressures (kPa) or a flow out of range.
+    """Return what differs between two designs, at pressures in kPa, by default the first of
+    ``usual_pressures``. Raises DesignError where one cannot be built, and for pressures or a flow
+    out of range.
     """
-    if not pressures_kpa:
+    if pressures_kpa is not None and not pressures_kpa:
         raise DesignError("pressures_kpa is empty; a comparison needs one pressure or more")
-    request = PredictionRequest(tuple(pressures_kpa), flow_ml_min)
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
         checked = check(design)
+        pressures = tuple(pressures_kpa or usual_pressures(design.form)[:1])
+        request = PredictionRequest(pressures, flow_ml_min)
         prediction = predict(design, request, checked.laminate)
         figures = tuple(
             figure
@@ -260,7 +261,7 @@ def compare(
     designs = each[0], each[1]
     return DesignComparison(
         designs, tuple(_keys(designs)), tuple(_rules(designs)), tuple(_figures(designs)),
-        request.pressures_kpa,
+        tuple(pressures_kpa or usual_pressures(first.form)[:1]),
     )  # fmt: skip
 
 
@@ -391,6 +392,7 @@ def _inflated(comparison: DesignComparison) -> PicturePair:
             notes[number] = WHY
             continue
         try:
+            refuse_beyond_burst(laminate, pressure)
             together = stack(design, laminate, factors=factors_of(design), form=form)
             rest = together.chambers - 1
             pose = together.pose((pressure, *(0.0,) * rest))

@@ -22,6 +22,7 @@ from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free, keys_of
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import FLAGS, Flag
 from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart
 from sbafab.process import Progress, ignore_progress
@@ -145,6 +146,16 @@ class FoundDesign:
         return intervals
 
     @cached_property
+    def flags(self) -> dict[str, tuple[Flag, ...]]:
+        """What figures of the best design are not to be trusted for, by quantity, where there is
+        something, as ``predict`` flags them.
+        """
+        if self.best.laminate is None:
+            return {}
+        each = {q.label: self._subject.flags(q) for q in self.problem.quantities}
+        return {label: flags for label, flags in each.items() if flags}
+
+    @cached_property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
         return Subject(self.problem.design.with_(dict(self.best.values)), self.best.laminate)
@@ -196,7 +207,7 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
         )
     for requirement in request.requirements:
         quantity = requirement.quantity
-        is_exact = quantity.key is not None or quantity.name in AS_DRAWN
+        is_exact = quantity.key is not None or quantity.name in (*AS_DRAWN, "burst")
         if not is_exact and group_of(quantity, design.form) is None:
             instead = "; ask for stroke@10kPa" if quantity.name == "reference_stroke" else ""
             raise DesignError(
@@ -515,6 +526,7 @@ def found_toml(
     best = f"# {goal.quantity.label} = {value} (the goal{_interval_text(result, goal)})"
     keys = keys_said(result.best.values)
     measured = [f"# {name}: {value.sentence()}" for name, value in result.measured.items()]
+    measured += [f"# {name}: {FLAGS[f]}" for name, flags in result.flags.items() for f in flags]
     head = [f"# Found by sbafab find, from {Path(source).name}: {keys}.", *limits, best, *measured]
     return "\n".join(line.rstrip() for line in head) + "\n\n" + tomli_w.dumps(first | tables)
 

@@ -20,6 +20,7 @@ from sbafab.design.files import key_paths, listed, shown
 from sbafab.design.records import Design, Form, Slots, keys_of
 from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE, millimetres
 from sbafab.errors import DesignError
+from sbafab.laminate.burst import NOT_BURST, Burst, burst
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
@@ -35,14 +36,33 @@ from sbafab.models.elastic import (
     stroke_at,
     time_to_fill,
 )
-from sbafab.models.figures import Factors
-from sbafab.models.formulas import force, sizes
-from sbafab.models.intervals import DELAYS, GROUP_BY_UNIT, Uncertainty, factors_of, uncertainty_of
+from sbafab.models.figures import NEAR_BURST, Factors, Flag
+from sbafab.models.formulas import (
+    force,
+    is_near_burst,
+    is_the_papers_3dof,
+    refuse_beyond_burst,
+    refuse_pressure,
+    sizes,
+)
+from sbafab.models.intervals import (
+    DELAYS,
+    GROUP_BY_UNIT,
+    PAPER_3DOF,
+    Uncertainty,
+    burst_uncertainty,
+    factors_of,
+    farther,
+    flags_at,
+    sizes_of,
+    uncertainty_of,
+)
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.mechanisms import ASKED, mechanism_value
 from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
 from sbafab.models.paper import (
     FLAT_HEIGHT_OF_FILMS,
+    FOLDED_HEIGHT,
     FULL_KPA,
     HEIGHTS,
     WATER_FLOW,
@@ -75,7 +95,7 @@ QUANTITIES = (
     QuantityName("reached_diameter", "mm", "the lower one of these two"),
     QuantityName("width", "mm", "of the flat laminate, likewise length"),
     QuantityName("length", "mm", ""),
-    QuantityName("height", "mm", "folded: the sum of the films"),
+    QuantityName("height", "mm", "folded: what the press leaves of the films"),
     QuantityName("lumen", "mm", "diameter of the lumen"),
     QuantityName("mass", "g", "of the films"),
     QuantityName("yield", "", "share of builds that hold, 0.95 or 95%"),
@@ -83,6 +103,7 @@ QUANTITIES = (
     QuantityName("reference_stroke", "mm", "what the paper measured, scaled"),
     QuantityName("bend@P", "deg", "one chamber at P kPa; two: bend@2chambers@P"),
     QuantityName("force@H@P", "N", "blocked at the stroke H mm or %, at P kPa"),
+    QuantityName("burst", "kPa", "estimate, film stress in proportion"),
     QuantityName("lateral_stiffness@P", "N/mm", "of the tip, chambers shut at P kPa"),
     QuantityName("time", "s", "to 10 kPa with water at --flow"),
     QuantityName("contraction", "mm", "free, of a drawn pouch motor"),
@@ -90,7 +111,7 @@ QUANTITIES = (
     QuantityName("free_bend", "deg", "of drawn hinges, all of a chamber"),
     QuantityName("moment@P", "N mm", "of one, straight, at P kPa"),
     QuantityName("load@P", "N", "that wrinkles a drawn beam at P kPa"),
-    QuantityName("slip@P", "N", "that makes jammed sheets slip"),
+    QuantityName("slip@P", "N", "that makes jammed sheets slip, P below 0"),
     QuantityName("push@P", "N", "of a drawn pouch on a plate, at most"),
 )
 """In the order of the help."""
@@ -107,7 +128,7 @@ def quantity_lines() -> str:
 
 
 USUAL_KPA = 10.0
-_PRESSURE = re.compile(r"\s*(\d+\.?\d*|\.\d+)\s*([A-Za-z]+)\s*")
+_PRESSURE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*([A-Za-z]+)\s*")
 _CHAMBERS = re.compile(r"\s*([1-9]\d?)\s*chambers?\s*", re.IGNORECASE)
 AT_PRESSURE = {row.name: row.unit for row in QUANTITIES if "@" in row.written}
 """Units of the quantities that take a pressure."""
@@ -119,10 +140,13 @@ UNITS = {
     "deg": {"deg": 1.0},
     "s": {"s": 1.0, "ms": 0.001},
     "N/mm": {"N/mm": 1.0, "mN/mm": 0.001, "N/m": 0.001},
+    "kPa": KILOPASCALS,
     "N mm": {"N mm": 1.0, "Nmm": 1.0, "mNm": 1.0, "Nm": 1000.0},
 }
-"""Of masses, forces, angles, times and stiffness; lengths have those of design files."""
+"""Of masses, forces, angles, times, stiffness and pressures; lengths have those of design files."""
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
+UNDER_VACUUM = ("slip",)
+"""Quantities at pressures below that of the atmosphere."""
 KEYS = {"lumen": "lumen.diameter"}
 """Quantities that are keys: they are asked for, and need no model."""
 ROUND_A_TUBE = ("deflated_diameter", "inflated_diameter", "reached_diameter")
@@ -228,9 +252,14 @@ def _with_pressure(name: str, places: list[str], text: str, kpa: float | None) -
         raise DesignError(
             f"{shown(text)}: a force needs one stroke, and only a force takes one; {HOW}"
         )
+    is_vacuum = name in UNDER_VACUUM
     if pressure is None:
-        pressure = USUAL_KPA if kpa is None else kpa
-    force(pressure, 0.0)
+        pressure = -USUAL_KPA if is_vacuum else USUAL_KPA
+        pressure = kpa if kpa is not None and (kpa < 0) == is_vacuum else pressure
+    try:
+        refuse_pressure(pressure, is_vacuum)
+    except DesignError as error:
+        raise DesignError(f"{shown(text)}: {error}") from None
     return RequestedQuantity(name, AT_PRESSURE[name], pressure, stroke, chambers, share=share)
 
 
@@ -246,10 +275,10 @@ def _with_flow(places: list[str], text: str, flow_ml_min: float) -> RequestedQua
 
 
 def named_pressure(texts: list[str]) -> float | None:
-    """The highest pressure that any of the quantities names, kPa."""
+    """The highest pressure that any of the quantities names, or the largest vacuum, kPa."""
     places = [place for text in texts for place in text.split("@")[1:]]
     named = [kilopascals for place in places if (kilopascals := _kilopascals(place)) is not None]
-    return max(named, default=None)
+    return max(named, key=abs, default=None)
 
 
 def _kilopascals(place: str) -> float | None:
@@ -339,7 +368,7 @@ class Subject:
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        return sizes(self.design, self.laminate, self._actuator.press_factor)
+        return sizes(self.design, self.laminate, self.factors)
 
     @cached_property
     def _keys(self) -> Mapping[str, Any]:
@@ -347,9 +376,12 @@ class Subject:
 
     def value(self, quantity: RequestedQuantity, share_of_good: Callable[[], float]) -> float:
         """Raises DesignError where the design has no such quantity, or no model knows it."""
+        kpa = kpa_of(quantity)
+        if kpa is not None:
+            refuse_beyond_burst(self.laminate, kpa)
         if quantity.name in ASKED:
-            mechanism, kpa = self.design.form.mechanism, quantity.kpa or USUAL_KPA
-            return mechanism_value(mechanism, self.laminate, quantity.name, kpa)
+            mechanism = self.design.form.mechanism
+            return mechanism_value(mechanism, self.laminate, quantity.name, kpa or USUAL_KPA)
         if quantity.name in AT_PRESSURE:
             return self._moved(quantity)
         by_name: Mapping[str, Callable[[], float]] = {
@@ -357,6 +389,7 @@ class Subject:
             "mass": lambda: film_mass(self.laminate),
             "height": lambda: self._actuator.thickness,
             "reference_stroke": lambda: self._actuator.known_stroke,
+            "burst": lambda: self._burst.kpa,
             "time": lambda: self._time(quantity.flow or WATER_FLOW),
         }
         if quantity.name in by_name:
@@ -369,6 +402,26 @@ class Subject:
         if isinstance(value, int | float):
             return float(value)
         raise DesignError(f"{self.design.name} has no {quantity.name} that is a number")
+
+    @property
+    def _burst(self) -> Burst:
+        estimate = burst(self.laminate)
+        if estimate is None:
+            raise DesignError(f"the burst pressure of {self.design.name} is not known: {NOT_BURST}")
+        return estimate
+
+    def flags(self, quantity: RequestedQuantity) -> tuple[Flag, ...]:
+        """Return what the quantity's figure is not to be trusted for, as in ``predict``."""
+        group, kpa = group_of(quantity, self.design.form), kpa_of(quantity)
+        missed = 0.0
+        if quantity.name == "burst":
+            missed = burst_uncertainty(self._burst)[1]
+        elif quantity.name == "reference_stroke" and self._actuator.radii:
+            missed = farther(sizes_of(self.design.form, self.laminate), PAPER_3DOF, False)
+        elif group is not None and self.uncertainty is not None:
+            missed = self.uncertainty.farther(group)
+        near = kpa is not None and is_near_burst(self.laminate, kpa)
+        return (*flags_at(missed), *((NEAR_BURST,) if near else ()))
 
     def _time(self, flow_ml_min: float) -> float:
         time, _ = time_to_fill(self._stack, flow_ml_min, FULL_KPA)
@@ -404,7 +457,7 @@ class Subject:
     @cached_property
     def uncertainty(self) -> Uncertainty | None:
         """The calibration of the design; None without one."""
-        return uncertainty_of(self.design)
+        return uncertainty_of(self.design, laminate=self.laminate)
 
     @cached_property
     def _others(self) -> dict[Factors, Subject]:
@@ -426,8 +479,12 @@ class Subject:
 
         Raises DesignError where the calibration's other factors lead out of the model's range.
         """
+        if quantity.name == "burst":
+            return burst_uncertainty(self._burst, share)[0]
         group = group_of(quantity, self.design.form)
         if self.uncertainty is None or group is None:
+            return None
+        if quantity.name == "height" and not self._actuator.folded.molten:
             return None
 
         is_force = quantity.name == "force" and self.value(quantity, lambda: math.nan) > 0
@@ -447,7 +504,9 @@ class Subject:
     @cached_property
     def _stack(self) -> Stack:
         if self.origin is not None:
-            moved = moved_stack(self.origin._stack, self.origin.factors, self.factors)
+            moved = moved_stack(
+                self.origin._stack, self.laminate, self.origin.factors, self.factors
+            )
             if moved is not None:
                 return moved
         return stack(self.design, self.laminate, factors=self.factors)
@@ -490,16 +549,18 @@ class Subject:
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
         """Return the paper's measured value where the model is off by over a quarter, or None."""
         name, model = self._figure(quantity)
-        return counterpart(self.design.form, name, model, self.factors.calibration)
+        of_papers = is_the_papers_3dof(self.design.form, self.laminate)
+        return counterpart(self.design.form, name, model, self.factors.calibration, of_papers)
 
     def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
         """Return the name of the figure in ``predict``, and that of its model; empty without."""
         at = f"at {quantity.kpa or 0.0:g} kPa"
         flow = f"at {quantity.flow or WATER_FLOW:g} ml/min"
         if quantity.name == "height":
-            factor = self._actuator.press_factor
-            pressed = f" x press factor {factor:.3g}" if factor != 1 else ""
-            return "deflated height", FLAT_HEIGHT_OF_FILMS + pressed
+            folded = self._actuator.folded
+            is_pressed = folded.molten > 0 and folded.factor != 1
+            pressed = f" x press factor {folded.factor:.3g}" if is_pressed else ""
+            return FOLDED_HEIGHT, FLAT_HEIGHT_OF_FILMS + pressed
         if group_of(quantity, self.design.form) is None:
             return "", ""
         if quantity.name == "stroke":
@@ -516,6 +577,13 @@ class Subject:
         near = min(HEIGHTS, key=lambda height: abs(height - share))
         where = f"at {100 * near:g} % of the reference stroke" if near else "flat"
         return f"blocked force {at}, {where}", ELASTIC_STACK
+
+
+def kpa_of(quantity: RequestedQuantity) -> float | None:
+    """Return the gauge pressure in kPa that a quantity is at; None for one at none."""
+    if quantity.name == "time":
+        return FULL_KPA
+    return quantity.kpa if quantity.name in AT_PRESSURE else None
 
 
 def group_of(quantity: RequestedQuantity, form: Form) -> str | None:

@@ -18,6 +18,7 @@ from sbafab.design.files import KIT, OUTLINE, kit_names
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
 from sbafab.errors import OutputError
+from sbafab.models.formulas import refuse_pressure, usual_pressures
 from sbafab.notebook import data_frame
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
@@ -50,18 +51,24 @@ class SweepRequest:
 
     ``workers`` processes of this machine (as many as processors by default), or the cluster behind
     ``dask``; each design may take ``seconds``. ``all_columns``: the tables hold every key, rule
-    and figure.
+    and figure. Without ``pressures_kpa`` they are those of a prediction.
     """
 
     design: Design
     varied: tuple[Varied, ...]
     samples: int | None = None
     seed: int = 0
-    pressures_kpa: tuple[float, ...] = (10.0, 100.0)
+    pressures_kpa: tuple[float, ...] = ()
     workers: int | None = None
     dask: str | None = None
     seconds: float = SECONDS
     all_columns: bool = False
+
+    def __post_init__(self) -> None:
+        form = self.design.form
+        pressures = self.pressures_kpa or usual_pressures(form)
+        refuse_pressure(pressures, form.works_under_vacuum)
+        object.__setattr__(self, "pressures_kpa", pressures)
 
 
 @dataclass(frozen=True)

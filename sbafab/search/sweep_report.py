@@ -51,7 +51,7 @@ FIRST = (
     "overall diameter",
     "deflated diameter",
     "reached diameter",
-    "deflated height",
+    "folded height",
     "mass",
     "reference stroke",
 )

@@ -75,7 +75,16 @@ class Goal:
 
 
 GOOD_IF_MORE = (
-    *("stroke", "reference_stroke", "bend", "force", "lateral_stiffness", "yield", "lumen"),
+    *(
+        "stroke",
+        "reference_stroke",
+        "bend",
+        "force",
+        "lateral_stiffness",
+        "burst",
+        "yield",
+        "lumen",
+    ),
     *ASKED,
 )
 """Of these as much as can be is best, of all others as little."""

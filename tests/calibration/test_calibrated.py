@@ -132,20 +132,12 @@ def test_a_file_is_read_as_it_was_written(paper: ModelCalibration, tmp_path: Pat
     assert calibration_of(design) == paper
 
 
-def test_a_file_of_five_unknowns_has_the_prior_of_the_sixth(
-    paper: ModelCalibration, tmp_path: Path
-) -> None:
-    tables = paper.as_dict()
-    tables["unknowns"] = tables["unknowns"][:5]
-    tables["mean"] = tables["mean"][:5]
-    tables["covariance"] = [row[:5] for row in tables["covariance"][:5]]
-    del tables["discrepancy"]["loss"]
+def test_a_file_of_an_older_version_is_refused(paper: ModelCalibration, tmp_path: Path) -> None:
+    """Its press factor is that of whole laminates."""
     path = tmp_path / "lab.toml"
-    path.write_text(tomli_w.dumps(tables))
-    older = read_calibration(path)
-    assert older.values["loss_share"] == pytest.approx(UNKNOWNS[5].middle)
-    assert older.covariance[5] == (0, 0, 0, 0, 0, pytest.approx(UNKNOWNS[5].spread ** 2))
-    assert older.factors.modulus_ratio == paper.factors.modulus_ratio
+    path.write_text(tomli_w.dumps({**paper.as_dict(), "schema": "sbafab/calibration@1"}))
+    with pytest.raises(DesignError, match=r"calibration@2'; write it again with sbafab calibrate"):
+        read_calibration(path)
 
 
 def test_a_name_that_is_none_says_what_there_is(tmp_path: Path) -> None:

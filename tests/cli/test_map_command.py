@@ -177,7 +177,7 @@ def test_reproduce_writes_every_figure_with_the_papers_error_bars(
         if figure["model"].startswith(("elastic stack", "sum of the films"))
     }
     (flat,) = curves["flat-height"]
-    assert flat["model"] == pytest.approx([told["deflated height"]] * 2, rel=1e-6)
+    assert flat["model"] == pytest.approx([told["folded height"]] * 2, rel=1e-6)
     held = curves["force-3dof"][0]
     assert held["model"] == pytest.approx([told["blocked force at 100 kPa, flat"]] * 2, rel=1e-3)
     for point, angle in zip(curves["force-bent"], (30, 60, 90), strict=True):

@@ -127,7 +127,7 @@ def test_a_kit_gives_what_the_design_leaves_out(lab: Path, tmp_path: Path) -> No
     assert found.films.stock["tpu50"].thickness == pytest.approx(0.05)
     assert (found.inlet.tube, found.inlet.tube_outer_diameter) == ("Fine tube", 0.8)
     said = citation(found)
-    assert (said["name"], said["version"]) == ("lab", "2")
+    assert (said["name"], said["version"]) == ("lab", "3")
     assert said["departures"] == ["press.platen_width"]
 
 
@@ -231,7 +231,7 @@ BAD = {
         r"adhesives\.Loctite .*\.bonds = \[.*\] has no source",
     ),
     "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive is a design's to say"),
-    "no version": ('version = "2"\n', "", r"version is missing; add it to the kit"),
+    "no version": ('version = "3"\n', "", r"version is missing; add it to the kit"),
     "another schema": ("kit@1", "kit@9", r"schema = 'sbafab/kit@9' must be 'sbafab/kit@1'"),
     "film of no kind": (
         "[press]",

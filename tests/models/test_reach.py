@@ -101,7 +101,7 @@ def test_a_target_behind_a_contact_that_closes_is_met(three: Stack, pressures: A
     assert np.linalg.norm(reached.tip - target.tip) < CLOSE
 
 
-@pytest.mark.parametrize("pressures", [(0.0, 9.8746, 10.0), (0.0, 9.8731, 9.9548)])
+@pytest.mark.parametrize("pressures", [(0.0, 9.6, 9.7), (0.0, 9.7, 9.85)])
 def test_a_folded_stack_is_met_among_its_equilibria(three: Stack, pressures: Any) -> None:
     """Two full chambers fold below a level plate to either side; at the same pressures the stack
     also stands upright.
@@ -196,8 +196,8 @@ def test_bad_input_to_reach_is_refused(three: Stack) -> None:
         three.reach((0, 0))
     with pytest.raises(DesignError, match="most_pressure = 120 kPa must be above 0 and at most"):
         three.reach((0, 0, 10), most_pressure=120)
-    with pytest.raises(DesignError, match="a plate 1 mm high is lower than the flat stack"):
-        three.reach((0, 0, 10), plate=1.0)
+    with pytest.raises(DesignError, match=r"a plate 0\.9 mm high is lower than the flat stack"):
+        three.reach((0, 0, 10), plate=0.9)
 
 
 def test_bad_input_to_many_targets_is_refused(three: Stack) -> None:

@@ -50,6 +50,7 @@ def between_axes(start: int, end: int, width: float) -> Region:
 
 TESTED_APART = {
     "press-fit",
+    "pressure-rating",
     "pin-fit",
     "bridges",
     "scrap",
@@ -223,6 +224,20 @@ def test_a_laminate_past_the_platen_fails_press_fit_alone(good: Callable[..., La
     laminate = good("1dof-5mm", "chamber.diameter=150")
     assert failing(laminate) == {"press-fit"}
     assert failing(good("1dof-5mm", "chamber.diameter=140")) == set()
+
+
+def test_a_pocket_too_wide_for_its_pressure_fails_pressure_rating_alone(
+    good: Callable[..., Laminate], spoil: Callable[..., Laminate]
+) -> None:
+    """367 kPa with a radius of 2.5 mm (paper, Sec. 4), in proportion: 340 at 2.7."""
+    laminate, limits = good("1dof-5mm", "bond.width=1"), replace(FEW, working_pressure=170.0)
+    assert failing(laminate, limits) == set()
+    wider = spoil(laminate, 6, disc(AXIS, 2.71) - disc(AXIS, 0.5), None)
+    assert failing(wider, replace(FEW, working_pressure=169.0)) == set()
+    (found,) = (f for f in run_deck(wider, limits) if f.verdict == "fail")
+    assert found.rule == "pressure-rating"
+    assert found.measured == pytest.approx(367 * 2.5 / 2.71)
+    assert 6 in found.where.layers
 
 
 def test_kerf_that_closes_a_bore_fails_film_limits_alone(good: Callable[..., Laminate]) -> None:

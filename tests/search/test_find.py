@@ -19,6 +19,7 @@ import sbafab
 from sbafab.cli import app
 from sbafab.design.records import Free
 from sbafab.errors import DesignError
+from sbafab.models.figures import Factors
 from sbafab.models.intervals import calibration_of
 from sbafab.models.unknowns import UNKNOWNS
 from sbafab.search import trial as module
@@ -315,7 +316,8 @@ def test_the_help_lists_every_quantity_with_its_unit() -> None:
     lines = [" ".join(line.split()) for line in said.splitlines()]
     for one in QUANTITIES:
         assert any(line.startswith(f"{one.written} {one.unit}".strip()) for line in lines), one
-        name = one.written.replace("@H@P", "@1mm@5kPa").replace("@P", "@5kPa")
+        kpa = "@-5kPa" if one.written == "slip@P" else "@5kPa"
+        name = one.written.replace("@H@P", "@1mm@5kPa").replace("@P", kpa)
         assert read_quantity(name).unit == one.unit
 
 
@@ -350,28 +352,38 @@ HEIGHTS = (Free("stack.balloons", 2, 20, 1),)
 
 @pytest.mark.parametrize("sure", [None, 0.6, 0.9])
 def test_a_requirement_holds_with_a_probability(sure: float | None) -> None:
-    """Heights are lognormal: n films and n - 1 masks, times the press factor and what it misses."""
+    """Heights are lognormal: 2 n - 1 masks, and 2 n films times the press factor, and what that
+    and the number of balloons, 15 in the evidence, leave uncertain.
+    """
     design = sbafab.load("1dof-5mm")
-    found = sbafab.find(design, most={"height": 1.5}, best="stroke", free=HEIGHTS, sure=sure)
+    found = sbafab.find(design, most={"height": 0.9}, best="stroke", free=HEIGHTS, sure=sure)
     calibration = calibration_of(design)
     assert calibration is not None
     row = [unknown.field for unknown in UNKNOWNS].index("press_factor")
     missed = calibration.discrepancy["flat height"]
-    deviation = math.sqrt(calibration.covariance[row][row] + missed**2)
     quantile = NormalDist().inv_cdf(sure or 0.5)
+    change, moved = calibration.shifted()[row]
 
-    def height(balloons: int) -> float:
-        films = 2 * balloons * 0.038 + (2 * balloons - 1) * 0.025
-        return films * calibration.factors.press_factor
+    def height(balloons: int, factors: Factors = calibration.factors) -> float:
+        films = 2 * balloons * 0.038 * factors.press_factor
+        return films + (2 * balloons - 1) * 0.025
 
-    bounds = {n: height(n) * math.exp(quantile * deviation) for n in range(2, 21)}
-    most = max(n for n, bound in bounds.items() if bound <= 1.5)
+    def deviation(balloons: int) -> float:
+        slope = math.log(height(balloons, moved) / height(balloons)) / change
+        spread = slope * math.sqrt(calibration.covariance[row][row])
+        return math.hypot(spread, missed, 0.05 * math.log2(max(15 / balloons, balloons / 15)))
+
+    bounds = {n: height(n) * math.exp(quantile * deviation(n)) for n in range(2, 21)}
+    most = max(n for n, bound in bounds.items() if bound <= 0.9)
     assert found.best.values == {"stack.balloons": most}
     (requirement,) = found.problem.requirements
     assert found.best.value(requirement) == pytest.approx(height(most))
     assert found.best.judged(requirement) == pytest.approx(bounds[most], rel=1e-6)
     low, high = found.intervals["height"]
-    assert math.log(high / low) == pytest.approx(2 * NormalDist().inv_cdf(0.95) * deviation)
+    factor = math.exp(NormalDist().inv_cdf(0.95) * deviation(most))
+    # No film is thinner than none.
+    assert low == pytest.approx(max(height(most) / factor, (2 * most - 1) * 0.025))
+    assert high == pytest.approx(height(most) * factor)
     text = figure_text(found.problem, found.best, requirement)
     assert ("or less with" in text) == (sure is not None)
 

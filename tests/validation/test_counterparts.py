@@ -113,7 +113,7 @@ def _measured_figures() -> Iterator[tuple[str, str, float]]:
         for chambers in ("one chamber", "2 chambers"):
             name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
             yield "3dof-15mm", name, measured.value
-    yield "3dof-15mm", "deflated height", paper.FLAT_HEIGHT.value
+    yield "3dof-15mm", "folded height", paper.FLAT_HEIGHT.value
     yield "3dof-15mm", "free height at 10 kPa", paper.FULL_HEIGHT.value
     # Sec. 4.6 names neither pressure nor chambers.
     for where in ("10 kPa in one chamber", "100 kPa in 2 chambers"):
@@ -184,6 +184,8 @@ def _far_off(found: Prediction) -> Iterator[Figure]:
     for figure in found.figures:
         for row in COUNTERPARTS:
             is_its = row.parallel in (None, parallel) and figure.model.name.startswith(row.model)
+            # The 3-DoF of this file is the paper's own.
+            is_its = is_its and (parallel or not row.of_papers)
             if is_its and re.fullmatch(row.figure, figure.name):
                 if _is_far_off(row, bool(found.asked.factors.calibration)):
                     yield figure
@@ -264,8 +266,8 @@ def test_calibrated_predictions_print_them_with_the_calibrated_values(
     assert "17.5 mm of full height" not in text.partition("Eqs. 1-3")[0]
     calibration = load_calibration("paper")
     assert calibration is not None
-    pressed = 1.865 * calibration.values["press_factor"]
-    assert f"folded height {pressed:.4g} mm\n" in out
+    pressed = 29 * 0.025 + 30 * 0.038 * calibration.values["press_factor"]
+    assert f"folded height {pressed:.3f} mm\n" in out
     assert "0.95 mm of deflated height" not in text
 
 
@@ -389,5 +391,5 @@ def test_columns_of_a_sweep_have_them() -> None:
 def test_with_factors_the_clause_says_that_the_model_had_none() -> None:
     found = sbafab.predict("3dof-15mm", UNCALIBRATED, press_factor=0.509, pocket_loss=0.28)
     told = {figure.name: figure for figure in found.figures}
-    assert told["deflated height"].measured is None
+    assert told["folded height"].measured is None
     assert "this model without factors gives it 24.55" in told["free height at 10 kPa"].aside

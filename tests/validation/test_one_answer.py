@@ -105,7 +105,7 @@ def test_find_has_the_sizes_of_predict(name: str, quantities: set[str]) -> None:
     subject = Subject(design, sbafab.build(design))
     figures = {one.name: one.value for one in sbafab.predict(name).figures}
     for quantity in quantities:
-        figure = "deflated height" if quantity == "height" else quantity.replace("_", " ")
+        figure = "folded height" if quantity == "height" else quantity.replace("_", " ")
         value = subject.value(read_quantity(quantity), lambda: 1.0)
         assert value == pytest.approx(figures[figure], rel=1e-12)
 
@@ -127,7 +127,7 @@ def test_a_height_is_the_stroke_above_the_flat_one(prediction: Prediction) -> No
     assert isinstance(answer, ModelValues)
     height = _figure(prediction, "free height at 10 kPa")
     assert answer.series == {"": (_near(height),)}
-    flat = next(one for one in prediction.figures if one.name == "deflated height")
+    flat = next(one for one in prediction.figures if one.name == "folded height")
     stroke = _figure(prediction, CASES["stroke"].figure)
     assert height.value == pytest.approx(flat.value + stroke.value, rel=1e-12)
 

@@ -10,6 +10,7 @@ from sbafab.actuators import build, load_design
 from sbafab.actuators.radial import RadialDesign
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.figures import Factors
 from sbafab.models.formulas import sizes
 
 
@@ -84,7 +85,7 @@ def test_1dof_caps_are_discs(name: str, diameter: float) -> None:
 def test_radial_sizes() -> None:
     design = load_design("radial-15mm")
     assert isinstance(design, RadialDesign)
-    found = sizes(design, build(design))
+    found = sizes(design, build(design), Factors())
     assert found["pitch"] == pytest.approx(15.708, abs=0.0005)
     assert found["deflated_diameter"] == pytest.approx(15.328, abs=1e-9)
     assert found["inflated_diameter"] == pytest.approx(28.06, abs=0.005)

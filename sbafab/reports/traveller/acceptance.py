@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from sbafab.design.identity import adhesive_for, cure_hours, kit_of, tube_name
 from sbafab.design.records import Design
+from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
-from sbafab.models.formulas import burst_pressure
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.cycles import serial
 from sbafab.pressing.schedule import joined_words
@@ -288,25 +288,26 @@ class Proof(NamedTuple):
 def proof(work: Work) -> Proof:
     """Return the pressure of the proof test: the kit's, or less for what would burst near it."""
     kit_pressure = work.design.acceptance.proof_pressure_kpa
-    burst = burst_pressure(work.design.form, work.laminate)
+    estimate = burst(work.laminate)
     forces = (
         f"the paper gives forces at {FORCE_KPA:g} kPa and burst three actuators with pockets of "
         f"5 mm at {BURST.value:g} ± {BURST.error:g} kPa"
     )
-    if burst is None:
+    if estimate is None:
         return Proof(
             None,
-            f"{forces}; nobody has burst this film or this pocket. Burst one actuator, write down "
+            f"{forces}; nobody has burst this film. Burst one actuator, write down "
             f"the pressure, ________ kPa, and proof test the others at {SHARE:.0%} of it",
         )
-    most = math.floor(SHARE * burst / STEP) * STEP
+    most = math.floor(SHARE * estimate.kpa / STEP) * STEP
     if kit_pressure <= most:
         return Proof(
-            kit_pressure, f"{forces}; this one is estimated to burst at about {burst:.0f} kPa"
+            kit_pressure,
+            f"{forces}; this one is estimated to burst at about {estimate.kpa:.0f} kPa",
         )
     return Proof(
         most,
-        f"{forces}; this one is estimated to burst at about {burst:.0f} kPa (film stress in "
+        f"{forces}; this one is estimated to burst at about {estimate.kpa:.0f} kPa (film stress in "
         f"proportion, ours), so its proof pressure is {SHARE:.0%} of that and not {kit_pressure:g} "
         "kPa" + ("" if most >= FORCE_KPA else f"; do not count on forces at {FORCE_KPA:g} kPa"),
     )

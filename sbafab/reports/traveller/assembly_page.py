@@ -16,7 +16,7 @@ from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.assemblies.shapes import colours, own_surface
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
-from sbafab.models.formulas import inflated_diameter, reached_diameter
+from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import joined_words
 from sbafab.pressing.work_plan import plan_times
@@ -717,11 +717,10 @@ def final_checks(assembled: Assembled) -> list[Action]:
 
 
 def _across(placed: PlacedSba) -> str | None:
-    form, laminate = placed.made.design.form, placed.made.laminate
-    reached, widest = reached_diameter(form, laminate), inflated_diameter(form, laminate)
-    if reached is None or widest is None:
+    size = sizes(placed.made.design, placed.made.laminate)
+    if "reached_diameter" not in size:
         return None
-    return f"{reached:.1f} mm across, {widest:.1f} mm at most"
+    return f"{size['reached_diameter']:.1f} mm across, {size['inflated_diameter']:.1f} mm at most"
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:

@@ -165,7 +165,8 @@ def _facts(work: Work) -> list[tuple[str, str]]:
     laminate = work.laminate
     extras = "tabs and ears" if laminate.registration == "ears" else "tabs"
     names = {
-        "thickness": "Thickness, flat (nominal films)",
+        "thickness": "Thickness, sum of the films as bought",
+        "folded_height": "Folded height, after the press (computed)",
         "width": f"Overall width, with {extras}",
         "length": f"Overall length, with {extras}",
         "outline_diameter": f"Diameter round the axis, without {extras}",

@@ -1,0 +1,93 @@
+"""Burst pressure of a laminate, scaled from the actuators that the paper burst: a proof test's
+limit, and what a working pressure must stay well below.
+
+The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa
+(Sec. 4, 7). A thin film of radius r and thickness t under p carries p r / 2 t where it is a
+sphere's and p r / t where it is a cylinder's: a long pocket of width w becomes one of radius
+w / pi. Film stress is taken in proportion, and nothing else is known; lengths mm, pressures kPa.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sbafab.geometry.cache import stored
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Point
+from sbafab.geometry.offset import grow, shrink
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import InscribedDisc, inscribed_disc
+from sbafab.laminate.films import PAPER_BURST, PAPER_PRODUCT, PAPER_THICKNESS
+from sbafab.laminate.laminate import Interface, Laminate
+
+RADIUS = 2.5
+"""mm, of the pockets that burst."""
+NOT_BURST = "nobody has burst such a film; burst one actuator"
+ROUND = 1.05
+"""Most area of a round pocket, its strips taken away, over that of its largest disc; ours. Others
+are taken for cylinders, as if they were as long as can be."""
+
+
+class Burst(NamedTuple):
+    """An estimate of the pressure in kPa at which the weakest pocket bursts.
+
+    ``radius`` mm is that of a sphere whose film carries as much, ``thickness`` mm the thinner of
+    the pocket's films, ``centre`` the middle of its widest place, in the ``interface``.
+    """
+
+    kpa: float
+    radius: float
+    thickness: float
+    is_round: bool
+    interface: Interface
+    centre: Point
+
+
+def burst(laminate: Laminate) -> Burst | None:
+    """Return the burst estimate of a laminate, read from its profiles; None without a pocket, and
+    where a film is of another product than the one that was burst.
+    """
+    return stored(laminate, "_burst", _burst)
+
+
+def _burst(laminate: Laminate) -> Burst | None:
+    if any(layer.film.product != PAPER_PRODUCT for layer in laminate.tpe_layers):
+        return None
+    patterns = {i.pattern: i for i in laminate.interfaces if i.kind == "chamber"}
+    pockets = [_pocket(interface) for interface in patterns.values()]
+    return min((pocket for pocket in pockets if pocket), key=lambda each: each.kpa, default=None)
+
+
+def _pocket(interface: Interface) -> Burst | None:
+    """Return the estimate of an interface's widest pocket; None without one."""
+    open_film = _spanned(interface)
+    if open_film.is_empty:
+        return None
+    disc = inscribed_disc(open_film)
+    is_round = _is_round(open_film, disc)
+    radius = disc.radius if is_round else 4 * disc.radius / math.pi
+    thickness = min(interface.below.film.thickness, interface.above.film.thickness)
+    kpa = PAPER_BURST[0] * RADIUS / radius * thickness / PAPER_THICKNESS
+    return Burst(kpa, radius, thickness, is_round, interface, disc.centre)
+
+
+def _spanned(interface: Interface) -> Region:
+    """Return the unbonded film, its openings for bores and vias counted as film: the other film
+    spans them.
+    """
+    kept = [c for c in interface.unbonded.contours if not c.is_hole or _holds(c, interface.bond)]
+    return Region(tuple(kept))
+
+
+def _holds(hole: Contour, bond: Region) -> bool:
+    """Return True if the films are bonded in most of a hole of the unbonded film."""
+    inside = Region((hole.reversed(),))
+    return (inside & bond).area > inside.area / 2
+
+
+def _is_round(region: Region, disc: InscribedDisc) -> bool:
+    piece = next(piece for piece in region.pieces if piece.contains(disc.centre))
+    without_strips = grow(shrink(piece, disc.radius / 2), disc.radius / 2)
+    core = next(part for part in without_strips.pieces if part.contains(disc.centre))
+    return core.area <= ROUND * math.pi * disc.radius**2
