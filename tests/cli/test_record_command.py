@@ -14,7 +14,6 @@ from sbafab.models.calibrated import load_calibration
 from sbafab.reports.traveller.page import record_text
 from tests.site.formats import hold
 
-FLAT = 12 * 0.038 + 11 * 0.025
 """mm: twelve films and eleven masks between them."""
 
 
@@ -89,10 +88,11 @@ def test_from_the_first_record_to_the_report(
     assert height["mean"] == pytest.approx(0.5)
     paper = load_calibration("paper")
     assert paper is not None
-    assert height["predicted"] == pytest.approx(FLAT * paper.values["press_factor"])
+    pressed = 11 * 0.025 + 12 * 0.038 * paper.values["press_factor"]
+    assert height["predicted"] == pytest.approx(pressed)
     assert height["high"] - 0.5 == pytest.approx(4.30265 * 0.02 / 3**0.5, rel=1e-4)
     assert height["verdict"] == "differs"
-    advice = f"1dof-5mm: sbafab predict --press-factor {0.5 / FLAT:.3f} uses the measured"
+    advice = "1dof-5mm: sbafab calibrate fits the press factor to its height_mm"
     assert advice in run(["record", "--report"], capsys)[1]
 
 

@@ -8,6 +8,7 @@ measured curves in series.
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -17,9 +18,15 @@ import pytest
 
 import sbafab
 from docs.scripts.gallery import FIGURES, figures_of, numbers_of
+from sbafab.assemblies.files import load
 from sbafab.calibration.model_values import ModelValues, model_values
+from sbafab.design.files import template_names
+from sbafab.design.records import Design
 from sbafab.evidence.records import MeasuredActuator, MeasuredCurve, Setup
+from sbafab.laminate.assembly import pressed_layers
+from sbafab.laminate.burst import burst
 from sbafab.models.figures import Figure, Prediction
+from sbafab.models.formulas import size_phrases, sizes
 from sbafab.models.intervals import factors_of
 from sbafab.search.quantities import Subject, read_quantity
 from sbafab.studio.jobs import elastic, motion
@@ -176,3 +183,59 @@ def test_the_gallery_shows_it_with_its_interval(prediction: Prediction) -> None:
     for name, words, digits in FIGURES:
         if name in known:
             assert any(line.startswith(f"{words} {known[name].value:.{digits}f} ") for line in card)
+
+
+DESIGNS = [name for name in template_names() if isinstance(load(name), Design)]
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_one_folded_height_and_one_burst(name: str) -> None:
+    """Of predict, find, check's line, traveller and manifest's sizes; by hand from the films."""
+    design = sbafab.load(name)
+    laminate = sbafab.build(design)
+    figures = {one.name: one for one in sbafab.predict(design, quick=True).figures}
+    height = figures["folded height"].value
+    factors = factors_of(design)
+    by_hand = sum(
+        layer.film.thickness
+        * (factors.press_factor if layer.film.is_the_papers and layer in pressed else 1.0)
+        for pressed in [pressed_layers(laminate)]
+        for layer in laminate.layers
+    )
+    assert height == pytest.approx(by_hand, rel=1e-12)
+    subject = Subject(design, laminate)
+    assert subject.value(read_quantity("height"), lambda: 1.0) == pytest.approx(height, rel=1e-12)
+    assert sizes(design, laminate)["folded_height"] == pytest.approx(height, rel=1e-12)
+    assert f"folded height {height:.3f} mm" in size_phrases(design, laminate)[-1]
+    estimate = burst(laminate)
+    if estimate is not None and not design.form.works_under_vacuum:
+        assert figures["burst pressure"].value == estimate.kpa
+        assert subject.value(read_quantity("burst"), lambda: 1.0) == estimate.kpa
+
+
+def test_nothing_past_the_burst_estimate() -> None:
+    """Pockets of 10 mm burst at 367 / 2 (Sec. 4, film stress in proportion)."""
+    found = sbafab.predict("1dof-10mm", pressures_kpa=[90, 100, 300], quick=True)
+    flagged = {one.pressure_kpa: "near-burst" in one.flags for one in found.figures}
+    assert flagged[90.0] is False
+    assert flagged[100.0] is True
+    assert 300.0 not in flagged
+    assert any("300 kPa" in left.name and "184 kPa" in left.reason for left in found.left_out)
+
+
+def test_intervals_widen_off_the_evidence() -> None:
+    """Forces were measured of pockets of 5 mm: a doubling adds 0.15, four of them are far off."""
+
+    def force(diameter: float) -> Figure:
+        found = sbafab.predict("1dof-5mm", pressures_kpa=[10], chamber={"diameter": diameter})
+        return _figure(found, "blocked force at 10 kPa, flat")
+
+    spreads = []
+    for diameter, is_far in ((5.0, False), (10.0, False), (50.0, True)):
+        figure = force(diameter)
+        assert figure.interval is not None
+        assert ("extrapolation" in figure.flags) == is_far
+        low, high = figure.interval
+        spreads.append(math.log(high / low) / 2 / 1.6448536)
+    assert spreads[1] == pytest.approx(math.hypot(spreads[0], 0.15), rel=0.03)
+    assert spreads[2] == pytest.approx(math.hypot(spreads[0], 0.15 * math.log2(10)), rel=0.03)
