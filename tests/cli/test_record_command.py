@@ -14,8 +14,6 @@ from sbafab.models.calibrated import load_calibration
 from sbafab.reports.traveller.page import record_text
 from tests.site.formats import hold
 
-"""mm: twelve films and eleven masks between them."""
-
 
 def run(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
     with pytest.raises(SystemExit) as ended:
