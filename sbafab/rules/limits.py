@@ -139,15 +139,17 @@ KEYS = (
     _Key("worst_mask_overhang", WORST, lambda lim: lim.worst_mask_overhang, "default"),
     _Key("validated_balloons", ("press-fit",), lambda lim: lim.validated_balloons, "paper", True),
     _Key("least_feature", ("film-limits",), lambda lim: lim.least_feature, "default"),
-    _Key("unknown_kerf", ("tube-fit",), lambda lim: lim.unknown_kerf, "default"),
+    _Key("unknown_kerf", ("tube-fit", "nets"), lambda lim: lim.unknown_kerf, "default"),
     _Key("pin_stretch", ("pin-fit",), lambda lim: lim.pin_stretch, "default", True),
-    _Key("cutting_error", (*WORST, "pin-fit", "tube-fit"), lambda lim: lim.tolerances.cutting),
+    _Key(
+        "cutting_error", (*WORST, "pin-fit", "tube-fit", "nets"), lambda lim: lim.tolerances.cutting
+    ),
     _Key("pin_error", WORST, lambda lim: lim.tolerances.pin),
     _Key("hand_placement", WORST, lambda lim: lim.tolerances.placement, "default"),
     _Key("hand_turn", WORST, lambda lim: lim.tolerances.turn, "default"),
     _Key(
         "seam_error",
-        WORST,
+        (*WORST, "sealing", "nets", "tube-fit"),
         lambda lim: lim.tolerances.of_seam("hot-tip"),
         "default",
     ),

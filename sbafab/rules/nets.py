@@ -35,6 +35,7 @@ from sbafab.rules.void_axes import (
     blind_ends,
     shortest_way,
 )
+from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
     Cavity,
@@ -73,12 +74,14 @@ class NetFault:
 class NarrowPlace:
     """The place of a net's voids in one interface that is hardest to open, and its pressure.
 
-    ``pressure`` in kPa is None where no film has elastic constants.
+    Of the ``width`` as drawn ``left`` mm are left at worst; ``pressure``, kPa, opens that, None
+    where no film has elastic constants.
     """
 
     net: str
     interface: int
     width: Width
+    left: float
     pressure: float | None
 
 
@@ -169,7 +172,7 @@ def connectivity(laminate: Laminate, limits: Limits, faults: bool = True) -> Con
         owners,
         reading.groups(),
         tuple(chain(*differences)) if faults else (),
-        tuple(reading.narrow()) if faults else (),
+        tuple(reading.narrow(limits)) if faults else (),
     )
 
 
@@ -457,13 +460,14 @@ class _Reading:
 
     # Widths.
 
-    def narrow(self) -> Iterable[NarrowPlace]:
-        """Yield the place of every cavity of a net that is hardest to open."""
+    def narrow(self, limits: Limits) -> Iterable[NarrowPlace]:
+        """Yield the place of every cavity of a net that is hardest to open at worst."""
         for number, cavity in enumerate(self.cavities):
             names = self.owners.get(self.part(number), ())
             if names and not cavity.is_open_film:
                 gap = self.interface(cavity.interface)
-                place = hardest_place(self.laminate, gap, cavity.region)
+                edges = VoidEdges.of(gap, limits)
+                place = hardest_place(self.laminate, gap, cavity.region, edges)
                 if place is not None:
                     yield NarrowPlace(names[0], cavity.interface, *place)
 
@@ -676,14 +680,18 @@ def _openings(
     known = [(place.pressure, place) for place in narrow if place.pressure is not None]
     if known:
         pressure, worst = max(known, key=lambda row: row[0])
-        layers = laminate.interfaces[worst.interface - 1].layer_indices
-        place = Place(worst.interface, layers, *worst.width.middle)
+        interface = laminate.interfaces[worst.interface - 1]
+        place = Place(worst.interface, interface.layer_indices, *worst.width.middle)
         is_good = pressure <= limit * (1 + 1e-9)
+        left = f"is {worst.left:.3f} mm" if worst.left > 0 else "closes"
         message = (
-            f"the channel of net {worst.net} that is hardest to open is {worst.width.value:.3f} mm "
-            f"wide, at interface {worst.interface} ({at(worst.width.middle)}), and opens by a "
-            f"film's thickness at {pressure:.3g} kPa (clamped plate)"
+            f"the channel of net {worst.net} that is hardest to open is drawn "
+            f"{worst.width.value:.3f} mm wide, at interface {worst.interface} "
+            f"({at(worst.width.middle)}), and {left} at worst "
+            f"({VoidEdges.of(interface, limits).words()})"
         )
+        if worst.left > 0:
+            message += f"; it opens by a film's thickness at {pressure:.3g} kPa (clamped plate)"
         if not is_good:
             message += (
                 f"; the limit is {limit:g} kPa: widen it there, or raise rules.opening_pressure_kpa"
@@ -695,7 +703,8 @@ def _openings(
         unknown = next(place for place in narrow if place.pressure is None)
         message = (
             "State modulus and poisson of the films: without them it is not known what opens the "
-            f"channel of {unknown.width.value:.3f} mm at interface {unknown.interface}"
+            f"channel of {unknown.width.value:.3f} mm, {unknown.left:.3f} at worst, at interface "
+            f"{unknown.interface}"
         )
         where = Place(unknown.interface, (), *unknown.width.middle)
         yield Finding(NAME, "warn", limit, None, "kPa", where, message, remedy=message)

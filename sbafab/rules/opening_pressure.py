@@ -18,13 +18,13 @@ from typing import NamedTuple
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Line, Point, meeting_points
-from sbafab.geometry.facing_places import facing_places_of
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region
-from sbafab.geometry.width import TOUCH, Width, least_width
+from sbafab.geometry.width import TOUCH, Width
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import without_slivers
+from sbafab.rules.void_edges import VoidEdges
 
 BENDING = 32.0
 STRETCHING = 64.0 / 3.0
@@ -37,23 +37,29 @@ WIDEST = 3.0
 
 
 class OpeningPlace(NamedTuple):
-    """A place of a channel, and the kPa that open it there; None where no film is known."""
+    """A place of a channel as drawn, what is ``left`` of its width at worst, mm, and the kPa that
+    open it then; None where no film is known.
+    """
 
     width: Width
+    left: float
     pressure: float | None
 
 
-def hardest_place(laminate: Laminate, interface: Interface, void: Region) -> OpeningPlace | None:
+def hardest_place(
+    laminate: Laminate, interface: Interface, void: Region, edges: VoidEdges
+) -> OpeningPlace | None:
     """Return the place of a void that takes most pressure to open; None if no edges face there.
 
-    Pressures are those at which either film lifts by its thickness; without elastic constants of
-    either it is the narrowest place. A model, not measured.
+    Pressures are those at which either film lifts by its thickness, where the ``edges`` lie off at
+    worst; without elastic constants of either it is the narrowest place. A model, not measured.
     """
-    narrowest = least_width(void, 0.0)
-    if narrowest is None:
+    places = edges.narrow_places(void)
+    narrowest, left = min(places, key=lambda place: place[1].value, default=(None, None))
+    if narrowest is None or left is None:
         return None
     sides = [_Side.of(laminate, interface, step, void) for step in (-1, 1)]
-    worst = OpeningPlace(narrowest, _pressure(sides, narrowest))
+    worst = OpeningPlace(narrowest, left.value, _pressure(sides, left))
     if worst.pressure is None or math.isinf(worst.pressure):
         return worst
 
@@ -63,23 +69,20 @@ def hardest_place(laminate: Laminate, interface: Interface, void: Region) -> Ope
         return min((load for load in loads if load is not None), default=math.inf)
 
     # Pressures fall with the fourth power of the width: wider places are no harder to open.
-    harder = most(narrowest.value) / worst.pressure
-    slack = narrowest.value * ((harder**0.25 if math.isfinite(harder) else WIDEST) - 1)
-    if slack <= TOUCH:
+    harder = most(left.value) / worst.pressure
+    widest = left.value * (harder**0.25 if math.isfinite(harder) else WIDEST)
+    if widest - left.value <= TOUCH:
         return worst
     bonded = [region for side in sides for region in side.bonded]
-    walls = _split(void, bonded, narrowest.value + slack)
-    (places,) = facing_places_of([(walls, slack, 0.0, narrowest)])
-    for place in places.value.argsort(kind="stable").tolist():
-        (x, y), (u, v) = places.start[:, place].tolist(), places.end[:, place].tolist()
-        width = Width(float(places.value[place]), (x, y), (u, v))
-        if most(width.value) <= worst.pressure:
-            break
-        pressure = _pressure(sides, width)
+    walls = _split(void, bonded, widest + edges.most)
+    for width, left in edges.narrow_places(walls, widest):
+        if most(left.value) <= worst.pressure:
+            continue
+        pressure = _pressure(sides, left)
         if pressure is None:
-            return OpeningPlace(width, None)
+            return OpeningPlace(width, left.value, None)
         if pressure > worst.pressure:
-            worst = OpeningPlace(width, pressure)
+            worst = OpeningPlace(width, left.value, pressure)
     return worst
 
 
@@ -149,7 +152,7 @@ class _Side(NamedTuple):
 
 def _pressure(sides: Sequence[_Side], width: Width) -> float | None:
     """Return the kPa that lift either side; the more of both where bonds behind it end."""
-    if width.value <= 0:
+    if width.value <= TOUCH:
         return math.inf
     (x, y), (u, v) = width.start, width.end
     dx, dy = BESIDE * (y - v) / width.value, BESIDE * (u - x) / width.value

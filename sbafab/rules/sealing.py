@@ -6,16 +6,18 @@ searched from each inlet.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
-from sbafab.geometry.region import Region
+from sbafab.geometry.region import Region, strip
+from sbafab.geometry.width import Width
 from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.limits import at
+from sbafab.rules.limits import Limits, at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import (
     OUTSIDE,
     Void,
@@ -27,6 +29,8 @@ from sbafab.rules.voids import (
 )
 
 NAME = "sealing"
+CUT = 1e-4
+"""mm: width of a cut across a void."""
 
 
 class _Offence(NamedTuple):
@@ -49,6 +53,7 @@ def check(measures: Measures) -> list[Finding]:
         *_wrong_reaches(laminate, graph, owners),
         *_loose_films(laminate),
     ]
+    offences = offences or list(_closing(laminate, graph, owners, measures.limits))
     if not offences:
         pockets = "1 pocket" if len(owners) == 1 else f"{len(owners)} pockets"
         message = f"{pockets} sealed, each reached from the inlet of its own chamber alone"
@@ -83,10 +88,11 @@ RULE = Rule(
     check,
     Explanation(
         "every pocket is reached from its own chamber's inlet and from nowhere else",
-        "A pocket that opens elsewhere leaks; one that is cut off never inflates.",
+        "A pocket that opens elsewhere leaks; one that is cut off never inflates. Channels between "
+        "seams must stay open when these lie off their paths by registration.seam_error.",
         "Look at the place named: an opening too near another, a mask that crosses a bond, or a "
         "seam with a gap.",
-        ("bore.diameter", "lumen.diameter", "inlet.width"),
+        ("bore.diameter", "lumen.diameter", "inlet.width", "registration.seam_error"),
     ),
     at_most=True,
 )
@@ -226,6 +232,47 @@ def _foreign(
         f"({at(p)}); separate them by a bond there"
     )
     return _Offence(message, void.level, p)
+
+
+def _closing(
+    laminate: Laminate, graph: VoidGraph, owners: dict[Void, frozenset[str]], limits: Limits
+) -> Iterator[_Offence]:
+    """Yield a place of each pocket between seams that parts it when these lie off their paths."""
+    for void, names in owners.items():
+        interface = laminate.interfaces[void.level - 1]
+        edges = VoidEdges.of(interface, limits)
+        region = graph.pieces[void]
+        inlets = [inlet for inlet in laminate.inlets if inlet.chamber in names]
+        held = [
+            c for chamber in laminate.chambers if chamber.name in names for c in chamber.centres
+        ]
+        held += [i.mouth for i in inlets if mouth_of(laminate.inlets.index(i)) in graph.joins[void]]
+        for place, left in edges.narrow_places(region) if edges.seams else ():
+            if left.value > 0 or not _parts(region, place, held):
+                continue
+            message = (
+                f"{' and '.join(names)} may be parted at chamber interface {void.level} "
+                f"({at(place.middle)}): seams leave {place.value:.3f} mm there, and nothing at "
+                f"worst ({edges.words()}); lay them farther apart, or state a smaller "
+                "registration.seam_error that the tool keeps"
+            )
+            yield _Offence(message, void.level, place.middle)
+            break
+
+
+def _parts(region: Region, place: Width, held: Sequence[Point]) -> bool:
+    """Return True if points of a void lie on both sides of a place across it."""
+    (x, y), (u, v) = place.start, place.end
+    dx, dy = (CUT * (u - x) / place.value, CUT * (v - y) / place.value)
+    cut = strip((x - dx, y - dy), (u + dx, v + dy), CUT)
+    parts = (region - cut).pieces
+
+    def home(p: Point) -> int:
+        off = [0.0 if _holds(part, p) else part.distance_to_edge(p) for part in parts]
+        return off.index(min(off))
+
+    homes = {home(p) for p in held}
+    return len(homes) > 1
 
 
 def _loose_films(laminate: Laminate) -> list[_Offence]:

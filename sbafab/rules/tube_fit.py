@@ -3,7 +3,8 @@
 A channel w wide opens to a perimeter of 2 w. In it lie the tube and, along one side of it, the PTFE
 strip: the tube's half circle there is one strip's thickness farther out, so w must be pi / 2 times
 the sum of the tube's diameter and the strip's thickness. Both edges of the strip may be cut off by
-the cutting error, and a kerf that is not compensated makes it narrower by its width.
+the cutting error, and a kerf that is not compensated makes it narrower by its width. Between two
+seams it is narrower by their errors of place; what only these take is a warning.
 
 A port that is a hole has its tube glued on the film round it: the tube must cover the hole as cut
 at its widest, and the film go on past the hole for a bond's width.
@@ -19,13 +20,15 @@ from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Edge, Line, Point, meeting_points
 from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
 from sbafab.geometry.region import Region, polygon, strip
+from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
-from sbafab.rules.boundary import outward_reach
+from sbafab.rules.boundary import Reach, outward_reach
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.limits import TOLERANCE, Limits, at, holds
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
+from sbafab.rules.void_edges import VoidEdges
 from sbafab.rules.voids import PAST_MOUTH, mouth_openings
 
 NAME = "tube-fit"
@@ -38,7 +41,10 @@ ROOM = 1e-9
 
 
 class _Fit(NamedTuple):
-    """One measure of an inlet: the feature, its value and its least value, mm."""
+    """One measure of an inlet: the feature, its value at worst and its least value, mm.
+
+    ``drawn`` is the width as drawn; ``firm`` what is left of it with seams on their paths.
+    """
 
     inlet: Inlet
     interface: Interface | None
@@ -48,6 +54,7 @@ class _Fit(NamedTuple):
     at: Point
     remedy: str
     drawn: float = 0.0
+    firm: float = 0.0
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -76,17 +83,22 @@ def check(measures: Measures) -> list[Finding]:
     else:
         message = (
             f"{worst.feature} of {worst.inlet.chamber} is drawn {worst.drawn:.3f} mm wide, "
-            f"{at(worst.at)}, and cut {worst.value:.3f} at worst "
-            f"({_lost_to(worst.interface, limits)}); a tube of "
+            f"{at(worst.at)}, and {_made(worst.interface)} {worst.value:.3f} at worst "
+            f"({_edges(worst.interface, limits).words()}); a tube of "
             f"{worst.inlet.tube_diameter:g} beside its strip needs {worst.limit:.3f}"
         )
-    if not good:
+    # What only the seams' places take from a strip leaves it open, if narrow for its tube.
+    by_seams = worst.value > 0 and all(holds(fit.firm, fit.limit) for fit in short)
+    verdict: Verdict = "pass" if good else "warn" if by_seams else "fail"
+    if verdict == "fail":
         message += f": {worst.remedy}"
+    elif verdict == "warn":
+        message = f"{worst.remedy}: {message}"
     place = Place(None, (), *worst.at)
     if worst.interface is not None:
         place = Place(worst.interface.index, worst.interface.layer_indices, *worst.at)
-    verdict: Verdict = "pass" if good else "fail"
-    finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message)
+    remedy = worst.remedy if verdict == "warn" else ""
+    finding = Finding(NAME, verdict, worst.limit, worst.value, "mm", place, message, remedy=remedy)
     holes = [_of_holes(on_holes)] if on_holes else []
     return [finding, *(_unlike(fits) if good else ()), *holes]
 
@@ -197,11 +209,12 @@ def _fits(inlet: Inlet, laminate: Laminate, limits: Limits) -> list[_Fit]:
         openings = mouth_openings(inlet, interface)
         if openings:
             # A tube goes into one opening; bond between two of them holds it out of both.
-            width = max(high - low for low, high in openings)
-            cut = max(0.0, width - _lost(interface, limits))
-            remedy = _wider(needed + _lost(interface, limits))
-            opening = _Fit(inlet, interface, MOUTH, cut, needed, inlet.mouth, remedy, width)
-            return [opening, *_along_run(inlet, interface, needed, limits)]
+            low, high = max(openings, key=lambda ends: ends[1] - ends[0])
+            (x, y), (dx, dy) = inlet.mouth, inlet.direction
+            ends = [(x + dy * offset, y - dx * offset) for offset in (low, high)]
+            opening = _Fit(inlet, interface, MOUTH, 0.0, needed, inlet.mouth, "")
+            run = _along_run(inlet, interface, needed, limits)
+            return [_at_worst(opening, ends[0], ends[1], limits), *run]
     message = "open a mask strip to the tab's end"
     gaps = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
     if gaps and not any(interface.pressed for interface in gaps):
@@ -231,23 +244,42 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
     rims = interface.contact.index if interface.pressed else EdgeIndex(())
     bonds = [outward_reach(edge, rims) for edge in sides]
     fits = []
-    for reaches, feature, limit, remedy in (
-        (widths, "the strip", needed, _wider(needed + _lost(interface, limits))),
-        (
-            bonds,
-            BOND,
-            limits.bond_width,
-            "make the tab wider, by bond.width or in the shape of a drawn layer",
-        ),
-    ):
-        least = min((r for r in reaches if r), key=lambda r: r.value, default=None)
-        if least is not None:
-            cut = (
-                least.value if feature == BOND else max(0.0, least.value - _lost(interface, limits))
-            )
-            fit = _Fit(inlet, interface, feature, cut, limit, least.at, remedy, least.value)
-            fits.append(fit)
+    wide = _least(sides, widths)
+    if wide is not None:
+        edge, reach = wide
+        strip_fit = _Fit(inlet, interface, "the strip", 0.0, needed, reach.at, "")
+        fits.append(_at_worst(strip_fit, edge.nearest(reach.at), reach.at, limits))
+    bonded = _least(sides, bonds)
+    if bonded is not None:
+        value, place = bonded[1]
+        remedy = "make the tab wider, by bond.width or in the shape of a drawn layer"
+        limit = limits.bond_width
+        fits.append(_Fit(inlet, interface, BOND, value, limit, place, remedy, value, value))
     return fits
+
+
+def _least(edges: Sequence[Edge], reaches: Sequence[Reach | None]) -> tuple[Edge, Reach] | None:
+    both = ((edge, reach) for edge, reach in zip(edges, reaches, strict=True) if reach is not None)
+    return min(both, key=lambda pair: pair[1].value, default=None)
+
+
+def _edges(interface: Interface | None, limits: Limits) -> VoidEdges:
+    if interface is None:
+        return VoidEdges(limits.tolerances.cutting, limits.unknown_kerf, ())
+    return VoidEdges.of(interface, limits)
+
+
+def _at_worst(fit: _Fit, p: Point, q: Point, limits: Limits) -> _Fit:
+    """Return the fit of a strip between two points of its edges, with what is left at worst."""
+    drawn = Width(math.dist(p, q), p, q)
+    edges = _edges(fit.interface, limits)
+    value = edges.left(drawn).value
+    least = math.ceil(round((fit.limit + drawn.value - value) * 1000, 6)) / 1000
+    remedy = f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"
+    if edges.seams:
+        remedy = f"lay the seams beside the inlet of {fit.inlet.chamber} {least:.3f} mm apart"
+    firm = drawn.value - 2 * edges.cutting if edges.seams else value
+    return fit._replace(value=value, remedy=remedy, drawn=drawn.value, firm=firm)
 
 
 def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | None:
@@ -303,30 +335,8 @@ def _needed(inlet: Inlet, interface: Interface) -> float:
     return math.pi / 2 * (inlet.tube_diameter + strip)
 
 
-def _wider(width: float) -> str:
-    """Return the remedy for a strip narrower than ``width`` mm as drawn."""
-    least = math.ceil(round(width * 1000, 6)) / 1000
-    return f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"
-
-
-def _lost(interface: Interface, limits: Limits) -> float:
-    """Width by which a strip may be cut narrower than drawn, mm."""
-    unknown = 0.0 if _is_measured(interface, limits) else limits.unknown_kerf
-    return 2 * limits.tolerances.cutting + unknown
-
-
-def _lost_to(interface: Interface | None, limits: Limits) -> str:
-    """The causes of that loss in words."""
-    edges = f"{limits.tolerances.cutting:g} on each edge"
-    if _is_measured(interface, limits):
-        return edges
-    return f"{edges}, kerf up to {limits.unknown_kerf:g}"
-
-
-def _is_measured(interface: Interface | None, limits: Limits) -> bool:
-    """Return True if the kerf in the masks, which makes strips narrower, is measured."""
-    masks = interface.masks if interface is not None else ()
-    return bool(masks) and all(mask.film.material in limits.kerf for mask in masks)
+def _made(interface: Interface | None) -> str:
+    return "cut" if interface is None or interface.pressed else "welded"
 
 
 def _margin(fit: _Fit) -> float:

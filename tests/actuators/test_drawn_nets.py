@@ -125,7 +125,11 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], None], str, Point]] = [
     (with_stub, "net a has a dead end at interface 1", (-12, -2)),
     (with_second_hole, "net b reaches the outside at layer 5", (8, -3)),
     (without_route, "net a is open: left is not joined to supply; they come nearest", (-8, -7.1)),
-    (too_narrow, "of net a that is hardest to open is 0.250 mm wide, at interface 1", (-8, -7.5)),
+    (
+        too_narrow,
+        "of net a that is hardest to open is drawn 0.250 mm wide, at interface 1",
+        (-8, -7.5),
+    ),
 ]
 
 

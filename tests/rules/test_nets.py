@@ -13,7 +13,7 @@ from sbafab.laminate.joints import Fold, Net, Port
 from sbafab.laminate.laminate import Chamber, Laminate
 from sbafab.laminate.netlist import Netlist
 from sbafab.rules import sealing
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 from sbafab.rules.nets import check, connectivity, netlist_findings
 from sbafab.rules.void_axes import Terminal, axis_of, blind_ends
@@ -31,7 +31,8 @@ from tests.rules.routed import (
     xy,
 )
 
-LIMITS = Limits()
+LIMITS = Limits(tolerances=Tolerances(cutting=0), unknown_kerf=0)
+"""Channels are cut as they are drawn."""
 NEAR = 1.0
 """Furthest in mm that a fault may be named from its place."""
 
@@ -106,7 +107,7 @@ def test_a_channel_too_narrow_to_open_fails_at_its_neck() -> None:
     assert joined.verdict == "pass"
     assert (opening.verdict, opening.where.interface) == ("fail", 1)
     assert (opening.where.x, opening.where.y) == pytest.approx((10.0, 4.0), abs=1.0)
-    assert "is 0.200 mm wide" in opening.message
+    assert "is drawn 0.200 mm wide" in opening.message
     wider = replace(LIMITS, opening_pressure=1e6)
     assert check(Measures(laminate_of(routes), wider))[1].verdict == "pass"
 

@@ -16,10 +16,12 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc, rectangle, strip
 from sbafab.laminate.joints import Net, Port
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.nets import NarrowPlace, connectivity
 from tests.quick import few
 from tests.rules.routed import Routes, laminate_of, routed, xy
+
+AS_DRAWN = Limits(tolerances=Tolerances(cutting=0), unknown_kerf=0)
 
 
 def plate(films: Sequence[tuple[float, float]], width: float) -> float:
@@ -53,7 +55,7 @@ def hardest(laminate: Laminate, at: Point) -> NarrowPlace:
     gap = laminate.interfaces[1]
     port = Port("p", gap.below.index, gap.above.index, at)
     declared = replace(laminate, ports=(port,), nets=(Net("n", ("p",)),))
-    (place,) = (p for p in connectivity(declared, Limits()).narrow if p.interface == 2)
+    (place,) = (p for p in connectivity(declared, AS_DRAWN).narrow if p.interface == 2)
     return place
 
 
@@ -196,7 +198,7 @@ def test_no_section_of_a_random_laminate_is_harder_to_open(seed: int) -> None:
         routes.more += [(level, pad)] if free else []
     laminate = with_films(laminate_of(routes), random)
     stack = Stack(laminate)
-    found = connectivity(laminate, Limits())
+    found = connectivity(laminate, AS_DRAWN)
     assert found.narrow
     worst: dict[int, float] = {}
     for place in found.narrow:

@@ -1,0 +1,114 @@
+"""Edges of voids at worst: how much of a channel cutting, kerf and seams leave.
+
+A cut edge lies off by the cutting error, and by half of a kerf that is not measured. An edge of a
+seam lies off by its tool's error of place, but the two edges of one seam move together: there it is
+as exact as a cut edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from sbafab.geometry.edges import Point
+from sbafab.geometry.facing_places import facing_places_of
+from sbafab.geometry.region import Region
+from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.laminate import Interface
+from sbafab.rules.limits import Limits
+from sbafab.rules.margins import bonding_seams
+
+NEAR: Final = 1e-5
+"""mm within which a place begins at an edge."""
+
+
+@dataclass(frozen=True)
+class VoidEdges:
+    """The edges that bound the voids of an interface, with what they may lie off, mm.
+
+    ``kerf`` is the kerf that is not known, ``seams`` those that bond, with their tools' errors.
+    """
+
+    cutting: float
+    kerf: float
+    seams: tuple[tuple[Region, float], ...]
+
+    @staticmethod
+    def of(interface: Interface, limits: Limits) -> VoidEdges:
+        cutting, seams = limits.tolerances.cutting, bonding_seams(interface)
+        cut = interface.masks or (interface.below, interface.above)
+        is_known = all(layer.film.material in limits.kerf for layer in cut)
+        return VoidEdges(
+            cutting,
+            0.0 if is_known else limits.unknown_kerf,
+            tuple((s.region, max(cutting, limits.tolerances.of_seam(s.tool))) for s in seams),
+        )
+
+    @property
+    def most(self) -> float:
+        """The most that can be lost between any two edges, mm."""
+        return 2 * max(self._cut, *(error for _, error in self.seams), self.cutting)
+
+    @property
+    def _cut(self) -> float:
+        return self.cutting + self.kerf / 2
+
+    def left(self, place: Width) -> Width:
+        """Return what is left of a place at worst; a width of 0 where it closes."""
+        at_start, at_end = self._lost(place.start, place.end)
+        if at_start + at_end >= place.value:
+            return Width(0.0, place.middle, place.middle)
+        (x, y), (u, v) = place.start, place.end
+        dx, dy = (u - x) / place.value, (v - y) / place.value
+        return Width(
+            place.value - at_start - at_end,
+            (x + dx * at_start, y + dy * at_start),
+            (u - dx * at_end, v - dy * at_end),
+        )
+
+    def _lost(self, p: Point, q: Point) -> tuple[float, float]:
+        """The most that the edges at two points lose towards each other, mm."""
+        pairs = ((a, b) for a in self._at(p) for b in self._at(q))
+        return max(
+            (
+                (self.cutting, self.cutting) if a is not None and a == b else (of_a, of_b)
+                for (a, of_a), (b, of_b) in pairs
+            ),
+            key=sum,
+        )
+
+    def _at(self, p: Point) -> list[tuple[int | None, float]]:
+        """The seams whose edges run through a point, by number, with what they may lie off."""
+        beside: list[tuple[int | None, float]] = [
+            (number, error)
+            for number, (region, error) in enumerate(self.seams)
+            if region.distance_to_edge(p) <= NEAR
+        ]
+        return beside or [(None, self._cut)]
+
+    def narrow_places(self, void: Region, widest: float = 0.0) -> Iterator[tuple[Width, Width]]:
+        """Yield places of a void as drawn, and what is left of each at worst, narrow ones first.
+
+        The narrowest at worst is among them, and all of which no more than ``widest`` mm is left.
+        """
+        least = least_width(void, 0.0)
+        if least is None:
+            return
+        yield least, self.left(least)
+        slack = max(self.left(least).value, widest) + self.most - least.value
+        if not self.seams and not widest:
+            return
+        (places,) = facing_places_of([(void, max(0.0, slack), 0.0, least)])
+        for number in places.value.argsort(kind="stable").tolist():
+            (x, y), (u, v) = places.start[:, number].tolist(), places.end[:, number].tolist()
+            place = Width(float(places.value[number]), (x, y), (u, v))
+            yield place, self.left(place)
+
+    def words(self) -> str:
+        """The causes of what is lost, in words."""
+        if self.seams:
+            errors = " or ".join(f"{error:g}" for error in sorted({e for _, e in self.seams}))
+            return f"seams up to {errors} off their paths"
+        edges = f"{self.cutting:g} on each edge"
+        return f"{edges}, kerf up to {self.kerf:g}" if self.kerf else edges
