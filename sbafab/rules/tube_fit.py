@@ -278,7 +278,7 @@ def _at_worst(fit: _Fit, p: Point, q: Point, limits: Limits) -> _Fit:
     remedy = f"make it {least:.3f} mm wide, by inlet.width or in the shape of a drawn layer"
     if edges.seams:
         remedy = f"lay the seams beside the inlet of {fit.inlet.chamber} {least:.3f} mm apart"
-    firm = drawn.value - 2 * edges.cutting if edges.seams else value
+    firm = edges.with_seams_in_place.left(drawn).value
     return fit._replace(value=value, remedy=remedy, drawn=drawn.value, firm=firm)
 
 

@@ -1,14 +1,13 @@
 """Edges of voids at worst: how much of a channel cutting, kerf and seams leave.
 
 A cut edge lies off by the cutting error, and by half of a kerf that is not measured. An edge of a
-seam lies off by its tool's error of place, but the two edges of one seam move together: there it is
-as exact as a cut edge.
+seam lies off by its tool's error of place; two edges of one seam move together, and lose nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from sbafab.geometry.edges import Point
@@ -42,13 +41,18 @@ class VoidEdges:
         return VoidEdges(
             cutting,
             0.0 if is_known else limits.unknown_kerf,
-            tuple((s.region, max(cutting, limits.tolerances.of_seam(s.tool))) for s in seams),
+            tuple((seam.region, limits.tolerances.of_seam(seam.tool)) for seam in seams),
         )
 
     @property
     def most(self) -> float:
         """The most that can be lost between any two edges, mm."""
-        return 2 * max(self._cut, *(error for _, error in self.seams), self.cutting)
+        return 2 * max([self._cut, *(error for _, error in self.seams)])
+
+    @property
+    def with_seams_in_place(self) -> VoidEdges:
+        """The edges with every seam on its path."""
+        return replace(self, seams=tuple((region, 0.0) for region, _ in self.seams))
 
     @property
     def _cut(self) -> float:
@@ -72,7 +76,7 @@ class VoidEdges:
         pairs = ((a, b) for a in self._at(p) for b in self._at(q))
         return max(
             (
-                (self.cutting, self.cutting) if a is not None and a == b else (of_a, of_b)
+                (0.0, 0.0) if a is not None and a == b else (of_a, of_b)
                 for (a, of_a), (b, of_b) in pairs
             ),
             key=sum,

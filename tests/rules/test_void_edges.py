@@ -119,16 +119,16 @@ def test_a_channel_between_two_seams_loses_the_errors_of_both(
 
 
 def test_a_channel_between_two_legs_of_one_seam_moves_with_it() -> None:
-    """Drawn narrower than one between two seams, it is the wider one at worst."""
+    """Between the legs of one seam it stays as drawn."""
     hook = [[-15, 3], [-6, 3], [-6, -3], [-3.9, -3], [-3.9, 1]]
     walls = {"hook": (hook, "hot-tip"), "bar": ([[15, -5], [-5, -5]], "hot-tip")}
     port = [{"name": "p", "layers": [1, 2], "at": [-4.95, 0]}]
     design = welded(walls, ports=port)
     film = film_of(build(design))
-    # Between the hook's legs 0.6 mm as drawn, 0.4 at worst; between both seams 0.5, closed.
+    # Between the hook's legs 0.6 mm; between both seams 0.5, closed at worst.
     assert opening(design).measured is None
     design = welded({"hook": walls["hook"]}, ports=port)
-    assert opening(design).measured == pytest.approx(plate([film], 0.4), rel=1e-6)
+    assert opening(design).measured == pytest.approx(plate([film], 0.6), rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -175,9 +175,9 @@ def test_a_narrow_end_of_a_pocket_parts_nothing() -> None:
     assert found.verdict == "pass"
 
 
-@pytest.mark.parametrize(("width", "verdict"), [(2.0, "warn"), (2.2, "pass"), (1.7, "fail")])
+@pytest.mark.parametrize(("width", "verdict"), [(2.0, "warn"), (2.2, "pass"), (1.59, "fail")])
 def test_a_mouth_between_two_seams_is_narrower_by_their_errors(width: float, verdict: str) -> None:
-    """Welded 0.6 mm narrower at worst, 0.2 with both on their paths; the tube needs 1.596."""
+    """Welded 0.6 mm narrower at worst; the tube needs 1.596."""
     half = width / 2 + 1
     paths = {
         "left": [[-19, -13], [-19, 12], [-half, 12], [-half, 25]],
