@@ -54,7 +54,7 @@ def test_a_sound_page_is_left_alone(made: Patient) -> None:
     assert said(made) == []
 
 
-FLAT = "<dt>Thickness, flat \\(nominal films\\)</dt><dd>"
+FLAT = "<dt>Thickness, sum of the films as bought</dt><dd>"
 FAULTS = {
     "an end tag too many": ("</section>", "</div></section>", "closes nothing"),
     "a part counted wrongly": ("<b>2</b>", "<b>3</b>", "is counted 3"),
@@ -107,7 +107,7 @@ FAULTS = {
     "paper that the pins leave out": ("Tape a fresh print", "Tape a print", "mm high"),
     "a turn more": ("3 times in this order", "4 times in this order", "turns, and layers"),
     "less film": (r"(\d+\.\d) cm² of parts", r"9\1 cm² of parts", "parts are"),
-    "a thicker laminate": (f"{FLAT}0", "<dt>Thickness, flat (nominal films)</dt><dd>1", "mm thick"),
+    "a thicker laminate": (f"{FLAT}0", f"{FLAT}1", "mm thick"),
 }
 
 

@@ -160,6 +160,6 @@ def _amounts(folder: Folder, page: Any) -> Iterator[Disagreement]:
             yield Disagreement("traveller", f"{len(layers)} {film} layers, not {stated.group(2)}")
     height = sum(layer.thickness for layer in folder.layers)
     facts = {words(term): words(term.getnext()) for term in page.iter("dt")}
-    flat = float(NUMBERS.findall(facts["Thickness, flat (nominal films)"])[0])
+    flat = float(NUMBERS.findall(facts["Thickness, sum of the films as bought"])[0])
     if abs(flat - height) > 0.0006:
         yield Disagreement("traveller", f"the laminate is {height:.3f} mm thick, not {flat:g}")
