@@ -1,7 +1,8 @@
 """facing-films: films of two balloons meet nowhere but where they are meant to bond.
 
-The press welds any two films that face each other with neither film nor mask between them: past a
-smaller balloon these need not be neighbours. Balloons bond in their neck rings, a sheet in its
+The press welds any two films that face each other with neither film nor mask between them, in a
+step that it closes on both, unless their faces do not bond in it: past a smaller balloon these need
+not be neighbours. Balloons bond in their neck rings, a sheet in its
 windows, and all films on ears. Elsewhere a mask must lie between, and reach past the films' edges
 as far as between neighbours.
 """
@@ -58,7 +59,8 @@ RULE = Rule(
     check,
     Explanation(
         "films of two balloons meet where they are meant to bond, and nowhere else",
-        "The press welds any two films with neither film nor mask between them, neighbours or not.",
+        "The press welds any two films with neither film nor mask between them, neighbours or not, "
+        "in a step that holds both, if their faces bond in it.",
         "Make balloons more alike, tabs shorter, or masks larger where the message says.",
         ("rules.mask_overhang", "mask.overhang", "chamber.diameter"),
     ),

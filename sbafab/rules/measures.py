@@ -10,6 +10,7 @@ from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Edge
 from sbafab.geometry.region import Region
 from sbafab.geometry.width import Width, least_width
+from sbafab.laminate.assembly import assembly
 from sbafab.laminate.folding import lies_on
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.boundary import Facing, Reach, edges_along, facing_films, outward_reach
@@ -54,8 +55,16 @@ class Measures:
 
     @cached_property
     def facing(self) -> tuple[Facing, ...]:
-        """Films that face each other past others."""
-        return facing_films(self.laminate)
+        """Films that face each other past others, and that a closing of the press would weld."""
+        laminate = self.laminate
+        pressed = [set(step.layers) for step in assembly(laminate)]
+        return tuple(
+            pair
+            for pair in facing_films(laminate)
+            for below, above in [(pair.gap.below, pair.gap.above)]
+            if laminate.presses(below, above)
+            and any({below.index, above.index} <= layers for layers in pressed)
+        )
 
     def bond(self, interface: Interface) -> Width | None:
         """Return the least width of an interface's bond; None without a bond or facing edges."""
