@@ -49,6 +49,10 @@ class OccupiedError(OutputError):
     """A folder that holds another design's files, which a run would replace."""
 
 
+class VoidError(OutputError):
+    """A simulation whose result cannot be; the exit code is that of a failed rule."""
+
+
 class DefectError(SbafabError):
     """Files that the program wrote and that differ from the design: a defect of the program."""
 

@@ -45,13 +45,13 @@ def inflated(design: tuple[str, ...], pressures: tuple[float, ...], ring: int) -
 def stroke(balloons: int, kpa: float, ring: int) -> str:
     """The stroke of a 1-DoF stack in mm, as its table shows it."""
     design = (ONE[0], f"stack.balloons={balloons}")
-    return f"{inflated(design, (kpa,), ring).stroke:.{3 if balloons == 1 else 2}f}"
+    return f"{inflated(design, (kpa,), ring).last.stroke:.{3 if balloons == 1 else 2}f}"
 
 
 def pose(pressures: tuple[float, ...], ring: int) -> str:
     """Height of the tip's mid-surface in mm, and where chambers are unlike the tilt in degrees."""
     last = inflated(ARM, pressures, ring).last
-    high = f"{last.place[2]:.2f}"
+    high = f"{last.stroke:.2f}"
     return high if len(set(pressures)) == 1 else f"{high}, {last.tilt:.0f}"
 
 
@@ -63,7 +63,7 @@ def one_balloon() -> Table:
     for kpa in (0.95, 6.0):
         own = [stroke(1, kpa, ring) for ring in RINGS]
         rows.append([f"{kpa:g}", *own, *(beside.cell(f"{kpa:g}", head) for head in heads)])
-    airs = [f"{inflated(ONE, (6.0,), ring).volumes[0][1]:.1f}" for ring in RINGS]
+    airs = [f"{inflated(ONE, (6.0,), ring).last.volumes['chamber1']:.1f}" for ring in RINGS]
     rows.append(["6: air in ul", *airs, "", "15.6"])
     columns = ["kPa", "8", "16 (default)", "24", "32", "CalculiX axisymmetric", "CalculiX whole"]
     return Table(columns, rows)

@@ -77,12 +77,12 @@ def ran(
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = simulate(laminate, Path(place), told, SofaJob(scene, seconds, **job))  # type: ignore[arg-type]
         used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-    print(scene, list(pressures), done.last.place, done.last.tilt, round(done.steps / used))
+    print(scene, list(pressures), done.last.tip, done.last.tilt, round(done.steps / used))
     return done, done.steps / used
 
 
 def told(done: SofaRun) -> str:
-    return f"{done.last.place[2]:.2f}, {done.last.tilt:.1f}"
+    return f"{done.last.tip[2]:.2f}, {done.last.tilt:.1f}"
 
 
 def scenes() -> Iterator[list[str]]:
@@ -122,7 +122,7 @@ def finer() -> Iterator[list[str]]:
         with _changed(lambda made, n=sectors: replace(made, sectors=n)):
             done, rate = ran([5.0] * 3)
         nodes = len(shell.round_actuator(sbafab.build(NAME), None, sectors).mesh.rest)
-        yield row(sectors, nodes, f"{done.last.place[2]:.2f}", f"{rate:.0f}")
+        yield row(sectors, nodes, f"{done.last.tip[2]:.2f}", f"{rate:.0f}")
 
 
 def three() -> Iterator[list[str]]:
@@ -130,7 +130,7 @@ def three() -> Iterator[list[str]]:
     yield row("kPa", "A shell, mm", "CalculiX, quarter, mm", "", "steps/s")
     for kpa in PRESSURES:
         done, rate = ran([kpa], design=("1dof-5mm", "stack.balloons=3"))
-        high = done.last.place[2]
+        high = done.last.tip[2]
         off = f"{100 * (high / CALCULIX[kpa] - 1):+.0f} %"
         yield row(f"{kpa:g}", f"{high:.2f}", f"{CALCULIX[kpa]:.2f}", off, f"{rate:.0f}")
 

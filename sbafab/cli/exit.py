@@ -24,6 +24,7 @@ from sbafab.errors import (
     SbafabError,
     Stopped,
     TooLargeError,
+    VoidError,
 )
 
 if TYPE_CHECKING:
@@ -92,8 +93,9 @@ def exit_plainly(as_json: bool = False) -> Iterator[None]:
         end(Exit("usage", sentence, BAD_INPUT), as_json)
     except DefectError as error:
         end(Exit("defect", str(error), RULE_FAILED), as_json)
-    except TooLargeError as error:
-        end(Exit("too-large", str(error), RULE_FAILED), as_json)
+    except (TooLargeError, VoidError) as error:
+        kind = "void" if isinstance(error, VoidError) else "too-large"
+        end(Exit(kind, str(error), RULE_FAILED), as_json)
     except SbafabError as error:
         end(Exit("input", str(error), BAD_INPUT), as_json)
     except KeyboardInterrupt as stop:

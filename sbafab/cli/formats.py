@@ -45,6 +45,7 @@ from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.rule import Explanation
 from sbafab.search.find import Binding, RangeEnd, Spare
 from sbafab.search.quantities import QuantityName
+from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 TEXT = {"type": "string"}
@@ -346,25 +347,36 @@ def _templates() -> dict[str, Any]:
 
 
 def _simulate() -> dict[str, Any]:
-    numbers = {"type": "object", "additionalProperties": number("null")}
-    place = {**array(number()), "minItems": 3, "maxItems": 3}
-    tip = table(time=number(), place=place, tilt=number())
-    state = {"type": "object", "description": "pressures, stroke, tip, tilt, volumes, stress, work"}
+    numbers = {"type": "object", "additionalProperties": number()}
+    place = {**array(number()), "type": ["array", "null"], "minItems": 3, "maxItems": 3}
+    moment = {
+        "time": number(),
+        "pressures": {**numbers, "description": "over the air outside, by chamber"},
+        "height": {**number("null"), "description": "of the tip over the underside of the base"},
+        "tip": {**place, "description": "by how much its middle moved since flat: x, y, z"},
+        "tilt": number("null"),
+        "volumes": {**numbers, "description": "of air, by chamber"},
+    }
+    loads = {
+        "stress": {**number(), "description": "calculix: von Mises, the largest"},
+        "work": {**number(), "description": "calculix: of the air"},
+    }
     body = table(
         schema={"const": ids.SIMULATE_SCHEMA},
         units={"type": "object", "additionalProperties": TEXT},
-        stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
     )
     return and_perhaps(
         body,
         folder=TEXT,
-        states={**array(state), "description": "calculix"},
-        scene={**TEXT, "description": "sofa"},
-        tips={**array(tip), "description": "sofa, mujoco"},
-        rate={**number("null"), "description": "sofa, mujoco"},
-        stroke={**number(), "description": "mujoco"},
-        volumes={**numbers, "description": "mujoco"},
-        drift={**number(), "description": "mujoco: mm in the last 0.5 s"},
+        simulator={"enum": [*SIMULATORS]},
+        **moment,
+        **loads,
+        drift={**number(), "description": "sofa, mujoco: mm of the tip in the last 0.5 s"},
+        overlap={**number(), "description": "sofa, mujoco: where films passed through each other"},
+        diameter={**number(), "description": "sofa, round a tube: mm over the crowns"},
+        rate={**number(), "description": "sofa, mujoco"},
+        states={**array(and_perhaps(table(**moment), **loads)), "description": "in order of time"},
+        stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
     )
 
 

@@ -97,8 +97,9 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
 
     OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as table and
     plot, and the deformed shape as VTU and picture; OUT/<name>/sofa/ or mujoco/ the input files of
-    the run. result.json holds the results over time. If a run stops early, its results are kept
-    and the exit code is 1.
+    the run. result.json holds height, tip, tilt and volumes over time. If a run stops early, its
+    results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
+    the reason is printed, nothing is written, and the exit code is 1.
     """
     wish = SimulationRequest(**settings)
     design = load_design(request.designs[0], request.assignments, request.waivers)
@@ -115,21 +116,26 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     if request.as_json:
         print_json({**result_json(result), "folder": str(simulation.folder)})
     else:
-        _print(design.name, result, simulation.folder, export)
+        _print(design.name, result, simulation.folder)
+    if simulation.beside:
+        print_error(f"{simulation.beside}; the results were put into {simulation.folder}")
     highest = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
     if highest > BURST.value:
         print_error(
             f"warning: the paper's actuators burst at {BURST.value:g} kPa; films cannot tear or "
             f"yield in the simulation, so its results at {highest:g} kPa are not physical"
         )
-    if result.stopped is not None:
+    if result is not None and result.stopped is not None:
         print_error(result.stopped)
         click.get_current_context().exit(RULE_FAILED)
 
 
-def _print(name: str, result: Result, folder: Path, is_export: bool) -> None:
-    width = max((len(label) for label, _, _ in result.rows), default=0)
+def _print(name: str, result: Result | None, folder: Path) -> None:
+    if result is None:
+        print_verdict(f"{name} exported. Written to {folder}", folder)
+        return
+    width = max(len(label) for label, _, _ in result.rows)
     for label, value, unit in result.rows:
-        click.echo(f"{label:{width}} {value:10.3f} {unit}")
+        click.echo(f"{label:{width}} {value:10.3f} {unit}".rstrip())
     outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
-    print_verdict(f"{name} {'exported' if is_export else outcome}. Written to {folder}", folder)
+    print_verdict(f"{name} {outcome}. Written to {folder}", folder)

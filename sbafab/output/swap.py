@@ -64,6 +64,19 @@ def replaced_folder(target: Path) -> Iterator[Path]:
         raise _unwritten(target, error.strerror or str(error)) from None
 
 
+def refuse_busy(target: Path) -> None:
+    """Raises OutputError where ``replaced_folder`` could not write now; creates nothing."""
+    refuse_file_as_folder(target.parent)
+    _refuse_foreign(target)
+    if _lock_file(target).exists():
+        with _locked(target):
+            pass
+
+
+def _lock_file(target: Path) -> Path:
+    return target.parent / f".{target.name}.lock"
+
+
 @contextlib.contextmanager
 def _locked(target: Path) -> Iterator[None]:
     """Holds the lock of a folder that may be written. Raises OutputError or OSError."""
@@ -71,7 +84,7 @@ def _locked(target: Path) -> Iterator[None]:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         _refuse_foreign(target)
-        lock = FileLock(target.parent / f".{target.name}.lock", timeout=0)
+        lock = FileLock(_lock_file(target), timeout=0)
         lock.acquire()
     except Timeout:
         raise OutputError(

@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +40,7 @@ from sbafab.output.folder import close_folder, write_folder
 from sbafab.output.job import CheckedJob, Plan, check_job, plan_job
 from sbafab.output.manifest import as_json, identity
 from sbafab.output.schema_ids import SIMULATE_SCHEMA
-from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, replaced_folder
+from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, refuse_busy, replaced_folder
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
@@ -296,11 +297,16 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Simulated:
-    """The outcome of a simulation; no result and no folder where a rule ``failed`` before."""
+    """The outcome of a simulation; no result and no folder where a rule ``failed`` before.
+
+    An export has no result. ``beside`` is one sentence if ``folder`` is not in the design's own,
+    which could not be written at the end.
+    """
 
     findings: Sequence[Finding]
     folder: Path | None
-    result: Result
+    result: Result | None = None
+    beside: str = ""
 
     @property
     def failed(self) -> bool:
@@ -308,10 +314,10 @@ class Simulated:
         return self.folder is None
 
 
-def result_json(result: Result) -> dict[str, Any]:
-    """Return the contents of ``result.json``."""
+def result_json(result: Result | None) -> dict[str, Any]:
+    """Return the contents of ``result.json``, the head of it where nothing has run."""
     head = {"schema": SIMULATE_SCHEMA, "units": UNITS}
-    return {**head, **result.figures, "stopped": result.stopped}
+    return {**head, **({} if result is None else result.as_dict())}
 
 
 def simulate(
@@ -324,17 +330,19 @@ def simulate(
 ) -> Simulated:
     """Run the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
 
-    Raises DesignError or OutputError for what it cannot do, if possible before it starts.
+    Raises DesignError or OutputError for what it cannot do, if possible before it starts, and
+    VoidError where its result cannot be; nothing is written then.
     """
     progress = progress or ignore_progress
     refuse_unused(name, wish)
-    result = Result((), {})
+    result = None
     with tempfile.TemporaryDirectory() as temporary:
         checked = check(design, progress)
         if checked.failed:
-            return Simulated(checked.findings, None, result)
+            return Simulated(checked.findings, None)
         # Said before a run of hours, not after it.
         refuse_to_replace(out / design.name, design, checked.waived, (name,))
+        refuse_busy(out / design.name)
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(temporary) / name
         if export:
@@ -346,8 +354,29 @@ def simulate(
                 raise _with_log(error, folder, out / f"{design.name}-{name}-failed.log") from None
             text = as_json(result_json(result))
             (folder / "result.json").write_text(text, encoding="utf-8", newline="\n")
-        run = generate(RunRequest(design, out, (name,), simulated=folder), progress)
+        try:
+            run = generate(RunRequest(design, out, (name,), simulated=folder), progress)
+        except OutputError as error:
+            if result is None:
+                raise
+            return Simulated(
+                checked.findings, _kept(folder, out / f"{design.name}-{name}"), result, str(error)
+            )
     return Simulated(checked.findings, run.folder / name, result)
+
+
+def _kept(folder: Path, place: Path) -> Path:
+    """Return where the results of a run were put, as their own place could not be written."""
+    for number in count(1):
+        free = place if number == 1 else place.with_name(f"{place.name}-{number}")
+        try:
+            shutil.copytree(folder, free)
+        except FileExistsError:
+            continue
+        except OSError:
+            return Path(shutil.move(folder, tempfile.mkdtemp(prefix=f"{place.name}-")))
+        return free
+    raise AssertionError
 
 
 def _with_log(error: OutputError, folder: Path, copy: Path) -> OutputError:
@@ -359,6 +388,6 @@ def _with_log(error: OutputError, folder: Path, copy: Path) -> OutputError:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(log, copy)
             except OSError:
-                return OutputError(message.replace(f" (see {log})", ""))
-            return OutputError(message.replace(str(log), str(copy)))
+                return type(error)(message.replace(f" (see {log})", ""))
+            return type(error)(message.replace(str(log), str(copy)))
     return error

@@ -8,17 +8,22 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from numbers import Real
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, cast
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.process import Progress
+from sbafab.simulators.coarse.rounds import pocket_radii, why_not_round
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
@@ -81,15 +86,111 @@ class SimulationRequest:
 
 
 @dataclass(frozen=True)
+class State:
+    """An actuator at one moment in s of a run, in every simulator's terms.
+
+    ``pressures`` are kPa over the air outside by chamber (a vacuum is negative), none where
+    volumes are imposed; ``volumes`` ul of air by chamber, none where they were not recorded.
+    ``tip`` is by how many mm (x, y, z) the middle of the tip has moved since the films lay flat,
+    ``height`` where it then is over the underside of the base, with films as thick as bought;
+    ``tilt`` degrees. These three are None round a tube, the tilt also where the tip has one axis.
+    """
+
+    time: float
+    pressures: Mapping[str, float]
+    height: float | None
+    tip: Vector | None
+    tilt: float | None
+    volumes: Mapping[str, float]
+
+    @property
+    def stroke(self) -> float:
+        """Growth in height in mm."""
+        return 0.0 if self.tip is None else self.tip[2]
+
+
+FIGURES = {
+    "drift": ("drift in the last 0.5 s", "mm"),
+    "overlap": ("films through each other", "ul"),
+    "diameter": ("diameter over the crowns", "mm"),
+    "stress": ("von Mises stress, at most", "MPa"),
+    "work": ("work of the air", "uJ"),
+    "rate": ("rate", "steps/s"),
+}
+"""Label and unit of what only some simulators find."""
+DRIFT_SECONDS = 0.5
+SAME_TIME = 1e-6
+"""s"""
+
+
+@dataclass(frozen=True)
 class Result:
-    """Result of a run: ``rows`` to print of label, value and unit; ``figures`` holds all of it.
+    """Result of a run: its ``states`` in order of time, and ``figures`` by name of ``FIGURES``.
 
     ``stopped`` is one sentence if it ended early; the results until then are valid.
     """
 
-    rows: tuple[tuple[str, float, str], ...]
-    figures: Mapping[str, Any]
+    simulator: Name
+    states: tuple[State, ...]
+    figures: Mapping[str, float] = field(default_factory=dict)
     stopped: str | None = None
+
+    @property
+    def last(self) -> State:
+        """The state at the end, which the following are of."""
+        return self.states[-1]
+
+    @property
+    def pressures(self) -> Mapping[str, float]:
+        """Pressures in kPa over the air outside, by chamber."""
+        return self.last.pressures
+
+    @property
+    def height(self) -> float | None:
+        """Height in mm of the middle of the tip over the underside of the base."""
+        return self.last.height
+
+    @property
+    def tip(self) -> Vector | None:
+        """By how many mm the middle of the tip has moved since the films lay flat."""
+        return self.last.tip
+
+    @property
+    def tilt(self) -> float | None:
+        """Degrees by which the tip leans."""
+        return self.last.tilt
+
+    @property
+    def volumes(self) -> Mapping[str, float]:
+        """Volumes of air in ul, by chamber."""
+        return self.last.volumes
+
+    @property
+    def rows(self) -> list[tuple[str, float, str]]:
+        """Label, value and unit of what is printed."""
+        last = self.last
+        rows = [(name, value, "kPa") for name, value in last.pressures.items()]
+        if last.tip is not None and last.height is not None:
+            rows += [
+                (f"tip {axis}", value, "mm") for axis, value in zip("xyz", last.tip, strict=True)
+            ]
+            rows += [("height", last.height, "mm")]
+        rows += [] if last.tilt is None else [("tilt", last.tilt, "degrees")]
+        rows += [(f"air {name}", value, "ul") for name, value in last.volumes.items()]
+        return rows + [
+            (*FIGURES[name][:1], v, FIGURES[name][1]) for name, v in self.figures.items()
+        ]
+
+    def as_dict(self) -> dict[str, object]:
+        """For a JSON file: the last state, the figures, all states."""
+        states = [asdict(state) for state in self.states]
+        return {
+            "simulator": self.simulator,
+            **asdict(self.last),
+            **self.figures,
+            "states": states,
+            "stopped": self.stopped,
+        }
 
 
 class Simulator(Protocol):
@@ -174,6 +275,128 @@ def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantit
             f"{quantity} names chamber {unknown}, which is not there; "
             f"the chambers are {', '.join(names)}"
         )
+
+
+# What cannot be: a result that holds it is void.
+
+
+STRETCH = 1.3
+"""Times its flat length that a film may be along its meridian; more has burst it long before."""
+MOST_LEAN = 1.0
+"""Degrees of tilt where all chambers are alike; shells that hold stand within 0.1."""
+LEAST_RISE = 0.01
+"""mm that a tip rises where all chambers are alike: no start is as low and stays there."""
+NOWHERE = 1e-6
+"""mm from 0 in x, y and z: no start has its tip there, and solvers that fail put nodes there."""
+NO_AIR = 0.01
+"""Part of the films' own volume, over its pockets, by which a chamber's air may be below 0."""
+MOST_OVERLAP = 0.2
+"""Part of all air in which films may have passed through each other where there is no contact. At
+a tenth, which one chamber at 5 kPa takes in SOFA's scenes, it bends some 10 degrees too far."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of what a laminate can do.
+
+    ``highest`` is how far its tip may rise, in mm, None round a tube; whether its tip must stand,
+    as alike chambers lift it; the least air of a chamber in ul.
+    """
+
+    highest: float | None
+    must_stand: bool
+    least_air: float
+
+
+def limits(laminate: Laminate, requested: Collection[float]) -> Limits:
+    """Return the limits of a laminate with these pressures or volumes in its chambers.
+
+    A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
+    the mesh has no inlets. A laminate on a tube has no common tip.
+    """
+    radii = pocket_radii(laminate)
+    thick = min((layer.film.thickness for layer in laminate.tpe_layers), default=0.0)
+    chambers = max(len(laminate.chambers), 1)
+    least_air = -NO_AIR * thick * math.pi * sum(radius**2 for radius in radii) / chambers
+    highest = None if laminate.tube is not None else 2 * STRETCH * sum(radii) / chambers
+    must_stand = highest is not None and len(set(requested)) == 1 and min(requested) >= 0
+    return Limits(highest, must_stand and why_not_round(laminate) is None, least_air)
+
+
+def impossible(state: State, can_be: Limits, passed: float = 0.0) -> str | None:
+    """Return what is impossible in a state, or None; ``passed`` is the ``overlap`` in ul."""
+    return next(_wrong(state, can_be, passed), None)
+
+
+def _wrong(state: State, can_be: Limits, passed: float) -> Iterator[str]:
+    tip, tilt = state.tip, state.tilt
+    if not all(map(math.isfinite, (*state.volumes.values(), *(tip or ()), tilt or 0.0))):
+        yield "a place or a volume is no finite number"
+    for name, air in state.volumes.items():
+        if air < can_be.least_air:
+            yield (
+                f"{name} holds {air:.3g} ul of air, less than none: its films have passed through "
+                "each other"
+            )
+    air = sum(state.volumes.values())
+    if passed > MOST_OVERLAP * air:
+        yield f"films have passed through each other in {passed:.3g} ul, with {air:.3g} ul of air"
+    if tip is None or can_be.highest is None:
+        return
+    if max(map(abs, tip)) < NOWHERE and any(state.pressures.values()):
+        yield "the tip lies at 0, 0, 0"
+    if tip[2] > can_be.highest:
+        yield (
+            f"the tip is {tip[2]:.3f} mm high, and the films reach {can_be.highest:.3g} mm at most"
+        )
+    alike = "all chambers are told the same, and the tip"
+    if can_be.must_stand and tip[2] < LEAST_RISE:
+        yield f"{alike} has not risen (z {tip[2]:.3f} mm)"
+    if can_be.must_stand and tilt is not None and tilt > MOST_LEAN:
+        yield f"{alike} leans by {tilt:.1f} degrees (more than {MOST_LEAN:g})"
+
+
+def overlap(
+    points: NDArray[np.float64],
+    flat: NDArray[np.float64],
+    start: NDArray[np.float64],
+    triangles: NDArray[np.int64],
+) -> float:
+    """Return the volume in ul in which films have passed through the films that lay on them.
+
+    ``points``, ``flat`` and ``start`` are the places (n, 3) of nodes at the end, when all films lie
+    on each other, and in the order of the films; ``triangles`` (k, 3) are all films. Nodes that lie
+    on each other when flat are looked at one on the next, along the normal of their films, each
+    for its share of the flat film.
+    """
+    import numpy as np
+
+    a, b, c = flat[triangles].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)[:, 2]
+    turned = np.where((across < 0)[:, None], triangles[:, ::-1], triangles)
+    flat_areas = np.abs(across) / 2
+    a, b, c = points[turned].transpose(1, 0, 2)
+    normals, areas = np.zeros_like(points), np.zeros(len(points))
+    for corner in turned.T:
+        np.add.at(normals, corner, np.cross(b - a, c - a))
+        np.add.at(areas, corner, flat_areas / 3)
+    x, y = np.round(flat[:, :2], 6).T
+    order = np.lexsort((start[:, 2], y, x))
+    lower, upper = order[:-1], order[1:]
+    facing = (x[lower] == x[upper]) & (y[lower] == y[upper])
+    lower, upper = lower[facing], upper[facing]
+    up = normals[lower] + normals[upper]
+    up /= np.maximum(np.linalg.norm(up, axis=1), np.finfo(float).tiny)[:, None]
+    apart = np.einsum("ij,ij->i", points[upper] - points[lower], up)
+    return float(-(np.minimum(apart, 0.0) * areas[upper]).sum())
+
+
+def drift(states: Sequence[State]) -> float:
+    """Return by how many mm the tip moved in the last half second; little if it is at rest."""
+    last = states[-1]
+    since = last.time - DRIFT_SECONDS + SAME_TIME
+    before = next((state for state in reversed(states) if state.time <= since), states[0])
+    return math.dist(before.tip or (), last.tip or ())
 
 
 # A program started, watched, and stopped after its time or on an interrupt.
@@ -265,24 +488,11 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             continue
 
 
-# Place and lean of the tip, from the nodes that mark it.
-
-
-@dataclass(frozen=True)
-class Tip:
-    """The tip at a time in s: its place in mm, and how far it leans off the axis in degrees."""
-
-    time: float
-    place: Vector
-    tilt: float
-
-
-def tip_at(time: float, points: Sequence[Vector]) -> Tip:
-    """The mean of points that go round it, and the lean of their polygon's normal."""
-    x, y, z = (sum(values) / len(points) for values in zip(*points, strict=True))
+def tilt_of(points: Sequence[Vector]) -> float:
+    """Degrees by which the normal of a polygon of points leans off the axis."""
     nx = ny = nz = 0.0
     for (ax, ay, az), (bx, by, bz) in zip(points, [*points[1:], points[0]], strict=True):
         nx += ay * bz - az * by
         ny += az * bx - ax * bz
         nz += ax * by - ay * bx
-    return Tip(time, (x, y, z), math.degrees(math.atan2(math.hypot(nx, ny), nz)))
+    return math.degrees(math.atan2(math.hypot(nx, ny), nz))

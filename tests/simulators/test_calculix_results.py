@@ -21,7 +21,7 @@ from sbafab.simulators.calculix import results
 from sbafab.simulators.calculix.deck import DeckSettings
 from sbafab.simulators.calculix.results import (
     Frame,
-    State,
+    LoadedState,
     deformed_png,
     history,
     history_csv,
@@ -132,7 +132,7 @@ def stretched(mesh: Mesh, by: float) -> Frame:
     return Frame(SETTINGS.ramp, (by - 1) * mesh.points, np.zeros((len(mesh.points), 6)))
 
 
-def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list[State]]:
+def states_of(symmetry: Symmetry, by: float = 2.0) -> tuple[Laminate, Mesh, list[LoadedState]]:
     laminate, mesh = lone(symmetry)
     return (
         laminate,

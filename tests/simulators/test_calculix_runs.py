@@ -15,7 +15,8 @@ from click.testing import CliRunner
 from docs.scripts.axisymmetric import MeridianSection, axisymmetric_strokes
 from sbafab.actuators import build, load_design
 from sbafab.cli import app
-from sbafab.errors import OutputError
+from sbafab.cli.progress import plain_lines
+from sbafab.errors import OutputError, VoidError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.simulators.calculix import results
 from sbafab.simulators.calculix.deck import DeckSettings
@@ -100,7 +101,8 @@ def test_simulate_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     told = json.loads(result.stdout)
     hold("simulate", told)
     assert told["stopped"] is None
-    assert told["states"][-1]["pressures"] == {"chamber1": 0.5}
+    assert told["states"][-1]["pressures"] == told["pressures"] == {"chamber1": 0.5}
+    assert told["height"] == pytest.approx(told["tip"][2] + 0.076, abs=1e-3)
     folder = tmp_path / "1dof-5mm"
     made = {path.name for path in (folder / "calculix").iterdir()}
     assert made == {
@@ -134,10 +136,11 @@ def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None
 GIVES_UP = """
 import re
 nodes = re.search(r"NSET=all_nodes.(.*?).[*]ELEMENT", open("mesh.inp").read(), re.S)[1]
-count = len(nodes.splitlines())
+heights = [float(line.split(",")[3]) for line in nodes.split("\\n") if line.count(",") == 3]
+count = len(heights)
 def block(time, name, size):
-    value = f"{time:12.5E}" * size
-    rows = "".join(f" -1{node:10d}{value}\\n" for node in range(1, count + 1))
+    values = [f"{time * height:12.5E}" * size for height in heights]
+    rows = "".join(f" -1{node:10d}{value}\\n" for node, value in enumerate(values, 1))
     parts = "".join(f" -5  {n}\\n" for n in range(size))
     head = f"  100CL  101{time:12.5E}{count:12d}   0    1   1\\n -4  {name}  {size}\\n"
     return head + parts + rows + " -3\\n"
@@ -161,13 +164,42 @@ def test_a_run_that_gives_up_keeps_what_it_has(
     found = inflated(tmp_path / "run", settings, 0.75)
     # A quarter of the pressure is on at half of the time; what came after 0.55 s did not converge.
     assert [state.pressures["chamber1"] for state in found.states] == pytest.approx([0, 0.5, 2])
-    assert found.states[-1].stroke == 0
+    # Every node has moved by half its height: so have two films of 0.038 mm.
+    assert found.states[-1].stroke == pytest.approx(0.038, rel=0.01)
     assert found.stopped == (
         "ccx stopped at 0.55 s, 2.5 of 8 kPa: its iterations no longer converge, however small "
         "the step; results up to 2 kPa are kept; take --procedure dynamic, which gets past wrinkles"
     )
     assert len((tmp_path / "run" / "history.csv").read_text().splitlines()) == 1 + 3
     assert b"november" not in (tmp_path / "run" / "actuator.frd").read_bytes()
+
+
+def test_results_end_where_a_chamber_would_hold_less_than_no_air(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All heights shrink to a quarter, then turn over: so does what the pocket holds."""
+    stand_in(tmp_path, monkeypatch, GIVES_UP.replace("time * height", "-3 * time * height"))
+    laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    mesh = MeshSettings(0.75, symmetry="quarter", gaps=True)
+    settings = DeckSettings({"chamber1": 8.0}, outputs=4)
+    found = simulate(laminate, mesh, settings, tmp_path / "run", 300, lambda *_: None)
+    start, last = found.states
+    assert last.volumes["chamber1"] == pytest.approx(start.volumes["chamber1"] / 4, rel=0.01)
+    assert found.stopped is not None
+    assert "beyond 0.5 kPa the result cannot be: chamber1 holds -" in found.stopped
+    assert len((tmp_path / "run" / "history.csv").read_text().splitlines()) == 1 + 2
+
+
+def test_a_first_result_that_cannot_be_voids_a_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stand_in(tmp_path, monkeypatch, GIVES_UP.replace("time * height", "-8 * time * height"))
+    laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    mesh = MeshSettings(0.75, symmetry="quarter", gaps=True)
+    settings = DeckSettings({"chamber1": 8.0}, outputs=4)
+    with pytest.raises(VoidError, match=r"at 0\.5 kPa, cannot be: chamber1 holds -"):
+        simulate(laminate, mesh, settings, tmp_path / "run", 300, lambda *_: None)
+    assert not (tmp_path / "run" / "history.csv").exists()
 
 
 def test_a_run_that_reaches_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,10 +221,32 @@ def test_a_run_that_takes_too_long_is_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nimport time\ntime.sleep(600)")
-    told: list[int] = []
-    ending = run_ccx(tmp_path, "job", 1.0, 1.5, lambda what, done, total: told.append(done))
+    told: list[float] = []
+    ending = run_ccx(tmp_path, "job", 1.0, 1.5, told.append)
     assert ending == (0.5, "it was stopped after 0.025 minutes")
-    assert told[-1] == 50
+    assert told[-1] == 0.5
+
+
+def test_progress_is_the_pressure_and_no_time_that_is_not_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 0.2 of 1 s a 25th of the pressure is on: neither is a share of the work done."""
+    script = (
+        "import time\n"
+        'open("actuator.sta", "w").write("head\\nhead\\n 1 1 1 8 0.2 0.2 0.2\\n")\n'
+        "time.sleep(600)"
+    )
+    stand_in(tmp_path, monkeypatch, script)
+    lines: list[str] = []
+    clock = iter(range(10**6))
+    progress = plain_lines(True, lines.append, lambda: 30.0 * next(clock))
+    laminate = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    settings = DeckSettings({"chamber1": 6.0}, outputs=5)
+    with pytest.raises(OutputError, match="it was stopped after"):
+        simulate(laminate, MeshSettings(0.75), settings, tmp_path / "run", 1.5, progress)
+    told = [line for line in lines if "ccx" in line]
+    assert "ccx, 0.24 of 6 kPa" in told[-1]
+    assert not any("left" in line or "per minute" in line for line in told)
 
 
 def test_an_interrupted_run_keeps_what_it_has(
@@ -200,8 +254,8 @@ def test_an_interrupted_run_keeps_what_it_has(
 ) -> None:
     stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nimport time\ntime.sleep(600)")
 
-    def interrupt(what: str, done: int, total: int) -> None:
-        if done:
+    def interrupt(reached: float) -> None:
+        if reached:
             raise KeyboardInterrupt
 
     assert run_ccx(tmp_path, "job", 1.0, 60, interrupt) == (0.5, "it was interrupted")

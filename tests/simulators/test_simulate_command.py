@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from filelock import FileLock
 
 from sbafab.cli import app
 from sbafab.errors import DesignError
@@ -180,7 +181,10 @@ def test_a_run_leaves_what_it_found(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
     found = json.loads((tmp_path / "1dof-5mm" / "mujoco" / "result.json").read_text())
-    assert found["stroke"] == told["stroke"] > 0.5
+    assert found["tip"] == told["tip"]
+    assert found["tip"][2] > 0.5
+    # Two films of 0.038 mm.
+    assert found["height"] == pytest.approx(found["tip"][2] + 0.076)
     hold("simulate", found)
     assert told == {**found, "folder": str(tmp_path / "1dof-5mm" / "mujoco")}
     assert found["stopped"] is None
@@ -200,6 +204,59 @@ def test_the_log_of_a_void_run_is_where_the_message_says(
     given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa", "-o", str(out)]
     found = CliRunner().invoke(app, given)
     named = re.search(r"\(see (.*\.log)\)", found.output.replace("\n", " "))
-    assert found.exit_code != 0
+    assert found.exit_code == 1
+    assert not (out / "1dof-5mm").exists()
     assert named is not None, found.output
     assert "[ERROR] what went wrong" in Path(named[1]).read_text(encoding="utf-8")
+
+
+RISEN = """#!/bin/sh
+cat > tip.state <<'END'
+T= 0
+  X= 1 0 1 0 1 1 -1 -1 1
+T= 0.1
+  X= 1 0 1 0 1 1 -1 -1 1
+END
+"""
+
+
+@pytest.fixture
+def risen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """A command that runs a program in runSofa's place, whose tip rises by 1 mm."""
+    program = tmp_path / "bin" / "runSofa"
+    program.parent.mkdir()
+    program.write_text(RISEN)
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
+    given = ["simulate", "1dof-5mm", "--set", "stack.balloons=1", "--with", "sofa"]
+    return [*given, "--seconds", "0.1", "-o", str(tmp_path / "out")]
+
+
+def test_a_folder_that_another_run_holds_is_asked_for_before_the_run(
+    tmp_path: Path, risen: list[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "bin" / "runSofa").write_text("#!/bin/sh\ntouch ran\n")
+    with FileLock(tmp_path / "out" / ".1dof-5mm.lock"):
+        found = CliRunner().invoke(app, risen)
+    assert found.exit_code == 2
+    assert "another run is writing" in found.stderr
+    assert not list(tmp_path.rglob("ran"))
+
+
+def test_a_result_is_kept_where_its_folder_is_taken_meanwhile(
+    tmp_path: Path, risen: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another run has begun while the simulator ran: what was asked before is no longer so."""
+    monkeypatch.setattr("sbafab.runs.run.refuse_busy", lambda target: None)
+    out = tmp_path / "out"
+    out.mkdir()
+    with FileLock(out / ".1dof-5mm.lock"):
+        for name in ("1dof-5mm-sofa", "1dof-5mm-sofa-2"):
+            found = CliRunner().invoke(app, [*risen, "--json"])
+            assert found.exit_code == 0, found.output
+            assert "another run is writing" in found.stderr
+            assert json.loads(found.stdout)["folder"] == str(out / name)
+            kept = json.loads((out / name / "result.json").read_text())
+            assert kept["tip"] == [0, 0, 1]
+            assert (out / name / "actuator.scn").is_file()

@@ -6,25 +6,28 @@ import math
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import sbafab
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.simulators.simulator import Tip
+from sbafab.simulators.simulator import State, drift, impossible, limits, overlap, tilt_of
 from sbafab.simulators.sofa.run import (
+    RecordedFilms,
     SofaJob,
     SofaRun,
-    impossible,
-    limits,
     read_log,
-    read_tips,
+    read_points,
     run_scene,
     simulate,
 )
+from sbafab.simulators.sofa.scenes import write_scenes
+from sbafab.simulators.sofa.shell import nearly_flat, round_actuator, round_shell
 
 HALF_TURN = "T= 0.3\n  X= 0 0 5 0 1 5 0 0 6\n"
 """Three points whose plane has the normal (1, 0, 0)."""
@@ -70,16 +73,18 @@ def test_a_good_run_is_read_back(tmp_path: Path, fake: Fake) -> None:
     done = simulate(
         laminate(), tmp_path / "sofa", job=BRIEF, progress=lambda *news: told.append(news)
     )
-    assert [tip.time for tip in done.tips] == [0, 0.1, 0.2]
-    assert done.tips[1].place == pytest.approx((0, 0, 4.5))
-    assert done.tips[1].tilt == pytest.approx(0)
-    assert done.last.place == pytest.approx((0, 0, 5))
-    assert done.before(0.1).time == pytest.approx(0.1)
-    assert done.before(1.0).time == 0
+    assert [state.time for state in done.states] == [0, 0.1, 0.2]
+    assert done.states[1].tip == pytest.approx((0, 0, 4.5))
+    assert done.states[1].tilt == pytest.approx(0)
+    assert done.last.tip == pytest.approx((0, 0, 5))
+    # Two films of 0.038 mm; a fifth of the second is over in which the pressure rises.
+    assert done.last.height == pytest.approx(5.076)
+    assert done.last.pressures == pytest.approx({"chamber1": 1.0})
+    assert drift(done.states) == pytest.approx(1.0)
     assert (done.steps, done.seconds, done.rate) == (11, 0.1875, 58.6667)
     assert told[-1] == ("runSofa", 11, 11)
     arguments = (tmp_path / "sofa" / "arguments").read_text(encoding="utf-8").split()
-    assert arguments == ["-g", "batch", "-n", "11", "actuator.scn"]
+    assert arguments == ["-g", "batch", "-n", "11", "recorded.scn"]
 
 
 @pytest.mark.parametrize(
@@ -132,13 +137,58 @@ def test_what_cannot_be_voids_a_run_whose_log_is_clean(
 def test_unlike_chambers_may_lean_and_a_tip_may_hang_below_its_base() -> None:
     laminate = sbafab.build("3dof-15mm", "stack.balloons=2")
     limit = limits(laminate, (5.0, 0.0, 0.0))
-    assert limit is not None
+    assert limit.highest is not None
     # Two balloons of two films, each 2.5 mm from axis to edge, stretched by 30 %; with the
     # inlet's strip the lower pocket is a little wider.
     assert 2 * 2 * 2.5 * 1.3 <= limit.highest < 1.2 * 2 * 2 * 2.5 * 1.3
-    assert impossible([Tip(1.0, (-5.0, 0.0, -1.0), 100.0)], limit) is None
-    assert impossible([Tip(1.0, (0.0, 0.0, 16.0), 0.0)], limit) is not None
-    assert limits(sbafab.build("radial-15mm"), (5.0,)) is None
+    hanging = State(1.0, {"chamber1": 5.0}, 0.1, (-5.0, 0.0, -1.0), 100.0, {"chamber2": 0.0})
+    assert impossible(hanging, limit) is None
+    assert impossible(replace(hanging, tip=(0.0, 0.0, 16.0)), limit) is not None
+    assert limits(sbafab.build("radial-15mm"), (5.0,)).highest is None
+
+
+def test_negative_air_and_films_through_films_cannot_be() -> None:
+    limit = limits(sbafab.build("3dof-15mm"), (5.0, 0.0, 0.0))
+    state = State(1.0, {"chamber1": 5.0}, 6.0, (-5.0, 0.0, 5.0), 100.0, {"chamber3": -62.046})
+    assert impossible(state, limit) == (
+        "chamber3 holds -62 ul of air, less than none: its films have passed through each other"
+    )
+    whole = replace(state, volumes={"chamber3": 1.0})
+    assert impossible(whole, limit, passed=0.19) is None
+    assert "passed through each other in 0.21 ul" in str(impossible(whole, limit, passed=0.21))
+    assert "no finite number" in str(impossible(replace(whole, tilt=math.nan), limit))
+
+
+def test_films_in_each_other_are_measured_along_their_normal() -> None:
+    """Two films of two triangles, the upper one facing down, turned by 60 degrees together."""
+    square = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
+    flat = np.concatenate([square, square])
+    start = flat + np.repeat([[0, 0, 0], [0, 0, 1]], 4, axis=0)
+    films = np.array([[0, 1, 2], [0, 2, 3], [6, 5, 4], [7, 6, 4]])
+    half, tall = 0.5, 3**0.5 / 2
+    turn = np.array([[half, 0, -tall], [0, 1, 0], [tall, 0, half]])
+    # A square of 2 mm, so deep in the other.
+    for apart, volume in ((0.4, 0.0), (-0.3, 4 * 0.3)):
+        end = (flat + np.repeat([[0, 0, 0], [0, 0, apart]], 4, axis=0)) @ turn.T
+        assert overlap(end, flat, start, films) == pytest.approx(volume)
+
+
+def test_air_is_that_of_the_recorded_films(tmp_path: Path) -> None:
+    """At the start a balloon is the paper's parabola; rings of 12 have the area of its circles."""
+    write_scenes(laminate(), tmp_path, {"chamber1": 5.0})
+    films = RecordedFilms(tmp_path / "actuator.scn")
+    shell = round_shell(round_actuator(laminate(), {"chamber1": 5.0}))
+    tip = [shell.position[node] for node in shell.tip]
+    state = films.state(laminate(), 0.5, tip, shell.position)
+    balloon = nearly_flat(2.5, 1.25)
+    assert state.volumes["chamber1"] == pytest.approx(balloon.volume, rel=0.05)
+    assert state.pressures == {"chamber1": 2.5}
+    assert films.overlap(shell.position) == 0
+    # Upside down, all the air is where films have passed through each other.
+    lowered = [(x, y, -z) for x, y, z in shell.position]
+    assert films.overlap(lowered) == pytest.approx(balloon.volume, rel=0.1)
+    assert "nodes.state" in films.recording()
+    assert "nodes.state" not in (tmp_path / "actuator.scn").read_text()
 
 
 def test_nan_in_the_record_voids_a_run(tmp_path: Path, fake: Fake) -> None:
@@ -216,14 +266,14 @@ def test_each_scene_is_run_with_its_own_step(tmp_path: Path, fake: Fake) -> None
     fake(writing(RECORD))
     run(tmp_path, SofaJob("frames", 0.2))
     arguments = (tmp_path / "sofa" / "arguments").read_text(encoding="utf-8").split()
-    assert arguments[-2:] == ["5", "actuator_frames.scn"]
+    assert arguments[-2:] == ["5", "recorded.scn"]
 
 
 def test_a_record_cut_short_keeps_what_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "tip.state"
     for end in range(len(RECORD)):
         path.write_text(RECORD[:end], encoding="utf-8")
-        assert [tip.time for tip in read_tips(path)] == [0, 0.1, 0.2][
+        assert [time for time, _ in read_points(path)] == [0, 0.1, 0.2][
             : RECORD[:end].count("\n") // 2
         ]
 
@@ -231,9 +281,9 @@ def test_a_record_cut_short_keeps_what_is_whole(tmp_path: Path) -> None:
 def test_a_tilt_is_that_of_the_points_plane(tmp_path: Path) -> None:
     path = tmp_path / "tip.state"
     path.write_text(RECORD + HALF_TURN, encoding="utf-8")
-    last = read_tips(path)[-1]
-    assert last.place == pytest.approx((0, 1 / 3, 16 / 3))
-    assert last.tilt == pytest.approx(90)
+    _, points = read_points(path)[-1]
+    assert np.mean(points, axis=0) == pytest.approx((0, 1 / 3, 16 / 3))
+    assert tilt_of(points) == pytest.approx(90)
 
 
 def test_a_log_without_times_is_read() -> None:
@@ -242,8 +292,9 @@ def test_a_log_without_times_is_read() -> None:
 
 
 def test_a_program_that_cannot_start_is_an_error(tmp_path: Path) -> None:
+    write_scenes(laminate(), tmp_path)
     with pytest.raises(OutputError, match="nowhere could not be started"):
-        run_scene(str(tmp_path / "nowhere"), tmp_path / "actuator.scn", 0.2, 0.02)
+        run_scene(str(tmp_path / "nowhere"), laminate(), tmp_path / "actuator.scn", 0.2, 0.02)
 
 
 def test_a_run_that_takes_too_long_keeps_what_it_has_reached(tmp_path: Path, fake: Fake) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ from sbafab.meshing.surface import Surface
 from sbafab.reports.canvas import AMBIENT, draw_length_bar, rasterize, view_of
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.simulators.calculix.deck import DeckSettings
+from sbafab.simulators.simulator import State
 from sbafab.spreadsheet import csv_text
 
 if TYPE_CHECKING:
@@ -140,30 +141,11 @@ NEAR = 0.5
 
 
 @dataclass(frozen=True)
-class State:
-    """The actuator at one moment.
+class LoadedState(State):
+    """A state with the largest von Mises ``stress`` in MPa and the ``work`` of the air in uJ."""
 
-    ``pressures`` kPa and ``volumes`` ul of air by chamber; ``tip`` is how far the tip has moved
-    from the base, in mm; ``tilt`` in degrees, None where tip or model have one axis only;
-    ``stress`` is the largest von Mises stress in MPa, ``work`` what the air has done, in uJ.
-    """
-
-    time: float
-    pressures: Mapping[str, float]
-    tip: tuple[float, float, float]
-    tilt: float | None
-    volumes: Mapping[str, float]
     stress: float
     work: float
-
-    @property
-    def stroke(self) -> float:
-        """Growth in height in mm."""
-        return self.tip[2]
-
-    def as_dict(self) -> dict[str, object]:
-        """For a JSON file."""
-        return asdict(self)
 
 
 def history(
@@ -172,15 +154,16 @@ def history(
     symmetry: Symmetry,
     settings: DeckSettings,
     frames: Sequence[Frame],
-) -> list[State]:
+) -> list[LoadedState]:
     """The states of a run from the unloaded one on; ``mesh`` is the one that was run."""
     tips, bases = (_poles(mesh, laminate, name) for name in ("tip", "base"))
     walls = {name: _walls(mesh, name) for name in settings.pressures}
     shares = {name: _share(laminate, name, symmetry) for name in settings.pressures}
     stand = images(laminate, symmetry)
+    flat = float(mesh.points[tips, 2].mean() - mesh.points[bases, 2].mean())
     start = np.zeros_like(mesh.points)
     unloaded = Frame(0.0, start, np.zeros((len(start), 6)))
-    states: list[State] = []
+    states: list[LoadedState] = []
     for frame in (unloaded, *frames):
         points = mesh.points + frame.displacement
         moved = frame.displacement[tips].mean(axis=0) - frame.displacement[bases].mean(axis=0)
@@ -190,9 +173,10 @@ def history(
         volumes = {name: meshed[stand[name]] for name in walls}
         work = states[-1].work + _work(states[-1], pressures, volumes) if states else 0.0
         states.append(
-            State(
+            LoadedState(
                 frame.time,
                 pressures,
+                flat + float(moved[2]),
                 (float(moved[0]), float(moved[1]), float(moved[2])),
                 _tilt(mesh.points[tips], points[tips]),
                 volumes,
@@ -220,7 +204,9 @@ def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
     return bool((apart[facing] < 0).any())
 
 
-def _work(before: State, pressures: Mapping[str, float], volumes: Mapping[str, float]) -> float:
+def _work(
+    before: LoadedState, pressures: Mapping[str, float], volumes: Mapping[str, float]
+) -> float:
     """Return the work of the air since a state, in uJ (kPa x ul)."""
     return sum(
         (before.pressures[name] + pressures[name]) / 2 * (volumes[name] - before.volumes[name])
@@ -274,7 +260,7 @@ def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
     return meshed / sum(circle.area for circle in discs) or 1.0
 
 
-def history_csv(states: Sequence[State]) -> str:
+def history_csv(states: Sequence[LoadedState]) -> str:
     """The states as text, a row each; units stand in the heads."""
     first = states[0]
     head = ["time_s", *(f"pressure_{name}_kPa" for name in first.pressures)]
@@ -283,7 +269,7 @@ def history_csv(states: Sequence[State]) -> str:
     head += [*(f"volume_{name}_ul" for name in first.volumes), "von_mises_max_MPa", "work_uJ"]
     rows: list[Sequence[str]] = [head]
     for state in states:
-        values = [state.time, *state.pressures.values(), state.stroke, *state.tip[:2]]
+        values = [state.time, *state.pressures.values(), state.stroke, *(state.tip or ())[:2]]
         values += [state.tilt] if state.tilt is not None else []
         values += [*state.volumes.values(), state.stress, state.work]
         # Adding 0.0 turns a rounded -0.0 into 0.0.
@@ -387,7 +373,7 @@ def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> N
 # Stroke, air and wall stress against pressure as one SVG, for screen and print.
 
 
-def history_svg(title: str, states: Sequence[State]) -> str:
+def history_svg(title: str, states: Sequence[LoadedState]) -> str:
     """Three panels beside each other; x is the chambers' pressure that is farthest from 0."""
     last = states[-1]
     fullest = max(last.pressures, key=lambda name: abs(last.pressures[name]))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, cast
 
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError, OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.conforming.element_mesh import volume_mesh
 from sbafab.meshing.conforming.layup import MeshSettings, Symmetry, flat, images, layup
@@ -25,7 +25,7 @@ from sbafab.simulators.calculix.deck import (
 from sbafab.simulators.calculix.results import (
     SAME_TIME,
     Frame,
-    State,
+    LoadedState,
     deformed_png,
     films_meet,
     history,
@@ -40,6 +40,9 @@ from sbafab.simulators.simulator import (
     OUT_OF_TIME,
     Result,
     SimulationRequest,
+    State,
+    impossible,
+    limits,
     program_path,
     run_program,
 )
@@ -64,17 +67,21 @@ def find_ccx() -> str:
 
 
 def run_ccx(
-    folder: Path, job: str, end: float, timeout: float, progress: Progress | None = None
+    folder: Path,
+    job: str,
+    end: float,
+    timeout: float,
+    report: Callable[[float], None] | None = None,
 ) -> Ending:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
-    What ccx prints goes to ``ccx.log`` there.
+    What ccx prints goes to ``ccx.log`` there; ``report`` is told the time in s that is reached.
     """
     sta = folder / f"{job}.sta"
 
     def look() -> None:
-        if progress is not None:
-            progress("ccx, percent of the load", int(100 * _reached(sta) / end), 100)
+        if report is not None:
+            report(_reached(sta))
 
     code, stopped = run_program([find_ccx(), "-i", job], folder / LOG, timeout, look)
     reached = _reached(sta)
@@ -116,7 +123,7 @@ DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
 class History:
     """The states from the unloaded one on, and one sentence if the run stopped early."""
 
-    states: tuple[State, ...]
+    states: tuple[LoadedState, ...]
     stopped: str | None
 
 
@@ -143,7 +150,15 @@ def simulate(
     mesh = deck_mesh(laminate, mesh_settings)
     find_ccx()
     write_deck(mesh, settings, folder)
-    ending = run_ccx(folder, JOB, settings.ramp, timeout, progress)
+    top = settings.largest
+
+    def report(reached: float) -> None:
+        # Time says nothing of the load, which rises with its square, nor of how long the rest
+        # takes: steps get shorter where films wrinkle.
+        progress(f"ccx, {top * settings.share(reached):.3g} of {top:g} kPa", 0, 1)
+
+    report(0.0)
+    ending = run_ccx(folder, JOB, settings.ramp, timeout, report)
     progress("results", 0, 1)
     run_mesh = started(mesh, settings)
     frames = converged_frames(folder / f"{JOB}.frd", run_mesh, ending)
@@ -152,32 +167,43 @@ def simulate(
             f"ccx stopped at {_place(ending.time, settings)}, before the first result: "
             f"{ending.stopped}; {_advice(ending, settings)}"
         )
-    met = _first_contact(run_mesh, settings, frames)
-    frames = frames[:met]
-    if not frames:
-        raise OutputError(
-            f"the films meet before the first result, at less than {settings.largest:g} kPa, and "
-            "the deck has no contact; ask for less vacuum"
-        )
     states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
+    wrong = _first_wrong(run_mesh, laminate, settings, frames, states)
+    if wrong is not None:
+        number, reason = wrong
+        if number == 0:
+            raise VoidError(
+                f"the first result, at {_largest(states[1]):.3g} kPa, cannot be: {reason}; ask for "
+                "less in one chamber, or for less vacuum"
+            )
+        frames, states = frames[:number], states[: number + 1]
     _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
     stopped = None if ending.stopped is None else _stopped(ending, states, settings)
-    if met is not None:
-        reached = min(states[-1].pressures.values())
+    if wrong is not None:
         stopped = (
-            f"the films meet beyond {reached:.3g} kPa, where the deck, which has no contact and no "
-            "loose sheets, no longer holds; results up to there are kept"
+            f"beyond {_largest(states[-1]):.3g} kPa the result cannot be: {wrong[1]}; results up "
+            "to there are kept"
         )
     return History(tuple(states), stopped)
 
 
-def _first_contact(mesh: Mesh, settings: DeckSettings, frames: Sequence[Frame]) -> int | None:
-    """Return the index of the first frame in which a vacuum has films pass through each other."""
+def _first_wrong(
+    mesh: Mesh,
+    laminate: Laminate,
+    settings: DeckSettings,
+    frames: Sequence[Frame],
+    states: Sequence[LoadedState],
+) -> tuple[int, str] | None:
+    """Return the index of the first frame that cannot be, and why; decks have no contact."""
+    can_be = limits(laminate, settings.pressures.values())
     drawn_in = [name for name, pressure in settings.pressures.items() if pressure < 0]
-    for number, frame in enumerate(frames):
+    for number, (frame, state) in enumerate(zip(frames, states[1:], strict=True)):
         if any(films_meet(mesh, name, frame) for name in drawn_in):
-            return number
+            return number, "the films meet, and the deck has no contact and no loose sheets"
+        reason = impossible(state, replace(can_be, must_stand=False))
+        if reason is not None:
+            return number, reason
     return None
 
 
@@ -197,8 +223,13 @@ def _stopped(ending: Ending, states: Sequence[State], settings: DeckSettings) ->
     last = states[-1]
     return (
         f"ccx stopped at {_place(ending.time, settings)}: {ending.stopped}; results up to "
-        f"{max(last.pressures.values(), key=abs):.3g} kPa are kept; {_advice(ending, settings)}"
+        f"{_largest(last):.3g} kPa are kept; {_advice(ending, settings)}"
     )
+
+
+def _largest(state: State) -> float:
+    """The pressure in kPa that is farthest from 0."""
+    return max(state.pressures.values(), key=abs)
 
 
 def _place(time: float, settings: DeckSettings) -> str:
@@ -222,7 +253,7 @@ def _write_results(
     mesh: Mesh,
     name: str,
     symmetry: Symmetry,
-    states: Sequence[State],
+    states: Sequence[LoadedState],
     last: Frame,
     folder: Path,
 ) -> None:
@@ -268,13 +299,8 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     mesh, settings = _settings(laminate, request)
     history = simulate(laminate, mesh, settings, folder, 60 * request.minutes, progress)
     last = history.states[-1]
-    rows = [(name, value, "kPa") for name, value in last.pressures.items()]
-    rows += [("stroke", last.stroke, "mm")]
-    rows += [("tilt", last.tilt, "degrees")] if last.tilt is not None else []
-    rows += [(f"air in {name}", value, "ul") for name, value in last.volumes.items()]
-    rows += [("von Mises stress, at most", last.stress, "MPa")]
-    figures = {"states": [state.as_dict() for state in history.states]}
-    return Result(tuple(rows), figures, history.stopped)
+    figures = {"stress": last.stress, "work": last.work}
+    return Result("calculix", history.states, figures, history.stopped)
 
 
 def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSettings, DeckSettings]:

@@ -131,6 +131,17 @@ def equal_area(stack: RoundStack, sectors: int) -> RoundStack:
     )
 
 
+def pocket_radii(laminate: Laminate) -> list[float]:
+    """Half the least width in mm of every pocket."""
+    radii = []
+    for gap in laminate.interfaces:
+        if gap.kind == "chamber":
+            for contour in gap.mask.outers:
+                low_x, bottom, right, top = contour.bounds
+                radii.append(min(right - low_x, top - bottom) / 2)
+    return radii
+
+
 def why_not_round(laminate: Laminate) -> str | None:
     """The reason why a laminate has no coarse shell, or None."""
     try:

@@ -219,6 +219,7 @@ def _data(coarse: CoarseActuator) -> dict[str, object]:
         "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
         "start": START,
         "pressures": dict(coarse.pressures),
+        "films": 2 * coarse.balloons * coarse.stack.film.thickness,
         "cavities": dict(mesh.cavities),
         "tip": mesh.tip,
         "roots": mesh.roots,

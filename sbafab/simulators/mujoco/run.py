@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sbafab.errors import OutputError
+from sbafab.errors import OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
 from sbafab.simulators.coarse.shell import PRESSURE
@@ -19,10 +18,14 @@ from sbafab.simulators.mujoco.model import DATA, MODEL, SECTORS, why_no_model, w
 from sbafab.simulators.simulator import (
     Result,
     SimulationRequest,
-    Tip,
+    State,
     chamber_pressures,
+    drift,
+    impossible,
+    limits,
+    overlap,
     refuse_time,
-    tip_at,
+    tilt_of,
 )
 
 SECONDS = 5.0
@@ -38,30 +41,23 @@ INSTALL = 'install it with: pip install "sbafab[mujoco]"'
 
 @dataclass(frozen=True)
 class MujocoRun:
-    """A valid run: the motion of the tip, and how it ended.
+    """A run: its states, and how it ended.
 
-    ``stroke`` in mm is by how much the films' centres at both ends have parted upward since flat;
-    ``volumes`` in ul by chamber; ``rate`` in steps per s of real time; ``stopped`` is one sentence
-    if it was stopped early.
+    The tip of a state is that of the films' centres, as seen from those at the base. ``overlap`` is
+    the volume in ul in which films have passed through each other at the end; ``rate`` in steps per
+    s of real time; ``stopped`` is one sentence if it was stopped early.
     """
 
     model: Path
-    tips: tuple[Tip, ...]
-    stroke: float
-    volumes: tuple[tuple[str, float], ...]
+    states: tuple[State, ...]
+    overlap: float
     steps: int
     rate: float
     stopped: str | None = None
 
     @property
-    def last(self) -> Tip:
-        return self.tips[-1]
-
-    @property
-    def drift(self) -> float:
-        """Distance in mm that the tip moved in the last half second; small if it is at rest."""
-        since = [tip for tip in self.tips if tip.time >= self.last.time - 0.5 - TIP_PERIOD / 2]
-        return math.dist(since[0].place, self.last.place)
+    def last(self) -> State:
+        return self.states[-1]
 
 
 def simulate(
@@ -77,11 +73,17 @@ def simulate(
 
     ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere; ``sectors`` nodes
     make a ring; ``limit`` is the most real time in s. Raises DesignError where no such model can
-    be made of the laminate, OutputError where mujoco is missing or its run cannot be believed.
+    be made of the laminate, OutputError where mujoco is missing, VoidError where what it finds
+    cannot be.
     """
     refuse_time(seconds, LEAST_TIME)
     write_model(laminate, folder, pressures, sectors)
-    return run_model(folder, seconds, progress, limit)
+    done = run_model(folder, seconds, progress, limit)
+    can_be = limits(laminate, done.last.pressures.values())
+    wrong = impossible(done.last, can_be, done.overlap)
+    if wrong is not None:
+        raise VoidError(f"{MODEL} ran to {done.last.time:g} s, but its result cannot be: {wrong}")
+    return done
 
 
 def find_mujoco() -> Any:
@@ -104,8 +106,8 @@ def run_model(
 ) -> MujocoRun:
     """Inflates the model in a folder, for at most ``limit`` s of real time or until Ctrl-C.
 
-    Raises OutputError if the model does not load, or a step is unstable or not solved; the
-    sentence says how far the tip was known.
+    Raises OutputError if the model does not load, VoidError if a step is unstable or not solved;
+    the sentence says how far the tip was known.
     """
     mujoco = find_mujoco()
     path = folder / MODEL
@@ -118,7 +120,7 @@ def run_model(
         inflation = _Inflation(mujoco, model, json.loads((folder / DATA).read_text("utf-8")))
         steps = round(seconds / model.opt.timestep)
         every = max(1, round(TIP_PERIOD / model.opt.timestep))
-        tips = [inflation.tip()]
+        states = [inflation.state()]
         stopped: str | None = None
         step = 0
         started = time.monotonic()
@@ -131,55 +133,54 @@ def run_model(
             step += 1
             why = inflation.trouble(warnings)
             if why is not None:
-                reached_so_far = f"the tip is known to {tips[-1].time:g} s"
-                raise OutputError(f"{MODEL} did not run to its end: {why}; {reached_so_far}")
+                reached_so_far = f"the tip is known to {states[-1].time:g} s"
+                raise VoidError(f"{MODEL} did not run to its end: {why}; {reached_so_far}")
             if limit is not None and time.monotonic() - started > limit and step < steps:
                 stopped = f"it was stopped after {limit / 60:g} minutes"
             if step % every == 0 or step == steps or stopped is not None:
-                tips.append(inflation.tip())
+                states.append(inflation.state())
                 if progress is not None:
                     progress("mujoco", step, steps)
     rate = step / max(time.monotonic() - started, 1e-9)
     note = None
     if stopped is not None:
-        reached = tips[-1].time
+        reached = states[-1].time
         note = f"{MODEL} ran to {reached:g} of {seconds:g} s: {stopped}; what it reached is kept"
-    shape = inflation.stroke(), inflation.volumes()
-    return MujocoRun(path, tuple(tips), *shape, step, rate, note)
+    return MujocoRun(path, tuple(states), inflation.overlap(), step, rate, note)
 
 
 class _Inflation:
     """The model's state, and the cavities that the pressures act on."""
 
-    def __init__(self, mujoco: Any, model: Any, data: Mapping[str, Any]) -> None:
+    def __init__(self, mujoco: Any, model: Any, told: Mapping[str, Any]) -> None:
         import numpy as np
 
-        self.mujoco, self.model, self.told = mujoco, model, data
-        self.state = mujoco.MjData(model)
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, data["start"])
-        mujoco.mj_resetDataKeyframe(model, self.state, key)
-        self.cavities = {name: np.array(t) for name, t in data["cavities"].items()}
+        self.mujoco, self.model, self.told = mujoco, model, told
+        self.data = mujoco.MjData(model)
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, told["start"])
+        mujoco.mj_resetDataKeyframe(model, self.data, key)
+        self.cavities = {name: np.array(t) for name, t in told["cavities"].items()}
         # The world, body 0, comes before the nodes.
         self.free = model.body_dofnum[1:] > 0
-        self.nodes = self._placed()
+        self.start = self.nodes = self._placed()
 
     def _placed(self) -> Any:
-        self.mujoco.mj_kinematics(self.model, self.state)
-        return self.state.xpos[1:].copy()
+        self.mujoco.mj_kinematics(self.model, self.data)
+        return self.data.xpos[1:].copy()
 
     def step(self) -> None:
         """One time step under the pressures of this time, which follow the films."""
         import numpy as np
 
-        share = min(1.0, (self.state.time + self.model.opt.timestep) / RAMP)
+        share = self._share(self.data.time + self.model.opt.timestep)
         forces = np.zeros_like(self.nodes)
         for name, triangles in self.cavities.items():
             a, b, c = self.nodes[triangles].transpose(1, 0, 2)
             push = np.cross(b - a, c - a) * (share * self.told["pressures"][name] / 6)
             for corner in triangles.T:
                 np.add.at(forces, corner, push)
-        self.state.qfrc_applied[:] = forces[self.free].ravel()
-        self.mujoco.mj_step(self.model, self.state)
+        self.data.qfrc_applied[:] = forces[self.free].ravel()
+        self.mujoco.mj_step(self.model, self.data)
         self.nodes = self._placed()
 
     def trouble(self, warnings: list[str]) -> str | None:
@@ -188,29 +189,47 @@ class _Inflation:
 
         if warnings:
             return f'MuJoCo says "{" ".join(warnings[0].split())[:200]}"'
-        if any(warning.number for warning in self.state.warning):
+        if any(warning.number for warning in self.data.warning):
             return "MuJoCo warns of an unstable step"
         # MuJoCo takes a force that is no number for none, and says nothing.
-        if not np.isfinite(self.state.qfrc_smooth).all() or not np.isfinite(self.nodes).all():
+        if not np.isfinite(self.data.qfrc_smooth).all() or not np.isfinite(self.nodes).all():
             return "a force or a place is no finite number"
         return None
 
-    def tip(self) -> Tip:
-        points = [(float(x), float(y), float(z)) for x, y, z in self.nodes[self.told["tip"]]]
-        return tip_at(round(float(self.state.time), 9), points)
+    def _share(self, time: float) -> float:
+        """The part of the pressures that is on at a time in s."""
+        return min(1.0, time / RAMP)
 
-    def stroke(self) -> float:
+    def state(self) -> State:
+        """The state in every simulator's terms."""
+        time = round(float(self.data.time), 9)
         poles, roots = (self.nodes[self.told[end]].mean(axis=0) for end in ("poles", "roots"))
-        return float(poles[2] - roots[2])
+        x, y, z = (float(p - r) for p, r in zip(poles, roots, strict=True))
+        rim = [(float(a), float(b), float(c)) for a, b, c in self.nodes[self.told["tip"]]]
+        pressures = {n: self._share(time) * p for n, p in self.told["pressures"].items()}
+        height = self.told["films"] + z
+        return State(time, pressures, height, (x, y, z), tilt_of(rim), self._volumes())
 
-    def volumes(self) -> tuple[tuple[str, float], ...]:
+    def _volumes(self) -> dict[str, float]:
         import numpy as np
 
-        volumes = []
+        volumes = {}
         for name, triangles in self.cavities.items():
             a, b, c = self.nodes[triangles].transpose(1, 0, 2)
-            volumes.append((name, float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6))
-        return tuple(volumes)
+            volumes[name] = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+        return volumes
+
+    def overlap(self) -> float:
+        """The volume in ul in which films have passed through each other."""
+        import numpy as np
+
+        model, films = self.model, []
+        for flex in range(model.nflex):
+            nodes = model.flex_vertbodyid[model.flex_vertadr[flex] :] - 1
+            first = model.flex_elemdataadr[flex]
+            corners = model.flex_elem[first : first + 3 * model.flex_elemnum[flex]]
+            films.append(nodes[corners.reshape(-1, 3)])
+        return overlap(self.nodes, model.body_pos[1:], self.start, np.concatenate(films))
 
 
 @contextmanager
@@ -246,17 +265,8 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     pressures = _pressures(laminate, request)
     seconds = SECONDS if request.seconds is None else request.seconds
     result = simulate(laminate, folder, pressures, seconds, progress, limit=60 * request.minutes)
-    x, y, z = result.last.place
-    share = min(1.0, result.last.time / RAMP)
-    rows = [(name, share * value, "kPa") for name, value in pressures.items()]
-    rows += [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
-    rows += [("tilt", result.last.tilt, "degrees"), ("stroke", result.stroke, "mm")]
-    rows += [(f"air {name}", value, "ul") for name, value in result.volumes]
-    rows += [("drift in 0.5 s", result.drift, "mm"), ("rate", result.rate, "steps/s")]
-    tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in result.tips]
-    figures = {"stroke": result.stroke, "volumes": dict(result.volumes), "tips": tips}
-    figures |= {"drift": result.drift, "rate": result.rate}
-    return Result(tuple(rows), figures, result.stopped)
+    figures = {"drift": drift(result.states), "overlap": result.overlap, "rate": result.rate}
+    return Result("mujoco", result.states, figures, result.stopped)
 
 
 def _pressures(laminate: Laminate, request: SimulationRequest) -> dict[str, float]:

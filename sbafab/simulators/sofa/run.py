@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import re
 import signal
+import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
-from sbafab.errors import DesignError, OutputError
+import numpy as np
+
+from sbafab.errors import DesignError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.process import Progress
@@ -20,12 +23,16 @@ from sbafab.simulators.simulator import (
     Ended,
     Result,
     SimulationRequest,
-    Tip,
+    State,
     chamber_pressures,
+    drift,
+    impossible,
+    limits,
+    overlap,
     program_path,
     refuse_time,
     run_program,
-    tip_at,
+    tilt_of,
 )
 from sbafab.simulators.sofa.scenes import (
     BEAM_DT,
@@ -33,6 +40,7 @@ from sbafab.simulators.sofa.scenes import (
     DT,
     FRAMES_DT,
     FRAMES_FILE,
+    RAMP,
     SHELL_FILE,
     TIP_FILE,
     TIP_PERIOD,
@@ -40,7 +48,9 @@ from sbafab.simulators.sofa.scenes import (
     why_no_scene,
     write_scenes,
 )
-from sbafab.simulators.sofa.shell import pocket_radii
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 Scene = Literal["shell", "frames", "volume", "beam"]
 
@@ -74,26 +84,23 @@ USUAL = SofaJob()
 
 @dataclass(frozen=True)
 class SofaRun:
-    """A valid run: the motion of the tip, steps done, s they took, steps per s.
+    """A valid run: its states, steps done, s they took, steps per s.
 
-    ``stopped`` is one sentence if it was stopped early.
+    ``overlap`` is the volume in ul in which films have passed through each other at the end, None
+    where that is not known; ``stopped`` is one sentence if it was stopped early.
     """
 
     scene: Path
-    tips: tuple[Tip, ...]
+    states: tuple[State, ...]
+    overlap: float | None
     steps: int
     seconds: float | None
     rate: float | None
     stopped: str | None = None
 
     @property
-    def last(self) -> Tip:
-        return self.tips[-1]
-
-    def before(self, seconds: float) -> Tip:
-        """The tip so many s before the end, or at the start."""
-        until = self.last.time - seconds
-        return next((tip for tip in reversed(self.tips) if tip.time <= until), self.tips[0])
+    def last(self) -> State:
+        return self.states[-1]
 
 
 def simulate(
@@ -106,8 +113,8 @@ def simulate(
     """Writes the scenes of a laminate into a folder and runs one of them.
 
     ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere. Raises DesignError
-    where no such scene can be made of the laminate, OutputError where runSofa is missing or what
-    it ran cannot be believed.
+    where no such scene can be made of the laminate, OutputError where runSofa is missing, VoidError
+    where what it ran cannot be believed.
     """
     name, dt = SCENES[job.scene]
     refuse_time(job.seconds, TIP_PERIOD)
@@ -116,8 +123,12 @@ def simulate(
     program = find_program()
     requested = job.volumes if job.scene == "volume" else pressures
     names = tuple(chamber.name for chamber in laminate.chambers)
-    limit = limits(laminate, checked(names, requested, PRESSURE, "pressure", "kPa").values())
-    return run_scene(program, folder / name, job.seconds, dt, job.limit, progress, limit)
+    can_be = limits(laminate, checked(names, requested, PRESSURE, "pressure", "kPa").values())
+    done = run_scene(program, laminate, folder / name, job.seconds, dt, job.limit, progress)
+    wrong = impossible(done.last, can_be, done.overlap or 0.0)
+    if wrong is not None:
+        raise VoidError(f"{name} ran to {done.last.time:g} s, but its result cannot be: {wrong}")
+    return done
 
 
 def _no_such_scene(laminate: Laminate, scene: Scene) -> str:
@@ -141,57 +152,62 @@ def find_program() -> str:
 
 def run_scene(
     program: str,
+    laminate: Laminate,
     scene: Path,
     seconds: float,
     dt: float,
     limit: float | None = None,
     progress: Progress | None = None,
-    can_be: TipLimits | None = None,
 ) -> SofaRun:
     """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
 
-    It is stopped after ``limit`` s of real time. Raises OutputError if it ends by itself, is
-    killed, logs what makes it void, or ends outside of what ``can_be``; the sentence says how far
-    the tip was known.
+    It is stopped after ``limit`` s of real time. Raises VoidError if it ends by itself, is killed
+    or logs what makes it void; the sentence says how far the tip was known.
     """
     folder = scene.parent
-    state = folder / TIP_FILE
+    state, nodes = folder / TIP_FILE, folder / NODES_FILE
     state.unlink(missing_ok=True)
+    films = RecordedFilms(scene)
+    recorded = folder / RECORDED_SCENE
+    recorded.write_text(films.recording(), encoding="utf-8")
     # The tip is written at the beginning of a step: one more step writes the last.
     steps = round(seconds / dt) + 1
     log_path = folder / LOG_FILE
-    command = [program, "-g", "batch", "-n", str(steps), scene.name]
+    command = [program, "-g", "batch", "-n", str(steps), recorded.name]
     ended = run_program(command, log_path, limit, lambda: _report(state, dt, steps, progress))
-    needed = plugins_needed(scene)
-    log = read_log(log_path.read_text(encoding="utf-8", errors="replace"), needed)
-    tips = read_tips(state)
-    if ended.stopped is not None and tips and log.trouble is None:
+    log = read_log(log_path.read_text(encoding="utf-8", errors="replace"), plugins_needed(scene))
+    tips = read_points(state)
+    why = _trouble(ended, log, [time for time, _ in tips], seconds)
+    is_cut = ended.stopped is not None and tips and log.trouble is None
+    if why is not None and not is_cut:
+        reached = (
+            f"the tip is known to {tips[-1][0]:g} s" if tips else "nothing is known of the tip"
+        )
+        raise VoidError(f"{scene.name} did not run to its end: {why}; {reached} (see {log_path})")
+    places = dict(read_points(nodes))
+    depth = films.overlap(places[max(places)]) if places else None
+    for extra in (nodes, recorded):
+        extra.unlink(missing_ok=True)
+    states = tuple(films.state(laminate, time, points, places.get(time)) for time, points in tips)
+    if is_cut:
         stopped = (
-            f"{scene.name} ran to {tips[-1].time:g} of {seconds:g} s: {ended.stopped}; what it "
+            f"{scene.name} ran to {tips[-1][0]:g} of {seconds:g} s: {ended.stopped}; what it "
             "reached is kept"
         )
-        return SofaRun(scene, tuple(tips), round(tips[-1].time / dt), None, None, stopped)
-    why = _trouble(ended, log, tips, seconds)
-    if why is not None:
-        reached = (
-            f"the tip is known to {tips[-1].time:g} s" if tips else "nothing is known of the tip"
-        )
-        raise OutputError(f"{scene.name} did not run to its end: {why}; {reached} (see {log_path})")
-    if can_be is not None and (wrong := impossible(tips, can_be)) is not None:
-        raise OutputError(f"{scene.name} ran to its end, but its result cannot be: {wrong}")
+        return SofaRun(scene, states, depth, round(tips[-1][0] / dt), None, None, stopped)
     if progress is not None:
         progress("runSofa", steps, steps)
-    return SofaRun(scene, tuple(tips), log.steps or steps, log.seconds, log.rate)
+    return SofaRun(scene, states, depth, log.steps or steps, log.seconds, log.rate)
 
 
 def _report(state: Path, dt: float, steps: int, progress: Progress | None) -> None:
     if progress is not None:
-        tips = read_tips(state)
+        tips = read_points(state)
         if tips:
-            progress("runSofa", min(steps, round(tips[-1].time / dt)), steps)
+            progress("runSofa", min(steps, round(tips[-1][0] / dt)), steps)
 
 
-def _trouble(ended: Ended, log: Log, tips: list[Tip], seconds: float) -> str | None:
+def _trouble(ended: Ended, log: Log, times: list[float], seconds: float) -> str | None:
     """Why a run cannot be believed."""
     code = ended.code
     if ended.stopped is not None:
@@ -202,9 +218,9 @@ def _trouble(ended: Ended, log: Log, tips: list[Tip], seconds: float) -> str | N
         return f'its log says "{log.trouble[:200]}"'
     if code > 0:
         return f"runSofa ended with exit code {code}"
-    if not tips:
+    if not times:
         return f"it wrote no place of the tip into {TIP_FILE}"
-    if tips[-1].time < seconds - 1.5 * TIP_PERIOD:
+    if times[-1] < seconds - 1.5 * TIP_PERIOD:
         return f"the tip's record ends before {seconds:g} s or is no finite number from there on"
     return None
 
@@ -228,13 +244,11 @@ class Log:
     rate: float | None
 
 
-def read_tips(path: Path) -> list[Tip]:
-    """The tip's records in time up to the first that is cut short or is no finite number."""
-    return [tip_at(time, points) for time, points in read_points(path)]
-
-
 def read_points(path: Path) -> list[tuple[float, list[Vector]]]:
-    """Time in s and places in mm of the recorded nodes, as far as ``read_tips`` reads them."""
+    """Times in s and places in mm of the recorded nodes.
+
+    They end before the first record that is cut short or holds what is no finite number.
+    """
     if not path.is_file():
         return []
     records: list[tuple[float, list[Vector]]] = []
@@ -286,55 +300,89 @@ def _points(numbers: list[float]) -> Iterator[Vector]:
         yield numbers[i], numbers[i + 1], numbers[i + 2]
 
 
-# The limits of a possible result: place, height and lean of the tip.
+# The films of a scene, of which a run records all nodes; a scene by itself records the tip alone.
 
 
-LEAST_RISE = 0.01
-"""mm that a tip must stand above its base: no scene starts as low and stays there."""
-MOST_LEAN = 1.0
-"""Degrees of tilt where all chambers are alike; shells that hold stand within 0.1."""
-STRETCH = 1.3
-"""Times its flat length that a film may be along its meridian; more has burst it long before."""
+NODES_FILE, RECORDED_SCENE = "nodes.state", "recorded.scn"
 
 
-@dataclass(frozen=True)
-class TipLimits:
-    """Limits of a tip: at most ``highest`` mm over its base, and whether it must stand upright."""
+class RecordedFilms:
+    """Nodes, films and chambers of a scene, as they stand in its file."""
 
-    highest: float
-    must_stand: bool
+    def __init__(self, scene: Path) -> None:
+        self.root = ET.parse(scene).getroot()
+        inside = {child: parent for parent in self.root.iter() for child in parent}
+        self.tip = self.root.find(".//Node[@name='tip']")
+        assert self.tip is not None
+        self.body = inside[self.tip]
+        self.pressures = {
+            inside[air].attrib["name"].removeprefix("air_"): float(air.attrib["pressure"])
+            for air in self.root.iter("SurfacePressureForceField")
+        }
 
+    def recording(self) -> str:
+        """The scene with a record of all nodes of its films, whenever the tip is recorded."""
+        assert self.tip is not None
+        record = self.tip.find("WriteState")
+        assert record is not None
+        ET.SubElement(self.body, "WriteState", {**record.attrib, "filename": NODES_FILE})
+        return ET.tostring(self.root, encoding="unicode")
 
-def limits(laminate: Laminate, requested: Collection[float]) -> TipLimits | None:
-    """Return the limits of a laminate with these pressures or volumes in its chambers.
+    def _triangles(self, name: str) -> Iterator[tuple[str, NDArray[np.int64]]]:
+        """Triangles (k, 3) of the containers of a name, with the names of their nodes."""
+        for node in self.body.findall("Node"):
+            for container in node.findall(f"TriangleSetTopologyContainer[@name='{name}']"):
+                numbers = [int(word) for word in container.attrib["triangles"].split()]
+                yield node.attrib["name"], np.array(numbers).reshape(-1, 3)
 
-    A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
-    the mesh has no inlets. None for a laminate on a tube, whose balloons have no common tip.
-    """
-    if laminate.tube is not None:
-        return None
-    reach = sum(pocket_radii(laminate)) / len(laminate.chambers)
-    return TipLimits(
-        2 * STRETCH * reach, len(set(requested)) == 1 and why_not_round(laminate) is None
-    )
+    def overlap(self, places: Sequence[Vector]) -> float | None:
+        """The volume in ul in which films have passed through each other.
 
+        None where the scene does not tell the flat shape.
+        """
+        films = [of for name, of in self._triangles("t") if name.startswith("membrane")]
+        flat, start = self._places("rest_position"), self._places("position")
+        if flat is None or start is None or not films:
+            return None
+        return overlap(np.array(places), flat, start, np.concatenate(films))
 
-def impossible(tips: Sequence[Tip], limit: TipLimits) -> str | None:
-    """Return what is impossible in the last tip, or None."""
-    last = tips[-1]
-    z = last.place[2]
-    if all(abs(value) < LEAST_RISE for value in last.place):
-        return "the tip lies at 0, 0, 0"
-    if limit.must_stand and z < LEAST_RISE:
-        return f"all chambers are told the same, and the tip has not risen (z {z:.3f} mm)"
-    if z > limit.highest:
-        return f"the tip is {z:.3f} mm high, and the films reach {limit.highest:.3g} mm at most"
-    if limit.must_stand and last.tilt > MOST_LEAN:
-        return (
-            f"all chambers are told the same, and the tip leans by {last.tilt:.1f} degrees "
-            f"(more than {MOST_LEAN:g})"
-        )
-    return None
+    def _places(self, name: str) -> NDArray[np.float64] | None:
+        """Places (n, 3) of the films' nodes, as the scene gives them."""
+        body = self.body.find("MechanicalObject")
+        words = None if body is None else body.get(name)
+        return None if words is None else np.array(words.split(), dtype=float).reshape(-1, 3)
+
+    def state(
+        self,
+        laminate: Laminate,
+        time: float,
+        tip: Sequence[Vector],
+        places: Sequence[Vector] | None,
+    ) -> State:
+        """The state at a time in s, from the places in mm of the tip's nodes and of all."""
+        on = min(1.0, time / RAMP)
+        pressures = {name: on * value for name, value in self.pressures.items()}
+        volumes = {}
+        if places is not None:
+            for name, walls in self._triangles("c"):
+                a, b, c = np.array(places)[walls].transpose(1, 0, 2)
+                volumes[name] = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+        if laminate.tube is not None:
+            return State(time, pressures, None, None, None, volumes)
+        x, y, z = (np.mean(tip, axis=0) - self._flat_tip()).tolist()
+        height = sum(layer.film.thickness for layer in laminate.tpe_layers) + z
+        return State(time, pressures, height, (x, y, z), tilt_of(tip), volumes)
+
+    def _flat_tip(self) -> NDArray[np.float64]:
+        """The middle of the tip's nodes when flat; where the scene has no flat shape, the axis."""
+        flat = self._places("rest_position")
+        assert self.tip is not None
+        mapping = self.tip.find("SubsetMapping")
+        if flat is None or mapping is None:
+            return np.zeros(3)
+        nodes = [int(word) for word in mapping.attrib["indices"].split()]
+        middle: NDArray[np.float64] = flat[nodes].mean(axis=0)
+        return middle
 
 
 # The interface of a simulator.
@@ -363,24 +411,17 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     scene = cast(Scene, request.scene or USUAL.scene)
     job = SofaJob(scene, seconds, 60 * request.minutes, request.volumes or None)
     result = simulate(laminate, folder, pressures, job, progress)
-    rows = [] if scene == "volume" else [(name, p, "kPa") for name, p in pressures.items()]
-    rows += _reached(laminate, result)
-    rows += [] if result.rate is None else [("rate", result.rate, "steps/s")]
-    tips = [{"time": tip.time, "place": tip.place, "tilt": tip.tilt} for tip in result.tips]
-    figures = {"scene": result.scene.name, "tips": tips, "rate": result.rate}
-    return Result(tuple(rows), figures, result.stopped)
-
-
-def _reached(laminate: Laminate, result: SofaRun) -> list[tuple[str, float, str]]:
-    """The tip's place and lean, or how far the crowns of balloons lie from their tube's axis."""
+    figures: dict[str, float] = {}
     if laminate.tube is not None:
+        # How far the crowns of balloons lie from their tube's axis.
         _, crowns = read_points(result.scene.with_name(TIP_FILE))[-1]
         across = [2 * math.hypot(x, y) for x, y, _ in crowns]
-        return [("diameter over the crowns", sum(across) / len(across), "mm")]
-    x, y, z = result.last.place
-    tip = [("tip x", x, "mm"), ("tip y", y, "mm"), ("tip z", z, "mm")]
-    drift = math.dist(result.last.place, result.before(1.0).place)
-    return [*tip, ("tilt", result.last.tilt, "degrees"), ("drift in 1 s", drift, "mm")]
+        figures["diameter"] = sum(across) / len(across)
+    else:
+        figures["drift"] = drift(result.states)
+    figures |= {} if result.overlap is None else {"overlap": result.overlap}
+    figures |= {} if result.rate is None else {"rate": result.rate}
+    return Result("sofa", result.states, figures, result.stopped)
 
 
 def _pressures(laminate: Laminate, request: SimulationRequest) -> dict[str, float]:

@@ -16,7 +16,7 @@ from sbafab.meshing.conforming.element_mesh import shell_mesh, thin
 from sbafab.meshing.conforming.layup import Layup, MeshSettings, flat, layup, narrowest_ring
 from sbafab.meshing.conforming.mesh import Mesh, volumes
 from sbafab.meshing.surface import Vector
-from sbafab.simulators.coarse.rounds import elastic_of
+from sbafab.simulators.coarse.rounds import elastic_of, pocket_radii
 from sbafab.simulators.coarse.shell import (
     PRESSURE,
     CoarseActuator,
@@ -198,17 +198,6 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
         ),
         reading="tip" if laminate.tube is None else "crowns",
     )
-
-
-def pocket_radii(laminate: Laminate) -> list[float]:
-    """Half the least width in mm of every pocket."""
-    radii = []
-    for gap in laminate.interfaces:
-        if gap.kind == "chamber":
-            for contour in gap.mask.outers:
-                low_x, bottom, right, top = contour.bounds
-                radii.append(min(right - low_x, top - bottom) / 2)
-    return radii
 
 
 def _vectors(points: NDArray[np.float64]) -> tuple[Vector, ...]:
