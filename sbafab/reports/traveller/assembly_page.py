@@ -129,8 +129,6 @@ def _chapter(design: DesignWork, number: int, mark: str) -> str:
     """Return the chapter on one design, with ids that no other chapter has."""
     page: dict[str, Any] = context(design.work)
     page["shapes"] = definitions(pattern_regions(design.work.laminate))
-    # The sheet goes round its tube when the assembly is put together.
-    page["wrapping"] = []
     html = (
         environment(HERE)
         .get_template(CHAPTER)

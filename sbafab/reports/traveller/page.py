@@ -25,7 +25,6 @@ from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import acceptance, base_plate, bench, bill, panel, process, units
-from sbafab.reports.traveller.acceptance import wrapping
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import HERE, Job, Work, frame
@@ -103,12 +102,8 @@ def context(work: Work) -> dict[str, Any]:
         **process.every_step(work),
         "step_pages": process.step_pages(work),
         "joint_pages": joint_pages(work),
-        "finishing": acceptance.finishing(work),
-        "tubing": acceptance.tubing(work),
-        "leak_test": acceptance.leak_test(work),
-        "wrapping": wrapping(work),
-        "leak_words": acceptance.leak_words(work),
-        "proof_words": acceptance.proof_words(work),
+        "cut_free": (),
+        **acceptance.values(work),
         "times": bill.times(work),
         "total_time": bill.total_time(work),
         "castings": (),

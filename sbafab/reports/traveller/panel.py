@@ -13,7 +13,7 @@ from sbafab.laminate.films import ink
 from sbafab.laminate.laminate import Laminate, Layer, Pin, SheetPanel
 from sbafab.pressing.schedule import joined_words
 from sbafab.reports import drawing as draw
-from sbafab.reports.traveller import acceptance, bench, process, units
+from sbafab.reports.traveller import bench, process, units
 from sbafab.reports.traveller.bill import (
     PAPER_MINUTES,
     Cut,
@@ -48,9 +48,7 @@ def chapter(work: Work) -> dict[str, Any]:
         "panel_pictures": _pictures(work.laminate, panel),
         "panel_actions": _preparing(work, panel),
         "step_pages": _step_pages(work, panel),
-        "finishing": _cut_free(panel),
-        "tubing": [*_each(panel, "Fit the tubes"), *acceptance.tubing(work)],
-        "leak_test": [*_each(panel, "Test"), *acceptance.leak_test(work)],
+        "cut_free": _cut_free(panel),
         "bill": _bill(work, panel),
         "cuts": _cuts(work, panel),
         "times": _times(work, panel),
@@ -206,16 +204,6 @@ def _cut_free(panel: SheetPanel) -> list[Action]:
         Action("Look through every lumen and into every tab: no scrap may be left in either."),
         Action("Leave the masks in their pockets."),
     ]
-
-
-def _each(panel: SheetPanel, task: str) -> list[Action]:
-    """Return a task done for each actuator of a batch, with a box for each; empty for one."""
-    count = len(panel.places)
-    if count == 1:
-        return []
-    numbers = tuple(str(number) for number in range(1, count + 1))
-    text = f"{task} one actuator after the other, numbered by its place in the sheet, row by row:"
-    return [Action(text, (), numbers)]
 
 
 def _bill(work: Work, panel: SheetPanel) -> list[Item]:
