@@ -68,9 +68,8 @@ def test_the_tip_is_pulled_by_hand(seen: Watched) -> None:
     box = seen.page.locator("#view-motion canvas").bounding_box()
     assert box is not None
     at = seen.page.evaluate(
-        """() => { const m = studio.motion, { camera, controls } = m.stage;
-        const v = controls.target.clone().set(...m.pose.origins.at(-1)).project(camera);
-        return [(v.x + 1) / 2, (1 - v.y) / 2]; }"""
+        """() => { const m = studio.motion, [x, y] = m.stage.camera.seen(m.pose.origins.at(-1));
+        return [(x + 1) / 2, (1 - y) / 2]; }"""
     )
     x, y = box["x"] + at[0] * box["width"], box["y"] + at[1] * box["height"]
     seen.page.mouse.move(x, y)

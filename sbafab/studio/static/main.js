@@ -19,6 +19,7 @@ import { PartsMotion } from "./parts_motion.js";
 import { PartsCompare } from "./parts_compare.js";
 import { goBack } from "./assembly_form.js";
 import { Dialogs } from "./dialogs.js";
+import { onLoss } from "./graphics.js";
 
 let studio, views, dialogs;
 const upper = {};
@@ -43,7 +44,11 @@ async function start() {
   new Editor(studio);
   views = { solid: new Solid(studio), layers: new Layers(studio), draw: new Draw(studio), nets: new Nets(studio), motion: new Motion(studio), parts: new PartsSolid(studio), plan: new PartsPlan(studio), swing: new PartsMotion(studio), make: new Make(studio), compare: new Compare(studio), beside: new PartsCompare(studio) };
   studio.motion = views.motion;
-  Object.assign(studio, { drawing: views.draw, netMap: views.nets });
+  Object.assign(studio, { drawing: views.draw, netMap: views.nets, solid: views.solid });
+  onLoss((lost) => {
+    if (lost) notice("The graphics driver stopped: pictures in space stand still until it is back.", true, [["Reload the page", () => location.reload()]], "graphics");
+    else if ($("#notice").dataset.kind === "graphics") $("#notice").hidden = true;
+  });
   studio.moving = () => !views.motion.element.hidden || views.swing.moving;
   const section = new Section(studio);
   $("#lower-stage").append(section.element);
@@ -297,12 +302,12 @@ function theme(name) {
   document.documentElement.dataset.theme = name;
   remember("sbafab-theme", name);
 }
-export function notice(words, bad = false, choices = []) {
+// What asks stays until it is answered; what only tells of a failure goes with it.
+export function notice(words, bad = false, choices = [], kind = bad && !choices.length ? "bad" : "") {
   const bar = $("#notice"), close = () => { bar.hidden = true; };
-  // What asks stays until it is answered; what only tells of a failure goes with it.
-  bar.dataset.kind = bad && !choices.length ? "bad" : "";
+  bar.dataset.kind = kind;
   bar.classList.toggle("bad", bad);
-  bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { id: "low", class: "quiet", "aria-label": "Close", onclick: close }, "×"));
+  bar.replaceChildren(el("span", {}, words), ...choices.map(([label, does]) => el("button", { onclick: () => { close(); does(); } }, label)), el("button", { class: "quiet", "aria-label": "Close", onclick: close }, "×"));
   bar.hidden = false;
 }
 export { css, download, svgBlob };

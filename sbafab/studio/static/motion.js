@@ -1,10 +1,13 @@
 // The actuator under pressure: poses from the fast stack, drawn as they come.
-import { css, el, plain } from "./dom.js";
+import { el, plain } from "./dom.js";
 import { Balloons } from "./balloons.js";
+import { PLAIN, tone } from "./graphics.js";
+import { Mesh, cylinder, turned } from "./meshes.js";
 import { COARSE, FINE, chart, measured, meshOf } from "./motion_drawing.js";
 import { Playing, PoseView, angleAt } from "./play_loop.js";
 import { listen, tab } from "./server.js";
-import { Stage3D, THREE } from "./stage3d.js";
+import { Box, HERE, add, cross, distance, placement, scaled, shifted, unit } from "./space.js";
+import { Stage3D } from "./stage3d.js";
 
 const PER_MM = 0.003;
 
@@ -17,14 +20,13 @@ export class Motion extends PoseView {
     this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side));
     this.trace = [];
     this.build();
-    try { this.stage = new Stage3D(this.surface, { up: 10 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The figures beside it are complete."));
-    }
+    this.stage = Stage3D.on(this.surface, { up: 10, things: () => this.things() }, "The figures beside it are complete.");
     this.mesh = meshOf(this.stage?.software ? COARSE : FINE);
-    if (this.stage) this.scene();
+    this.balloons = new Balloons(this.mesh);
+    if (this.stage) this.grab();
     studio.on("laminate", () => { this.stack = null; if (!this.element.hidden) this.load(); });
     studio.on("opened", () => { this.fitted = false; });
-    studio.on("theme", () => { if (this.stage) { this.stage.repaint(); this.colours(); } this.plots(); });
+    studio.on("theme", () => { if (this.stage && this.stack) { this.shape(); if (this.pose) this.draw(); } this.plots(); });
   }
   show() { this.stage?.resize(); if (!this.stack) this.load(); }
 
@@ -73,7 +75,7 @@ export class Motion extends PoseView {
     this.sliders = [];
     this.values.replaceChildren();
     this.plot.replaceChildren();
-    this.body?.clear();
+    this.balloons.clear();
     this.stage?.draw();
     this.say(message, true);
   }
@@ -172,82 +174,60 @@ export class Motion extends PoseView {
     this.plot.replaceChildren(el("h3", {}, "From 0 to these pressures"), chart(this.way.pressure, this.way.height, p, this.pose.height, "Height, mm"), chart(this.way.pressure, this.way.bend, p, this.pose.bend, "Bend, °"), chart(this.way.pressure, this.way.volume, p, this.pose.volumes.reduce((sum, one) => sum + one, 0), "Volume, µl"));
   }
 
-  scene() {
-    this.body = new Balloons(this.mesh);
-    this.base = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial());
-    this.base.rotation.x = Math.PI / 2;
-    this.plate = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 64), new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.35 }));
-    this.plate.rotation.x = Math.PI / 2;
-    this.arrow = new THREE.ArrowHelper(new THREE.Vector3(1, 0, 0), new THREE.Vector3(), 1, 0xd6336c, 1.2, 0.7);
-    this.arrow.visible = this.plate.visible = false;
-    this.trail = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ transparent: true, opacity: 0.7 }));
-    this.trail.frustumCulled = false;
-    this.stage.scene.add(this.body.group, this.base, this.plate, this.arrow, this.trail);
-    this.colours();
-    this.grab();
-  }
-  colours() {
-    this.base.material.color.set(css("--strong"));
-    this.plate.material.color.set(css("--accent"));
-    this.arrow.setColor(css("--select"));
-    this.trail.material.color.set(css("--select"));
-    if (this.stack) { this.shape(); if (this.pose) this.draw(); }
+  // The balloons on their base, and what acts on them: a plate, a pull, and the way that the tip has gone.
+  things() {
+    const { pose, plated, pull } = this;
+    if (!pose || !this.balloons.film) return [];
+    const tip = pose.origins.at(-1), select = tone("--select");
+    return [...this.balloons.things(HERE), { mesh: this.base, side: 1, tint: tone("--strong") },
+      plated && { mesh: this.plate, place: shifted([0, 0, Number(this.plateHeight.value) + 0.1]), side: 1, tint: tone("--accent"), opacity: 0.35 },
+      ...(pull ? arrow(tip, scaled(pull, 1 / PER_MM)).map((part) => ({ ...part, look: PLAIN, tint: select })) : []),
+      { mesh: this.trail, tint: select, opacity: 0.7 }];
   }
   shape() {
     const { stack, studio: { laminate } } = this;
     const walls = Object.values(laminate.patterns).filter(({ layers }) => laminate.layers[layers[0] - 1].role === "wall");
     const wall = walls.sort((a, b) => b.layers.length - a.layers.length)[0];
-    this.body.shape(stack, { wall: wall && this.studio.shape(wall.shape), lumen: laminate.lumen });
-    this.base.scale.set(stack.outline * 1.12, 0.6, stack.outline * 1.12);
-    this.base.position.z = -0.32;
-    this.plate.scale.set(stack.outline * 1.6, 0.15, stack.outline * 1.6);
+    this.balloons.shape(stack, { wall: wall && this.studio.shape(wall.shape), lumen: laminate.lumen });
+    this.base = cylinder(stack.outline * 1.12, -0.62, -0.02);
+    this.plate = cylinder(stack.outline * 1.6, -0.075, 0.075);
     this.tips = [];
+    this.trail = new Mesh([], null, { joined: true });
   }
   draw() {
     const { pose, stack } = this;
-    this.body.draw(pose);
-    const tip = pose.origins.at(-1);
-    this.tips.push(...tip);
+    this.balloons.draw(pose);
+    this.tips.push(...pose.origins.at(-1));
     if (this.tips.length > 900) this.tips.splice(0, 3);
-    this.trail.geometry.dispose();
-    this.trail.geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(this.tips, 3));
-    this.plate.visible = Boolean(this.plated);
-    this.plate.position.z = Number(this.plateHeight.value) + 0.1;
-    this.arrow.visible = Boolean(this.pull);
-    if (this.pull) {
-      const way = new THREE.Vector3(...this.pull);
-      this.arrow.position.set(...tip);
-      this.arrow.setLength(Math.max(0.01, way.length() / PER_MM), 1.2, 0.7);
-      this.arrow.setDirection(way.normalize());
-    }
+    this.trail.points = new Float32Array(this.tips);
+    this.trail.version++;
     if (!this.fitted) {
       const tall = Math.max(14, stack.levels.length * 1.9), wide = stack.outline * 1.5;
       this.stage.touched = false;
-      this.stage.fit(new THREE.Box3(new THREE.Vector3(-wide, -wide, -1), new THREE.Vector3(wide, wide, tall)));
+      this.stage.fit(new Box([-wide, -wide, -1], [wide, wide, tall]));
       this.fitted = true;
     }
-    this.surface.firstChild.setAttribute("aria-label", `Actuator, ${pose.height.toFixed(2)} mm high, bent ${pose.bend.toFixed(1)} degrees`);
+    this.stage.canvas.setAttribute("aria-label", `Actuator, ${pose.height.toFixed(2)} mm high, bent ${pose.bend.toFixed(1)} degrees`);
     this.stage.draw();
   }
   // Hold the top and pull: a force on the tip along the way of the hand, gone when it lets go.
   grab() {
-    const canvas = this.surface.firstChild;
+    const { canvas, camera } = this.stage;
     canvas.addEventListener("pointerdown", (down) => {
       if (!this.pose || down.button) return;
-      const tip = new THREE.Vector3(...this.pose.origins.at(-1));
-      const seen = tip.clone().project(this.stage.camera), box = canvas.getBoundingClientRect();
-      const away = Math.hypot(((seen.x + 1) / 2) * box.width + box.left - down.clientX, ((1 - seen.y) / 2) * box.height + box.top - down.clientY);
-      const scale = this.stage.camera.position.distanceTo(tip) * 2 * Math.tan((this.stage.camera.fov * Math.PI) / 360) / box.height;
+      const tip = this.pose.origins.at(-1), [x, y] = camera.seen(tip), box = canvas.getBoundingClientRect();
+      const away = Math.hypot(((x + 1) / 2) * box.width + box.left - down.clientX, ((1 - y) / 2) * box.height + box.top - down.clientY);
+      const scale = (distance(camera.eye, tip) * 2 * camera.half[1]) / box.height;
       if (away * scale > this.stack.outline * 0.8) return;
-      this.stage.controls.enabled = false;
+      // The camera stays where it is.
+      down.preventDefault();
       canvas.setPointerCapture(down.pointerId);
-      const right = new THREE.Vector3().setFromMatrixColumn(this.stage.camera.matrixWorld, 0), up = new THREE.Vector3().setFromMatrixColumn(this.stage.camera.matrixWorld, 1);
+      const [right, up] = camera.ways;
       const move = (event) => {
-        const way = right.clone().multiplyScalar((event.clientX - down.clientX) * scale).addScaledVector(up, (down.clientY - event.clientY) * scale);
-        this.pull = way.multiplyScalar(PER_MM).toArray();
+        this.pull = scaled(add(scaled(right, event.clientX - down.clientX), up, down.clientY - event.clientY), scale * PER_MM);
         this.want();
       };
-      const end = () => { canvas.removeEventListener("pointermove", move); this.stage.controls.enabled = true; this.pull = null; this.want(); };
+      const end = () => { canvas.removeEventListener("pointermove", move); this.pull = null; this.want(); };
       canvas.addEventListener("pointermove", move);
       canvas.addEventListener("pointerup", end, { once: true });
       canvas.addEventListener("pointercancel", end, { once: true });
@@ -263,4 +243,11 @@ export class Motion extends PoseView {
     };
   }
   picture() { return this.stage.picture("motion.png"); }
+}
+
+// From a place along a way: a line, and a head of 1.2 by 0.7 mm at its end.
+const HEAD = turned([[0, -1.2], [0.35, -1.2], [0, 0]], 12);
+function arrow(from, way) {
+  const end = add(from, way), to = unit(way), aside = unit(cross(to, Math.abs(to[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0])), ways = [aside, cross(to, aside), to];
+  return [{ mesh: new Mesh([...from, ...end]) }, { mesh: HEAD, place: placement([0, 1, 2].map((i) => ways.map((one) => one[i])), end) }];
 }

@@ -1,10 +1,13 @@
 // An assembly under pressure: every actuator by its own fast stack, and what stands on its top goes along.
 import { Balloons } from "./balloons.js";
-import { css, el, plain } from "./dom.js";
+import { el, plain } from "./dom.js";
+import { tone } from "./graphics.js";
+import { turned } from "./meshes.js";
 import { COARSE, FINE, measured, meshOf } from "./motion_drawing.js";
-import { PartMeshes, THREE, geometryOf, paintOf } from "./parts_scene.js";
+import { PartMeshes, geometryOf, paintOf } from "./parts_scene.js";
 import { Playing, PoseView, angleAt } from "./play_loop.js";
 import { listen, tab } from "./server.js";
+import { HERE, back, placed, placement, raised, times } from "./space.js";
 import { Stage3D } from "./stage3d.js";
 
 // ms after which parts that no hand moves are at rest.
@@ -26,19 +29,13 @@ export class PartsMotion extends PoseView {
     this.element = el("div", { class: "view" }, el("div", { class: "motion" }, this.surface, this.side), el("div", { class: "stale-mark" }, "Updating"));
     Object.assign(this, { movers: new Map(), kept: new Map() });
     this.build();
-    try { this.stage = new Stage3D(this.surface, { up: 16 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The figures beside it are complete."));
-    }
-    if (this.stage) {
-      this.mesh = meshOf(this.stage.software ? COARSE : FINE);
-      this.meshes = new PartMeshes(studio);
-      this.bodies = new THREE.Group();
-      this.stage.scene.add(this.meshes.group, this.bodies);
-    }
+    this.meshes = new PartMeshes(studio);
+    this.stage = Stage3D.on(this.surface, { up: 16, things: () => [...this.meshes.things, ...this.bodies()] }, "The figures beside it are complete.");
+    this.mesh = meshOf(this.stage?.software ? COARSE : FINE);
     studio.on("parts", () => { this.text = null; if (!this.element.hidden) this.load(); });
     studio.on("opened", () => { this.kept.clear(); this.fitted = false; });
     studio.on("part", () => { if (this.stage && this.text) { this.meshes.paint(); this.stage.draw(); } });
-    studio.on("theme", () => { if (this.stage) { this.stage.repaint(); if (this.text) { this.meshes.paint(); this.shape(); this.draw(); } } });
+    studio.on("theme", () => { if (this.stage && this.text) { this.meshes.paint(); this.shape(); this.draw(); } });
   }
   // Whether a hand moves it, so that what takes seconds waits.
   get moving() { return !this.element.hidden && performance.now() - (this.moved ?? -RESTS) < RESTS; }
@@ -117,7 +114,7 @@ export class PartsMotion extends PoseView {
     this.values.replaceChildren(...[...this.movers.values()].flatMap((mover) => [el("h4", {}, mover.part), el("dl", { class: "reading" }, ...rows(mover, this.pressures(mover)).flatMap(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])), mover.is === "stack" && mover.pose ? el("p", { class: "more" }, measured(mover)) : ""]));
     const leaning = [...this.movers.values()].find(({ pose }) => pose && !pose.stable);
     this.say(leaning ? `${leaning.part} is unstable as a straight column: it would buckle` : this.trusted(), Boolean(leaning));
-    this.surface.firstChild?.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);
+    this.stage?.canvas.setAttribute("aria-label", `Assembly in motion: ${[...this.movers.values()].flatMap((mover) => rows(mover, this.pressures(mover)).slice(0, 2).map(([name, value]) => `${mover.part} ${name.toLowerCase()} ${value}`)).join(", ")}`);
   }
 
   trusted() {
@@ -127,54 +124,49 @@ export class PartsMotion extends PoseView {
 
   // What is drawn of each mover: balloons that a pose shapes, or a grip's, and the lumen round it.
   shape() {
-    this.bodies.clear();
     for (const mover of this.movers.values()) {
-      const part = this.studio.parts.find(({ name }) => name === mover.part), tone = paintOf(part, this.studio.parts);
+      const part = this.studio.parts.find(({ name }) => name === mover.part), paint = paintOf(part, this.studio.parts);
       if (mover.is === "stack") {
         mover.drawn = new Balloons(this.mesh);
-        mover.drawn.shape(mover, { wall: mover.wall, lumen: mover.lumen, tone });
-        this.bodies.add(mover.drawn.group);
-        const [a, b, c] = mover.frame;
-        mover.place = new THREE.Matrix4().set(...a, ...b, ...c, 0, 0, 0, 1);
+        mover.drawn.shape(mover, { wall: mover.wall, lumen: mover.lumen, paint });
+        mover.place = placement(mover.frame, mover.frame.map((row) => row[3]));
       } else if (mover.is === "grip") {
-        const { solid, lines } = geometryOf(`grip:${mover.part}:${this.text}`, mover.surface);
-        mover.body = new THREE.Group();
-        mover.body.matrixAutoUpdate = false;
-        mover.full = new THREE.Mesh(solid, new THREE.MeshLambertMaterial({ color: css(tone), side: THREE.DoubleSide }));
-        mover.full.add(new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: css("--part-ink") })));
-        mover.body.add(mover.full, ...(mover.lumen ? [lumenOf(mover, solid)] : []));
-        this.bodies.add(mover.body);
+        const { solid, edges } = geometryOf(`grip:${mover.part}:${this.text}`, mover.surface);
+        mover.full = { mesh: solid, edges, tint: tone(paint), ink: tone("--part-ink") };
+        mover.lumenWall = mover.lumen ? { mesh: wallOf(mover, solid.box), tint: tone("--accent"), opacity: 0.16 } : null;
       }
     }
   }
+  bodies() {
+    return [...this.movers.values()].flatMap(({ pose, drawn, full, lumenWall, at = HERE, ...mover }) => {
+      if (drawn) return pose ? drawn.things(times(at, mover.place)) : [];
+      return full ? [this.pressures(mover)[0] > 0 && { ...full, place: at }, lumenWall && { ...lumenWall, place: at }] : [];
+    });
+  }
   draw() {
     const moved = new Map();
-    for (const holder of this.meshes.group.children) {
-      const { part, place } = holder.userData, below = moved.get(part.on), mover = this.movers.get(part.name);
-      const move = (below?.move ?? new THREE.Matrix4()).clone();
-      if (below?.lift && part.at === "top") move.multiply(below.lift);
-      holder.matrix.multiplyMatrices(move, place);
-      holder.matrixWorldNeedsUpdate = true;
-      holder.visible = !(mover?.pose && mover.drawn) && !(part.kind === "line" && part.at === "lumen" && below?.lift);
+    for (const body of this.meshes.bodies) {
+      const { part, own } = body, below = moved.get(part.on), mover = this.movers.get(part.name);
+      const isMoving = Boolean(mover?.pose && mover.drawn), move = below?.lift && part.at === "top" ? times(below.move, below.lift) : below?.move ?? HERE;
+      body.place = times(move, own);
+      body.hidden = isMoving || (part.kind === "line" && part.at === "lumen" && Boolean(below?.lift));
       let lift = null;
-      if (mover?.pose && mover.drawn) {
+      if (isMoving) {
         mover.drawn.draw(mover.pose);
-        mover.drawn.group.matrix.multiplyMatrices(move, mover.place);
-        lift = mover.place.clone().multiply(tipOf(mover.pose)).multiply(new THREE.Matrix4().makeTranslation(0, 0, -mover.flat_height)).multiply(mover.place.clone().invert());
+        lift = times(mover.place, tipOf(mover.pose), raised(-mover.flat_height), back(mover.place));
       }
-      if (mover?.body) { mover.body.matrix.copy(holder.matrix); mover.full.visible = this.pressures(mover)[0] > 0; }
+      if (mover) mover.at = isMoving ? move : body.place;
       moved.set(part.name, { move, lift });
     }
-    this.bodies.updateMatrixWorld(true);
     if (!this.fitted && [...this.movers.values()].every(({ drawn, pose }) => !drawn || pose)) { this.stage.fit(this.reach()); this.fitted = true; }
     this.stage.draw();
   }
   // All that the parts may come to, so that the camera need not follow.
   reach() {
     const box = this.meshes.box();
-    for (const { drawn, place, outline, levels, body } of this.movers.values()) {
-      if (body) box.expandByObject(body);
-      if (drawn) for (const [x, y, z] of [[-1, -1, 1], [1, 1, 1]]) box.expandByPoint(new THREE.Vector3(1.5 * outline * x, 1.5 * outline * y, Math.max(8, 1.5 * levels.length) * z).applyMatrix4(place));
+    for (const { drawn, place, outline, levels, full, lumenWall, at } of this.movers.values()) {
+      for (const one of [full, lumenWall]) for (const corner of one?.mesh.box.corners ?? []) box.grow(placed(at, corner));
+      if (drawn) for (const [x, y, z] of [[-1, -1, 1], [1, 1, 1]]) box.grow(placed(place, [1.5 * outline * x, 1.5 * outline * y, Math.max(8, 1.5 * levels.length) * z]));
     }
     return box;
   }
@@ -199,13 +191,8 @@ function rows(mover, pressures) {
 }
 // Where the last plate stands: its frame in the actuator's own.
 function tipOf(pose) {
-  const [x, y, z] = pose.origins.at(-1), a = pose.axes.at(-1);
-  return new THREE.Matrix4().set(a[0], a[1], a[2], x, a[3], a[4], a[5], y, a[6], a[7], a[8], z, 0, 0, 0, 1);
+  const a = pose.axes.at(-1);
+  return placement([a.slice(0, 3), a.slice(3, 6), a.slice(6, 9)], pose.origins.at(-1));
 }
-function lumenOf({ lumen }, solid) {
-  const { min, max } = solid.boundingBox, long = 1.5 * (max.z - min.z);
-  const wall = new THREE.Mesh(new THREE.CylinderGeometry(lumen / 2, lumen / 2, long, 64, 1, true), new THREE.MeshLambertMaterial({ color: css("--accent"), transparent: true, opacity: 0.16, side: THREE.DoubleSide, depthWrite: false }));
-  wall.rotation.x = Math.PI / 2;
-  wall.position.z = (min.z + max.z) / 2;
-  return wall;
-}
+// The wall of a lumen, half as long again as what grips it.
+function wallOf({ lumen }, { middle: [, , z], size: [, , long] }) { return turned([[lumen / 2, z - 0.75 * long], [lumen / 2, z + 0.75 * long]]); }

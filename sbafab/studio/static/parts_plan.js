@@ -2,35 +2,26 @@
 import { el, plain } from "./dom.js";
 import { PanZoom, niceBar } from "./panzoom.js";
 import { along, check, spread, text } from "./layers.js";
-import { PartMeshes, THREE, paintOf, partWords } from "./parts_scene.js";
+import { PartMeshes, paintOf, partWords } from "./parts_scene.js";
 import { areaOf, contoursOf } from "./parts_section.js";
 import { partsList, sizeWords } from "./parts_solid.js";
-import { css } from "./dom.js";
+import { Painter, lightsOf } from "./graphics.js";
+import { Camera, add, cross, scaled } from "./space.js";
 
-// Which axes lie across and up, from where one looks, and along which axis.
+// Which axes lie across and up (0 is x), from where one looks, and the way that is up.
 export const WAYS = {
-  Top: { across: "x", up: "y", from: [0, 0, 1], head: [0, 1, 0] },
-  Front: { across: "x", up: "z", from: [0, -1, 0], head: [0, 0, 1] },
-  Side: { across: "y", up: "z", from: [1, 0, 0], head: [0, 0, 1] },
+  Top: { across: 0, up: 1, from: [0, 0, 1], head: [0, 1, 0] },
+  Front: { across: 0, up: 2, from: [0, -1, 0], head: [0, 0, 1] },
+  Side: { across: 1, up: 2, from: [1, 0, 0], head: [0, 0, 1] },
 };
+const FAR = 1500;
 
-// An orthographic camera where an eye is, square on to the assembly.
-export function aim(camera, way, eye, box) {
-  const { across, up, from, head } = WAYS[way], middle = box.isEmpty() ? new THREE.Vector3() : box.getCenter(new THREE.Vector3());
-  middle[across] = eye.x;
-  middle[up] = eye.y;
-  const w = eye.width / eye.scale / 2, h = eye.height / eye.scale / 2;
-  Object.assign(camera, { left: -w, right: w, top: h, bottom: -h, near: 1, far: 3000 });
-  camera.up.set(...head);
-  camera.position.set(...from).multiplyScalar(1500).add(middle);
-  camera.lookAt(middle);
-  camera.updateProjectionMatrix();
-  camera.updateMatrixWorld();
-}
-// The light comes over the left shoulder, so that faces that lean are told from flat ones.
-export function lightOf(light, way) {
-  const from = new THREE.Vector3(...WAYS[way].from), head = new THREE.Vector3(...WAYS[way].head);
-  light.position.copy(from).multiplyScalar(2).add(head).addScaledVector(head.clone().cross(from), -0.7);
+// A camera without perspective where an eye is, square on to the assembly, and its light over the left shoulder, so that faces that lean are told from flat ones.
+export function aimed(way, eye, box) {
+  const { across, up, from, head } = WAYS[way], target = [...box.middle];
+  [target[across], target[up]] = [eye.x, eye.y];
+  const camera = new Camera({ eye: add(target, from, FAR), target, up: head, half: [eye.width / eye.scale / 2, eye.height / eye.scale / 2], near: 1, far: 2 * FAR });
+  return { camera, lights: lightsOf(1.9, "#c8ced6", { from: add(add(scaled(from, 2), head), cross(head, from), -0.7), strength: 1.6 }) };
 }
 
 export class PartsPlan {
@@ -50,19 +41,11 @@ export class PartsPlan {
       el("div", { class: "tools" }, this.sizes.label, this.opened, this.depth, this.depthOut, el("button", { onclick: () => { this.eye.touched = false; this.eye.fit(); } }, "Fit")),
       el("div", { class: "tools right-top", role: "group", "aria-label": "Seen from" }, ...this.buttons),
       el("div", { class: "stale-mark" }, "Updating"));
-    try { this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide."));
-      return;
-    }
-    this.renderer.localClippingEnabled = true;
-    this.canvas = this.renderer.domElement;
-    this.canvas.setAttribute("aria-hidden", "true");
-    this.surface.append(this.canvas, this.svg);
-    this.scene = new THREE.Scene();
+    this.painter = Painter.on(this.surface, { "aria-hidden": "true" }, () => this.draw(), "The parts and rules are listed beside it.");
+    if (!this.painter) return;
+    this.surface.append(this.svg);
     this.meshes = new PartMeshes(studio);
-    this.camera = new THREE.OrthographicCamera();
-    this.light = new THREE.DirectionalLight(0xffffff, 1.6);
-    this.scene.add(this.meshes.group, new THREE.HemisphereLight(0xffffff, 0xc8ced6, 1.9), this.light);
+    this.box = this.meshes.box();
     this.eye = new PanZoom(this.surface, () => this.draw());
     this.surface.addEventListener("pointermove", (event) => { if (!event.buttons) this.point(event); });
     this.surface.addEventListener("pointerleave", () => studio.hover(null));
@@ -72,7 +55,7 @@ export class PartsPlan {
     studio.on("opened", () => { this.eye.touched = false; });
   }
   show() {
-    if (!this.renderer) return;
+    if (!this.painter) return;
     if (this.behind) this.update();
     this.eye.touched ? this.draw() : this.eye.fit();
   }
@@ -88,33 +71,33 @@ export class PartsPlan {
     this.isCut = on;
     this.opened.setAttribute("aria-pressed", String(on));
     this.depth.disabled = !on;
-    if (on && this.box && !this.box.isEmpty()) {
+    if (on && !this.box.empty) {
       const { near, far } = this.range(), share = (0 - near) / (far - near);
       this.depth.value = share > 0.25 && share < 0.75 ? 100 * share : 50;
     }
     this.cut();
   }
   range() {
-    const { from } = WAYS[this.way], axis = ["x", "y", "z"].find((_, i) => from[i]), way = from["xyz".indexOf(axis)];
+    const { from } = WAYS[this.way], axis = from.findIndex(Boolean), way = from[axis];
     const [near, far] = way > 0 ? [this.box.max[axis], this.box.min[axis]] : [this.box.min[axis], this.box.max[axis]];
     return { axis, way, near, far };
   }
   cut() {
-    this.meshes.planes = [];
+    this.meshes.plane = null;
     this.loops = [];
     this.depthOut.textContent = "";
-    if (this.isCut && this.box && !this.box.isEmpty()) {
+    if (this.isCut && !this.box.empty) {
       const { axis, way, near, far } = this.range(), value = near + (this.depth.value / 100) * (far - near);
-      const normal = new THREE.Vector3(...WAYS[this.way].from).negate(), { across, up } = WAYS[this.way];
-      this.meshes.planes = [new THREE.Plane(normal, way * value)];
-      this.loops = this.meshes.group.children.map((holder) => ({ part: holder.userData.part, loops: contoursOf(holder, axis, value, across, up) })).filter(({ loops }) => loops.length);
-      this.depthOut.textContent = `${axis} ${plain(value, 1)}`;
+      const { across, up, from } = WAYS[this.way];
+      this.meshes.plane = [...scaled(from, -1), way * value];
+      this.loops = this.meshes.bodies.map((body) => ({ part: body.part, loops: contoursOf(body, axis, value, across, up) })).filter(({ loops }) => loops.length);
+      this.depthOut.textContent = `${"xyz"[axis]} ${plain(value, 1)}`;
     }
     this.meshes.paint();
     this.frame();
   }
   update() {
-    if (!this.renderer) return;
+    if (!this.painter) return;
     this.behind = this.element.hidden;
     if (this.behind) return;
     this.meshes.update();
@@ -123,36 +106,26 @@ export class PartsPlan {
   }
   frame() {
     const { across, up } = WAYS[this.way], box = (this.box = this.meshes.box());
-    if (box.isEmpty()) { this.draw(); return; }
-    aim(this.camera, this.way, this.eye, box);
-    this.anchors = this.meshes.group.children.map((holder) => this.anchor(holder));
+    if (box.empty) { this.draw(); return; }
+    this.anchors = this.meshes.bodies.map((body) => this.anchor(body));
     this.eye.bounds([box.min[across], box.min[up], box.max[across], box.max[up]], [56, 150, 92, 70]);
     this.draw();
   }
   // A place at which a part is seen, from its right end on; its middle where others hide it.
-  anchor(holder) {
-    const { across, up } = WAYS[this.way], { part } = holder.userData, box = this.meshes.boxOf(holder), ray = new THREE.Raycaster();
-    const at = (s, t) => [box.min[across] + s * (box.max[across] - box.min[across]), box.min[up] + t * (box.max[up] - box.min[up])];
+  anchor(body) {
+    const { across, up, from } = WAYS[this.way], { part } = body, { min, size } = this.meshes.boxOf(body);
+    const at = (s, t) => [min[across] + s * size[across], min[up] + t * size[up]];
     for (const s of [0.94, 0.8, 0.6]) for (const t of [0.5, 0.86, 0.14]) {
-      const [u, v] = at(s, t), from = new THREE.Vector3(...WAYS[this.way].from);
-      const origin = from.clone().multiplyScalar(1500);
-      origin[across] = u;
-      origin[up] = v;
-      ray.set(origin, from.negate());
-      if (this.meshes.under(ray) === part) return { part, place: [u, v], hidden: false };
+      const start = scaled(from, FAR), place = at(s, t);
+      [start[across], start[up]] = place;
+      if (this.meshes.under({ from: start, way: scaled(from, -1) }) === part) return { part, place, hidden: false };
     }
     return { part, place: at(0.5, 0.5), hidden: true };
   }
   draw() {
-    const { eye, canvas, studio } = this, width = eye.width, height = eye.height;
-    if (!width || !height || !this.box) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
-    this.renderer.setSize(width, height, false);
-    Object.assign(canvas.style, { width: "100%", height: "100%" });
-    this.renderer.setClearColor(css("--canvas"));
-    aim(this.camera, this.way, eye, this.box);
-    lightOf(this.light, this.way);
-    this.renderer.render(this.scene, this.camera);
+    const { eye, studio } = this;
+    if (!eye.width || !eye.height) return;
+    this.painter.paint({ things: this.meshes.things, ...aimed(this.way, eye, this.box) });
     this.svg.replaceChildren(...(studio.parts ? this.faces() : []), ...(studio.parts && this.sizes.box.checked ? [...this.overall(), ...this.names()] : []), ...this.scale());
     this.svg.setAttribute("aria-label", this.words());
   }
@@ -162,8 +135,8 @@ export class PartsPlan {
     return (this.loops ?? []).map(({ part, loops }) => el("path", { d: loops.map((loop) => `M${loop.map(([u, v]) => this.eye.px(u, v).map((n) => n.toFixed(2)).join(" ")).join("L")}Z`).join(""), fill: `var(${pickedParts.includes(part.name) ? "--select" : paintOf(part, parts)})`, "fill-rule": "evenodd", stroke: "var(--ink)", "stroke-width": 1.2, class: "cut-face", "data-part": part.name }));
   }
   words() {
-    const { across, up } = WAYS[this.way], size = this.box.isEmpty() ? null : this.box.getSize(new THREE.Vector3());
-    return `Assembly of ${this.studio.parts?.length ?? 0} parts from the ${this.way.toLowerCase()}${this.isCut ? ` cut at ${this.depthOut.textContent} mm (${this.loops.map(({ part, loops }) => `${part.name} ${plain(areaOf(loops), 1)} mm²`).join(", ")})` : ""}${size ? `, ${plain(size[across], 2)} by ${plain(size[up], 2)} mm` : ""}`;
+    const { across, up } = WAYS[this.way], { size } = this.box;
+    return `Assembly of ${this.studio.parts?.length ?? 0} parts from the ${this.way.toLowerCase()}${this.isCut ? ` cut at ${this.depthOut.textContent} mm (${this.loops.map(({ part, loops }) => `${part.name} ${plain(areaOf(loops), 1)} mm²`).join(", ")})` : ""}${this.studio.parts?.length ? `, ${plain(size[across], 2)} by ${plain(size[up], 2)} mm` : ""}`;
   }
   overall() {
     const { eye, box } = this, { across, up } = WAYS[this.way];
@@ -182,19 +155,15 @@ export class PartsPlan {
     const step = niceBar(this.eye.scale), w = step * this.eye.scale, x = this.eye.width - w - 14, y = this.eye.height - (this.eye.width < 560 ? 66 : 16);
     return [el("path", { d: `M${x} ${y - 5}V${y}H${x + w}V${y - 5}`, fill: "none", stroke: "var(--soft)" }), text(`${step} mm`, x + w / 2, y - 7, "middle")];
   }
-  under(event) {
-    const box = this.surface.getBoundingClientRect(), ray = new THREE.Raycaster();
-    ray.setFromCamera(new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2), this.camera);
-    return this.meshes.under(ray);
-  }
+  under(event) { return this.meshes.under(aimed(this.way, this.eye, this.box).camera.under(event, this.surface)); }
   point(event) {
     if (!this.studio.parts) return;
     const box = this.surface.getBoundingClientRect(), [u, v] = this.eye.at(event.clientX - box.left, event.clientY - box.top);
-    const { across, up } = WAYS[this.way], part = this.under(event), where = `${across} ${plain(u, 2)}, ${up} ${plain(v, 2)} mm`;
+    const { across, up } = WAYS[this.way], part = this.under(event), where = `${"xyz"[across]} ${plain(u, 2)}, ${"xyz"[up]} ${plain(v, 2)} mm`;
     this.studio.hover(null, part ? `${partWords(part)} · ${sizeWords(this.meshes, part)} · ${where}` : where);
   }
-  async picture() {
+  picture() {
     this.draw();
-    return { name: "plan.png", blob: await new Promise((done) => this.canvas.toBlob(done)) };
+    return this.painter.picture("plan.png");
   }
 }

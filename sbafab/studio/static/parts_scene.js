@@ -1,6 +1,7 @@
 // The parts of an assembly in space: a mesh a part, each surface built once and placed as the assembly places it.
-import { THREE } from "./stage3d.js";
-import { css } from "./dom.js";
+import { PLAIN, tone } from "./graphics.js";
+import { Mesh } from "./meshes.js";
+import { Box, add, met, placement, shifted, times } from "./space.js";
 
 const CREASE = Math.cos((32 * Math.PI) / 180);
 // A face smaller than this, in mm², is a sliver whose way says nothing.
@@ -12,15 +13,9 @@ const built = new Map();
 export function geometryOf(key, surface) {
   if (built.has(key)) return built.get(key);
   const points = new Float32Array(bytes(surface.points)), faces = new Uint32Array(bytes(surface.faces));
-  const solid = new THREE.BufferGeometry();
-  solid.setAttribute("position", new THREE.BufferAttribute(points, 3));
-  solid.setIndex(new THREE.BufferAttribute(faces, 1));
-  const lines = new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(creases(points, faces), 3));
-  solid.computeBoundingBox();
-  solid.computeBoundingSphere();
-  const made = { solid, lines };
+  const made = { solid: new Mesh(points, faces), edges: new Mesh(creases(points, faces)) };
   built.set(key, made);
-  while (built.size > MOST_KEPT) { const [oldest, { solid, lines }] = built.entries().next().value; solid.dispose(); lines.dispose(); built.delete(oldest); }
+  if (built.size > MOST_KEPT) built.delete(built.keys().next().value);
   return made;
 }
 const bytes = (words) => Uint8Array.from(atob(words), (c) => c.charCodeAt(0)).buffer;
@@ -55,63 +50,41 @@ export function paintOf(part, parts) {
 }
 export const partWords = (part) => `${part.name}, ${part.design ? part.design.name : part.kind}${part.on ? `, on ${part.on} (${part.at})` : ""}`;
 
-// All parts as meshes; `inside` paints what a cut opens.
+// All parts in their places; with a `plane` they are cut, and their insides painted as what it opens.
 export class PartMeshes {
-  constructor(studio) {
-    this.studio = studio;
-    this.group = new THREE.Group();
-    this.planes = [];
-  }
+  constructor(studio) { Object.assign(this, { studio, bodies: [], plane: null }); }
   update() {
-    this.group.clear();
     const { parts, surfaces } = this.studio;
-    for (const part of parts ?? []) {
-      const { solid, lines } = geometryOf(part.surface, surfaces.get(part.surface));
-      const holder = new THREE.Group(), [a, b, c] = part.rows, [x, y, z] = part.shift;
-      holder.matrixAutoUpdate = false;
-      holder.userData = { part, place: new THREE.Matrix4().set(...a, x, ...b, y, ...c, z, 0, 0, 0, 1) };
-      holder.add(new THREE.Mesh(solid), new THREE.Mesh(solid), new THREE.LineSegments(lines));
-      this.group.add(holder);
-    }
+    this.bodies = (parts ?? []).map((part) => {
+      const { solid, edges } = geometryOf(part.surface, surfaces.get(part.surface)), own = placement(part.rows, part.shift);
+      return { part, mesh: solid, edges, own, box: Box.of(solid.points, own), side: 1 };
+    });
     this.arrange(0);
-    for (const holder of this.group.children) holder.userData.box = new THREE.Box3().setFromObject(holder.children[0], true);
     this.paint();
   }
   paint() {
-    const { parts, pickedParts, marked } = this.studio, clippingPlanes = this.planes;
-    for (const { children: [outside, inside, lines], userData: { part } } of this.group.children) {
-      const colour = css(pickedParts.includes(part.name) ? "--select" : marked?.has(part.name) ? "--ghost" : paintOf(part, parts));
-      for (const one of [outside, inside, lines]) one.material.dispose();
-      outside.material = new THREE.MeshLambertMaterial({ color: colour, flatShading: true, clippingPlanes, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 });
-      inside.material = new THREE.MeshBasicMaterial({ color: new THREE.Color(colour).multiplyScalar(0.62), side: THREE.BackSide, clippingPlanes });
-      inside.visible = clippingPlanes.length > 0;
-      lines.material = new THREE.LineBasicMaterial({ color: css("--part-ink"), clippingPlanes });
+    const { parts, pickedParts, marked } = this.studio, ink = tone("--part-ink");
+    for (const body of this.bodies) {
+      const { name } = body.part, tint = tone(pickedParts.includes(name) ? "--select" : marked?.has(name) ? "--ghost" : paintOf(body.part, parts));
+      Object.assign(body, { tint, ink, plane: this.plane ?? undefined });
     }
+  }
+  // What is drawn: outsides with their edges, and in a cut insides without light, so that they read as cut faces.
+  get things() {
+    const insides = this.plane ? this.bodies.map((body) => ({ ...body, edges: null, side: -1, look: PLAIN, tint: body.tint.map((value) => 0.62 * value) })) : [];
+    return [...this.bodies, ...insides];
   }
   // Each part away from what it is fixed on along its own axis, by a share of the whole.
   arrange(share) {
     const away = new Map();
-    for (const holder of this.group.children) {
-      const { part, place } = holder.userData;
-      const from = away.get(part.on), move = new THREE.Vector3();
-      if (from) move.copy(from).addScaledVector(new THREE.Vector3(part.rows[0][2], part.rows[1][2], part.rows[2][2]), share);
-      away.set(part.name, move);
-      holder.userData.move = move;
-      holder.matrix.copy(place).premultiply(new THREE.Matrix4().makeTranslation(move));
-      holder.matrixWorldNeedsUpdate = true;
+    for (const body of this.bodies) {
+      const { part, own } = body, from = away.get(part.on);
+      body.move = from ? add(from, part.rows.map((row) => row[2]), share) : [0, 0, 0];
+      away.set(part.name, body.move);
+      body.place = times(shifted(body.move), own);
     }
-    this.group.updateMatrixWorld(true);
   }
-  box(of = () => true) {
-    const all = new THREE.Box3();
-    for (const holder of this.group.children) if (of(holder.userData.part)) all.union(this.boxOf(holder));
-    return all;
-  }
-  boxOf({ userData: { box, move } }) { return box.clone().translate(move); }
-  under(ray) {
-    const [plane] = this.planes;
-    const hits = ray.intersectObjects(this.group.children.map(({ children }) => children[0]), false);
-    return hits.find(({ point }) => !plane || plane.distanceToPoint(point) >= -1e-6)?.object.parent.userData.part ?? null;
-  }
+  box(of = () => true) { return this.bodies.filter(({ part }) => of(part)).reduce((all, body) => all.join(this.boxOf(body)), new Box()); }
+  boxOf({ box, move }) { return box.moved(move); }
+  under(ray) { return met(ray, this.bodies)?.thing.part ?? null; }
 }
-export { THREE };

@@ -1,15 +1,14 @@
 // The cut through an assembly's parts by a plane square to an axis: closed contours of each part, from its surface.
-import { THREE } from "./stage3d.js";
+import { placed } from "./space.js";
 
 // What lies this near to the plane, in mm, counts as beyond it: no corner lies on the plane itself.
 const NEAR = 1e-6;
 
-// Contours of a part's cut as lists of [across, up] in mm, at `value` along `axis`.
-export function contoursOf(holder, axis, value, across, up) {
-  const { geometry } = holder.children[0], { array } = geometry.attributes.position, index = geometry.index.array;
-  const count = array.length / 3, points = new Array(count), sides = new Float64Array(count), p = new THREE.Vector3();
+// Contours of a part's cut as lists of [across, up] in mm, at `value` along `axis`; axes are 0, 1 and 2.
+export function contoursOf({ mesh, place }, axis, value, across, up) {
+  const count = mesh.points.length / 3, points = new Array(count), sides = new Float64Array(count), { faces } = mesh;
   for (let i = 0; i < count; i++) {
-    p.fromArray(array, 3 * i).applyMatrix4(holder.matrix);
+    const p = placed(place, mesh.points.subarray(3 * i, 3 * i + 3));
     points[i] = [p[across], p[up]];
     sides[i] = p[axis] - value;
     if (Math.abs(sides[i]) < NEAR) sides[i] = NEAR;
@@ -21,10 +20,10 @@ export function contoursOf(holder, axis, value, across, up) {
     if (!places.has(name)) { const t = sides[a] / (sides[a] - sides[b]); places.set(name, [0, 1].map((i) => points[a][i] + t * (points[b][i] - points[a][i]))); }
     return name;
   };
-  for (let f = 0; f < index.length; f += 3) {
+  for (let f = 0; f < faces.length; f += 3) {
     const ends = {};
     for (let i = 0; i < 3; i++) {
-      const a = index[f + i], b = index[f + ((i + 1) % 3)];
+      const a = faces[f + i], b = faces[f + ((i + 1) % 3)];
       if (sides[a] < 0 !== sides[b] < 0) ends[sides[a] < 0 ? "to" : "from"] = crossing(a, b);
     }
     if ("from" in ends) { if (!next.has(ends.from)) next.set(ends.from, []); next.get(ends.from).push(ends.to); }

@@ -1,7 +1,7 @@
 // An assembly in space: parts in their places, drawn apart, cut open, picked by name.
 import { el, plain } from "./dom.js";
 import { Stage3D } from "./stage3d.js";
-import { PartMeshes, THREE, paintOf, partWords } from "./parts_scene.js";
+import { PartMeshes, paintOf, partWords } from "./parts_scene.js";
 
 export class PartsSolid {
   title = "Solid";
@@ -17,22 +17,19 @@ export class PartsSolid {
     const ways = [["Iso", [26, -34, 22]], ["Top", [0, -0.001, 1]], ["Front", [0, -1, 0.02]], ["Side", [1, 0, 0.02]]];
     this.element = el("div", { class: "view layers parts" }, this.list.element, this.surface,
       el("div", { class: "tools" }, el("label", {}, "Explode", this.explode), this.opened, this.depth),
-      el("div", { class: "tools right-top", role: "group", "aria-label": "Camera" }, ...ways.map(([words, way]) => el("button", { onclick: () => { this.stage.touched = false; this.stage.look(...way); this.stage.fit(this.meshes.box()); } }, words))),
+      el("div", { class: "tools right-top", role: "group", "aria-label": "Camera" }, ...ways.map(([words, way]) => el("button", { onclick: () => this.stage?.whole(way) }, words))),
       el("div", { class: "stale-mark" }, "Updating"));
-    try { this.stage = new Stage3D(this.surface, { up: 22 }); } catch {
-      this.surface.append(el("p", { class: "fallback" }, "This view needs WebGL, which this browser does not provide. The parts and rules are listed beside it."));
-      return;
-    }
     this.meshes = new PartMeshes(studio);
-    this.stage.scene.add(this.meshes.group);
-    const canvas = this.stage.renderer.domElement;
+    this.stage = Stage3D.on(this.surface, { up: 22, things: () => this.meshes.things }, "The parts and rules are listed beside it.");
+    if (!this.stage) return;
+    const { canvas } = this.stage;
     canvas.addEventListener("pointermove", (event) => { if (!event.buttons) this.point(event); });
     canvas.addEventListener("pointerleave", () => studio.hover(null));
     canvas.addEventListener("pointerdown", (event) => { this.down = [event.clientX, event.clientY]; });
     canvas.addEventListener("click", (event) => { if (Math.hypot(event.clientX - this.down[0], event.clientY - this.down[1]) < 4) { const part = this.hit(event); studio.pickParts(part ? [part.name] : []); } });
     studio.on("parts", () => this.update());
     studio.on("part", () => { this.meshes.paint(); this.said(); this.stage.draw(); });
-    studio.on("theme", () => { this.meshes.paint(); this.stage.repaint(); });
+    studio.on("theme", () => { this.meshes.paint(); this.stage.draw(); });
     studio.on("opened", () => { this.stage.touched = false; });
   }
   show() { this.stage?.resize(); if (this.behind) this.update(); }
@@ -45,31 +42,25 @@ export class PartsSolid {
     this.said();
   }
   arrange() {
-    const { box } = this.whole();
-    const size = box.getSize(new THREE.Vector3());
-    this.meshes.arrange((this.explode.value / 100) * 0.7 * Math.max(size.x, size.y, size.z));
+    this.meshes.arrange(0);
+    this.meshes.arrange((this.explode.value / 100) * 0.7 * Math.max(...this.meshes.box().size));
     this.cut();
     this.stage.box = this.meshes.box();
     if (!this.stage.touched) this.stage.fit(this.stage.box);
     this.stage.draw();
   }
-  // The box of the assembly as it is, whatever is drawn apart.
-  whole() {
-    this.meshes.arrange(0);
-    return { box: this.meshes.box() };
-  }
   // What stands before the plane is taken away; insides are painted flat, so that they read as cut faces.
   cut() {
-    const box = this.meshes.box(), y = box.min.y + (this.depth.value / 100) * (box.max.y - box.min.y);
-    this.meshes.planes = this.isCut && this.studio.parts ? [new THREE.Plane(new THREE.Vector3(0, 1, 0), -y)] : [];
+    const { min, size } = this.meshes.box();
+    this.meshes.plane = this.isCut && this.studio.parts ? [0, 1, 0, -min[1] - (this.depth.value / 100) * size[1]] : null;
     this.meshes.paint();
     this.stage.draw();
   }
   said() {
     const { parts, pickedParts } = this.studio;
-    this.stage.renderer.domElement.setAttribute("aria-label", pickedParts.length ? `Assembly, ${pickedParts.join(", ")} picked` : `Assembly of ${parts?.length ?? 0} parts`);
+    this.stage.canvas.setAttribute("aria-label", pickedParts.length ? `Assembly, ${pickedParts.join(", ")} picked` : `Assembly of ${parts?.length ?? 0} parts`);
   }
-  hit(event) { return this.meshes.under(this.stage.under(event)); }
+  hit(event) { return this.meshes.under(this.stage.ray(event)); }
   point(event) {
     const part = this.hit(event);
     this.studio.hover(null, part ? `${partWords(part)} · ${sizeWords(this.meshes, part)}` : "");
@@ -78,8 +69,8 @@ export class PartsSolid {
 }
 
 export function sizeWords(meshes, part) {
-  const size = meshes.box((one) => one.name === part.name).getSize(new THREE.Vector3());
-  return `${[size.x, size.y, size.z].map((length) => plain(length, 1)).join(" × ")} mm over all`;
+  const { size } = meshes.box((one) => one.name === part.name);
+  return `${size.map((length) => plain(length, 1)).join(" × ")} mm over all`;
 }
 
 // The parts by name beside a view: a click picks one, in every view.
