@@ -1,16 +1,15 @@
 // The cut through an assembly's parts by a plane square to an axis: closed contours of each part, from its surface.
-import { placed } from "./space.js";
+import { placedAll } from "./space.js";
 
 // What lies this near to the plane, in mm, counts as beyond it: no corner lies on the plane itself.
 const NEAR = 1e-6;
 
 // Contours of a part's cut as lists of [across, up] in mm, at `value` along `axis`; axes are 0, 1 and 2.
 export function contoursOf({ mesh, place }, axis, value, across, up) {
-  const count = mesh.points.length / 3, points = new Array(count), sides = new Float64Array(count), { faces } = mesh;
+  const count = mesh.points.length / 3, points = new Array(count), sides = new Float64Array(count), { faces } = mesh, all = placedAll(place, mesh.points);
   for (let i = 0; i < count; i++) {
-    const p = placed(place, mesh.points.subarray(3 * i, 3 * i + 3));
-    points[i] = [p[across], p[up]];
-    sides[i] = p[axis] - value;
+    points[i] = [all[3 * i + across], all[3 * i + up]];
+    sides[i] = all[3 * i + axis] - value;
     if (Math.abs(sides[i]) < NEAR) sides[i] = NEAR;
   }
   // Each edge that crosses the plane belongs to two faces, so that its place leads from one to the next.

@@ -16,6 +16,15 @@ export function times(...all) {
   return all.reduce((a, b) => Array.from({ length: 16 }, (_, i) => { const r = i % 4, c = i - r; return a[r] * b[c] + a[4 + r] * b[c + 1] + a[8 + r] * b[c + 2] + a[12 + r] * b[c + 3]; }));
 }
 export const placed = (m, [x, y, z]) => [0, 1, 2].map((r) => m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r]);
+// The same of many places, as x, y, z in a row.
+export function placedAll(m, points) {
+  const found = new Float64Array(points.length);
+  for (let i = 0; i < points.length; i += 3) {
+    const x = points[i], y = points[i + 1], z = points[i + 2];
+    for (let r = 0; r < 3; r++) found[i + r] = m[r] * x + m[4 + r] * y + m[8 + r] * z + m[12 + r];
+  }
+  return found;
+}
 // What takes a placement without scale back.
 export function back(m) {
   const columns = [m.slice(0, 3), m.slice(4, 7), m.slice(8, 11)];
@@ -26,8 +35,8 @@ export class Box {
   constructor(min = [Infinity, Infinity, Infinity], max = [-Infinity, -Infinity, -Infinity]) { Object.assign(this, { min, max }); }
   // Of points as x, y, z in a row, at a placement.
   static of(points, m = HERE) {
-    const box = new Box();
-    for (let i = 0; i < points.length; i += 3) box.grow(placed(m, points.slice(i, i + 3)));
+    const box = new Box(), { min, max } = box, all = placedAll(m, points);
+    for (let i = 0; i < all.length; i++) { const k = i % 3; if (all[i] < min[k]) min[k] = all[i]; if (all[i] > max[k]) max[k] = all[i]; }
     return box;
   }
   get empty() { return this.min[0] > this.max[0]; }
@@ -84,8 +93,7 @@ export function met({ from, way }, things) {
     const { mesh: { points, faces, ball: [middle, radius] }, place = HERE, plane } = thing, m = times(ahead, place);
     const [u, v] = placed(m, middle), stretch = Math.max(1, ...[0, 4, 8].map((i) => Math.hypot(...place.slice(i, i + 3))));
     if (Math.hypot(u, v) > radius * stretch) continue;
-    const seen = new Float64Array(points.length);
-    for (let i = 0; i < points.length; i += 3) for (let r = 0; r < 3; r++) seen[i + r] = m[r] * points[i] + m[4 + r] * points[i + 1] + m[8 + r] * points[i + 2] + m[12 + r];
+    const seen = placedAll(m, points);
     for (let f = 0; f < faces.length; f += 3) {
       const a = 3 * faces[f], b = 3 * faces[f + 1], c = 3 * faces[f + 2];
       const wa = seen[b] * seen[c + 1] - seen[c] * seen[b + 1], wb = seen[c] * seen[a + 1] - seen[a] * seen[c + 1], wc = seen[a] * seen[b + 1] - seen[b] * seen[a + 1];
