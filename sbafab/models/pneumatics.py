@@ -57,14 +57,14 @@ class Line:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, value, least in (
-            ("length", self.length, 1e-3),
-            ("diameter", self.diameter, 1e-3),
-            ("dead_volume", self.dead_volume, 0.0),
-            ("delay", self.delay, 0.0),
+        for name, value, least, most in (
+            ("length", self.length, 1e-3, 1e6),
+            ("diameter", self.diameter, 1e-3, 1e3),
+            ("dead_volume", self.dead_volume, 0.0, 1e9),
+            ("delay", self.delay, 0.0, 1e6),
         ):
-            if not (math.isfinite(value) and value >= least):
-                raise DesignError(f"line {name} = {value:g} must be at least {least:g}")
+            if not least <= value <= most:
+                raise DesignError(f"line {name} = {value:g} must be from {least:g} to {most:g}")
 
     @property
     def tube_volume(self) -> float:

@@ -23,7 +23,7 @@ from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
@@ -94,7 +94,7 @@ class Guard:
         if host.rpartition(":")[0] not in self.hosts and host not in self.hosts:
             return 403, f"the studio answers to {HERE[0]} only; open the link that it printed"
         origin = headers.get(b"origin")
-        if origin is not None and urlsplit(origin.decode("latin-1")).netloc != host:
+        if origin is not None and origin.decode("latin-1").partition("://")[2] != host:
             return 403, "this request comes from another site"
         if headers.get(b"sec-fetch-site", b"same-origin") == b"cross-site" and _is_call(scope):
             return 403, "this request comes from another site"
@@ -160,7 +160,7 @@ MOST = 1_000_000
 
 def design_in(link: str) -> str:
     """The design's text in a link. Raises DesignError where there is none."""
-    packed = parse_qs(urlsplit(link).fragment).get("design", [""])[0]
+    packed = parse_qs(link.partition("#")[2]).get("design", [""])[0]
     try:
         raw = base64.b64decode(packed + "=" * (-len(packed) % 4), b"-_", validate=True)
         reader = zlib.decompressobj(-zlib.MAX_WBITS)
@@ -277,7 +277,8 @@ def _studio(request: Request) -> Studio:
 
 
 async def _refused(_: Request, error: Exception) -> Response:
-    return JSONResponse({"kind": "error", "message": str(error)}, 422)
+    status = 409 if isinstance(error, places.ChangedError) else 422
+    return JSONResponse({"kind": "error", "message": str(error)}, status)
 
 
 async def _busy(_: Request, __: Exception) -> Response:

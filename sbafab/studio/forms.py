@@ -270,6 +270,9 @@ def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
     )
     if not good or not isinstance(request.get("text"), str):
         raise SbafabError("a request holds a text, and edits as [key, value]")
+    pose = request.get("pose") or {}
+    if not isinstance(pose, dict):
+        raise SbafabError("the pose of a request is a table")
     name = request.get("name")
     path = name if isinstance(name, str) and name.endswith(".toml") and "/" not in name else None
     has = request.get("has") or []
@@ -280,5 +283,5 @@ def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
         "has": [key for key in has if isinstance(key, str)] if isinstance(has, list) else [],
         "folder": str(folder),
         "path": path or "design.toml",
-        "pose": request.get("pose"),
+        "pose": pose,
     }

@@ -138,7 +138,7 @@ def elastic(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     design = _read(source)
     pause()
     if design.family == "assembly":
-        yield whole_prediction(_assembled(source), job.get("pose") or {}, pause)
+        yield whole_prediction(_assembled(source), job.get("pose", {}), pause)
     else:
         yield {"kind": "prediction", **api.predict(design).as_dict()}
 
@@ -190,7 +190,7 @@ def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     The pose asks for ``pressures``, or has none for the data that the page needs beforehand; of an
     assembly for ``parts``, the pressures of each.
     """
-    source, pose = _source(_text(job), job), job.get("pose") or {}
+    source, pose = _source(_text(job), job), job.get("pose", {})
     design = _read(source)
     if design.family == "assembly":
         assembled = _assembled(source)

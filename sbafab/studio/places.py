@@ -21,12 +21,24 @@ from sbafab.errors import DesignError, OutputError
 MOST_LISTED = 200
 MOST_BYTES = 2_000_000
 """Bytes of a design file."""
+MOST_NAME = 240
+"""Bytes of a design file's name: systems take 255, and it is saved under a longer one first."""
 REFERRING = ("outline", "kit", "design", "file", "calibration")
 """Keys whose values may be paths of files."""
 
 
+class ChangedError(OutputError):
+    """Another program has written a file since the page read it."""
+
+
 def design_file(folder: Path, name: str) -> Path:
     """The design file of this name in the folder. Raises DesignError for any other place."""
+    size = len(os.fsencode(name))
+    if size > MOST_NAME:
+        raise DesignError(
+            f"the name {name[:20]}... has {size} bytes, that of a design file at most {MOST_NAME}; "
+            "shorten it"
+        )
     path = folder / name
     if not name.endswith(".toml") or "\0" in name or not _lies_in(path, folder):
         raise DesignError(f"{name[:80]!r} is not a design file (.toml) in {folder}")
@@ -81,23 +93,32 @@ def state(path: Path) -> str:
         return ""
 
 
+def _mode(path: Path) -> int:
+    """The mode of what lies at a place; 0 where nothing does, or can for the length of its name."""
+    try:
+        return path.stat().st_mode
+    except OSError:
+        return 0
+
+
 def save(path: Path, text: str, expected: str | None) -> str:
     """Writes the file whole and returns its hash.
 
-    ``seen``: the hash of what the page has read; where another lies there now, raises OutputError.
+    ``expected``: the hash of what the page has read; where another lies there now, raises
+    ChangedError. Raises OutputError for what cannot be written.
     """
-    if path.exists() and not path.is_file():
+    mode = _mode(path)
+    if mode and not stat.S_ISREG(mode):
         raise OutputError(f"{path.name} is not a regular file; save under another name")
     if expected is not None and state(path) != expected:
-        raise OutputError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
+        raise ChangedError(f"{path.name} was changed on disk meanwhile; load it, or save over it")
     content = text.encode("utf-8")
     try:
-        mode = path.stat().st_mode & 0o777 if path.exists() else 0o644
         number, fresh = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
         try:
             with os.fdopen(number, "wb") as opened:
                 opened.write(content)
-            Path(fresh).chmod(mode)
+            Path(fresh).chmod(mode & 0o777 or 0o644)
             Path(fresh).replace(path)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -125,13 +146,13 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):
             raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
-        if path.exists() and not (path.is_file() or path.is_dir()):
+        mode = _mode(path)
+        if mode and not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise DesignError(f"{key} = {value[:60]!r} is not a regular file; name another one")
         named.append(state(path))
         # One that names itself is refused by who reads it.
-        if path.suffix == ".toml" and path.is_file() and path not in above:
-            inner = content_of(path, MOST_BYTES).decode("utf-8", "replace")
-            named += named_files(inner, path.parent, above | {path})
+        if path.suffix == ".toml" and stat.S_ISREG(mode) and path not in above:
+            named += named_files(read(path)[0], path.parent, above | {path})
     return tuple(named)
 
 

@@ -125,5 +125,6 @@ def test_a_step_that_cannot_be_is_refused(
 ) -> None:
     with pytest.raises(DesignError, match=said):
         three.motion(line=Line(WATER)).step(**asked)  # type: ignore[arg-type]
-    with pytest.raises(DesignError, match="line length"):
-        Line(length=0.0)
+    for wrong in ({"length": 0.0}, {"diameter": 1e300}, {"dead_volume": -1.0}, {"delay": math.nan}):
+        with pytest.raises(DesignError, match=f"line {next(iter(wrong))} = .* must be from"):
+            Line(**wrong)

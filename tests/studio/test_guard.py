@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -59,7 +60,9 @@ def test_a_name_bound_to_this_machine_is_refused(client: Client, host: str) -> N
     assert client.get("/", headers={"Host": host}).status_code == 403
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:9999"])
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "http://127.0.0.1:9999", "http://[", BASE + "/", ""]
+)
 def test_another_site_is_refused(client: Client, origin: str) -> None:
     headers = {**HEADERS, "Origin": origin}
     assert client.post("/api/live", json={"text": ""}, headers=headers).status_code == 403
@@ -78,8 +81,6 @@ def test_another_site_is_refused(client: Client, origin: str) -> None:
     ],
 )
 def test_no_file_outside_is_read_or_written(client: Client, studio: Studio, name: str) -> None:
-    from urllib.parse import quote
-
     assert client.get(f"/api/file/{quote(name, safe='')}", headers=HEADERS).status_code in {
         404,
         422,
@@ -89,6 +90,28 @@ def test_no_file_outside_is_read_or_written(client: Client, studio: Studio, name
     if answer.status_code == 200:  # on this system the name is a file's in the folder
         assert (studio.folder / name).resolve().parent == studio.folder.resolve()
     assert (studio.folder.parent / "secret.toml").read_text(encoding="utf-8") == 'name = "secret"'
+
+
+@pytest.mark.parametrize("letters", ["a" * 236, "\u00e9" * 119, "a" * 300, "a" * 5000])
+def test_a_name_too_long_for_a_file_is_one_sentence(client: Client, letters: str) -> None:
+    """Systems take 255 bytes; what is saved has a longer name first."""
+    name = f"{letters}.toml"
+    shown = quote(name)
+    answers = [
+        client.post("/api/save", json={"name": name, "text": "# a"}, headers=HEADERS),
+        client.get(f"/api/file/{shown}", headers=HEADERS),
+        client.get(f"/api/watch/{shown}", headers=HEADERS),
+        client.post("/api/record/sheet", json={"design": name}, headers=HEADERS),
+    ]
+    assert [answer.status_code for answer in answers] == [422] * len(answers)
+    for answer in answers:
+        told = answer.json()["message"]
+        assert told.endswith(
+            f"has {len(name.encode())} bytes, that of a design file at most 240; shorten it"
+        )
+    longest = "a" * 235 + ".toml"
+    saved = client.post("/api/save", json={"name": longest, "text": "# a"}, headers=HEADERS)
+    assert saved.status_code == 200
 
 
 def test_a_link_out_of_the_folder_is_not_followed(client: Client, studio: Studio) -> None:
@@ -102,7 +125,7 @@ def test_a_file_changed_meanwhile_is_not_saved_over(client: Client, studio: Stud
     (studio.folder / "own.toml").write_text("# theirs", encoding="utf-8")
     body = {"name": "own.toml", "text": "# mine", "seen": seen}
     refused = client.post("/api/save", json=body, headers=HEADERS)
-    assert refused.status_code == 422
+    assert refused.status_code == 409
     assert "changed on disk" in refused.json()["message"]
     assert (studio.folder / "own.toml").read_text(encoding="utf-8") == "# theirs"
     over = client.post("/api/save", json={**body, "seen": None}, headers=HEADERS)
@@ -120,6 +143,8 @@ def test_a_file_changed_meanwhile_is_not_saved_over(client: Client, studio: Stud
         b'{"text": "", "edits": [["a"]]}',
         b"[" * 5000,
         b'{"text": "", "edits": {"a": 1}}',
+        b'{"text": "", "pose": 3}',
+        b'{"text": "", "pose": [1]}',
     ],
 )
 def test_a_request_that_is_none_gets_one_sentence(client: Client, body: bytes) -> None:

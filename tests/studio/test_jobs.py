@@ -169,6 +169,25 @@ def test_a_design_names_no_file_outside_the_folder(tmp_path: Path, line: str) ->
         answers(job(tmp_path, f'name = "a"\nfamily = "1dof"\n{line}\n'))
 
 
+@pytest.mark.parametrize(
+    ("key", "named", "said"),
+    [
+        ("kit", "a" * 300, "neither a kit that ships"),
+        ("kit", "a" * 300 + ".toml", "neither a kit that ships"),
+        ("kit", "a/" * 400 + "b.toml", "neither a kit that ships"),
+        ("chamber.outline", "a" * 300 + ".svg", "cannot be read"),
+        ("kit", "latin.toml", "latin.toml is not a text file in UTF-8"),
+    ],
+)
+def test_a_file_that_cannot_be_is_one_sentence(
+    tmp_path: Path, key: str, named: str, said: str
+) -> None:
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"\n')
+    taken = edited(SMALL, [("chamber.diameter", None)]) if "outline" in key else SMALL
+    with pytest.raises(DesignError, match=said):
+        answers(job(tmp_path, edited(taken, [(key, f'"{named}"')])))
+
+
 def test_a_file_of_the_folder_may_name_one_outside_no_more(tmp_path: Path) -> None:
     (tmp_path / "part.toml").write_text('kit = "/etc/passwd"', encoding="utf-8")
     text = 'family = "assembly"\n[parts.a]\nkind = "sba"\ndesign = "./part.toml"\n'
@@ -238,6 +257,7 @@ def test_a_link_holds_a_design() -> None:
     for broken in (
         link[:-9],
         "http://127.0.0.1/",
+        "http://[",
         link + "x!",
         "http://a/#design=" + packed("a" * 2_000_000),
     ):

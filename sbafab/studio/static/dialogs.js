@@ -44,8 +44,8 @@ export class Dialogs {
   }
   async saved(name, over = false) {
     try { await this.studio.save(name, over); } catch (error) {
-      if (!over && /changed on disk/.test(error.message) && confirm(`${name} lies there already with other content. Save over it?`)) return this.saved(name, true);
-      if (!/changed on disk/.test(error.message)) alert(error.message);
+      if (error.status !== 409) alert(error.message);
+      else if (!over && confirm(`${name} lies there already with other content. Save over it?`)) return this.saved(name, true);
     }
   }
 
