@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from sbafab.design.sections import (
     NAME_PATTERN,
+    PART_PATTERN,
     Laser,
     Order,
     Press,
@@ -37,7 +38,7 @@ CheckName = Literal[
 ]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Shift = Annotated[float, Millimetres(-1000, 1000)]
-PartName = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$")]
+PartName = Annotated[str, Field(pattern=PART_PATTERN)]
 Words = Annotated[str, Field(max_length=120)]
 
 

@@ -15,8 +15,20 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from sbafab.design.sections import rule_names
+from sbafab.design.films import FACE_PATTERN
+from sbafab.design.recipes import DATE_PATTERN
+from sbafab.design.sections import NAME_PATTERN, PART_PATTERN, rule_names
 from sbafab.errors import DesignError
+
+PATTERNS = {
+    NAME_PATTERN: "must be 1 to 64 letters, digits, dots, dashes or underscores, beginning with a "
+    "letter or digit",
+    PART_PATTERN: "must be 1 to 32 letters, digits, dashes or underscores, beginning with a letter",
+    FACE_PATTERN: "must be 1 to 32 small letters, digits, dashes or underscores, beginning with a "
+    "letter",
+    DATE_PATTERN: "must be a date such as 2026-03-31",
+}
+"""What texts may be that must match a pattern."""
 
 
 def listed(values: Iterable[object]) -> str:
@@ -95,11 +107,11 @@ def _allowed(problem: Any) -> str:
         )
         hint = f"; did you mean {near[0]}?" if near else ""
         return f"must be {context['expected']}{hint}"
+    if kind == "string_pattern_mismatch":
+        return PATTERNS.get(context["pattern"], "must match {pattern}".format(**context))
     if kind in limits:
         return limits[kind].format(**context)
     plain = {
-        "string_pattern_mismatch": "must be 1 to 64 letters, digits, dots, dashes or underscores, "
-        "beginning with a letter or digit",
         "finite_number": "must be a finite number",
         "int_type": "must be a whole number",
         "int_from_float": "must be a whole number",

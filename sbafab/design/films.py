@@ -101,7 +101,8 @@ class Sheet(Section):
         return self
 
 
-FaceName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
+FACE_PATTERN = r"^[a-z][a-z0-9_-]{0,31}$"
+FaceName = Annotated[str, Field(pattern=FACE_PATTERN)]
 """A face material: small letters, digits, - and _."""
 
 
@@ -136,7 +137,7 @@ class FaceBondings(Section):
     @model_validator(mode="after")
     def _names_are_known(self) -> Self:
         for name, bond in self.by_name.items():
-            if not re.fullmatch("[a-z][a-z0-9_-]{0,31}", name):
+            if not re.fullmatch(FACE_PATTERN, name):
                 raise ValueError(f"has a bond named {name[:40]!r}; a name is of small letters")
             if bond.after is not None and (bond.after == name or bond.after not in self.by_name):
                 raise ValueError(

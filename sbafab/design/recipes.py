@@ -12,6 +12,7 @@ from sbafab.design.units import SHORTEST, LengthOrZero, Millimetres
 from sbafab.laminate.films import Film
 
 Operation = Literal["cut", "engrave"]
+DATE_PATTERN = r"^\d{4}-\d{2}-\d{2}$"
 MachineName = Annotated[str, Field(min_length=1, max_length=80)]
 SAME_THICKNESS = 1e-6
 """mm; thicknesses that differ by less are one."""
@@ -38,7 +39,7 @@ class Recipe(Section):
     """Full kerf width that was measured with these settings; for notes, it compensates nothing."""
     source: str = Field(min_length=1, max_length=200)
     """Where the settings are from, for instance a filled test grid."""
-    date: str | None = Field(default=None, pattern=r"^\d{4}-\d{2}-\d{2}$")
+    date: str | None = Field(default=None, pattern=DATE_PATTERN)
     """When they were tried, as year-month-day."""
 
     @model_validator(mode="after")

@@ -168,6 +168,7 @@ FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
 
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$"
+PART_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,31}$"
 
 
 RuleName = Literal[

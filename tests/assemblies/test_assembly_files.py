@@ -73,7 +73,8 @@ FAULTS: list[tuple[str, dict[str, Any], str]] = [
     ("brace", {"rules.waive": ["seats"]}, "rules.waive"),
     ("brace", {"name": "../x"}, "name = '../x' must be"),
     ("brace", {"sheets": {"tpe": {"width": -1}}}, "sheets.tpe.width = -1"),
-    ("brace", {"parts.1x": {"kind": "tube"}}, "parts.1x"),
+    ("brace", {"parts.1x": {"kind": "tube"}}, "parts.1x = '1x' must be 1 to 32 letters"),
+    ("brace", {f"parts.{'a' * 33}": {"kind": "tube"}}, "must be 1 to 32 letters"),
 ]
 
 

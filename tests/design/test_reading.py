@@ -80,6 +80,7 @@ def test_not_a_length(text: object) -> None:
         (["chamber.count=9"], "must be at most 8"),
         (["family=lobbed"], "did you mean lobed?"),
         (["name=../up"], "must be 1 to 64 letters"),
+        (['films.tpe.faces={upper="TPE", lower="tpe"}'], "must be 1 to 32 small letters"),
         (
             ['rules.waive=["bond"]'],
             "must be the name of a rule; there are bond-width, mask-overhang,",
