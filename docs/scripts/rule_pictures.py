@@ -129,6 +129,16 @@ def _press_fit() -> Pair:
     return Pair(right, svg([platen, *_layers(bad, [1])], box, _place(found)), found.message)
 
 
+def _pressure_rating() -> Pair:
+    """The mask of a balloon as drawn, and wider than the film bears at twice the pressure."""
+    good, limits = built("1dof-5mm", "bond.width=1"), replace(EXACT, working_pressure=170.0)
+    bad = spoiled(good, 6, disc((0, 0), 2.71) - disc((0, 0), 0.5))
+    found = _found("pressure-rating", bad, limits)
+    box = _box([good.layer(6), good.layer(7)], None)
+    wrong = svg(_layers(bad, (6, 7)), box, _place(found))
+    return Pair(svg(_layers(good, (6, 7)), box), wrong, found.message)
+
+
 def _pin_fit() -> Pair:
     cut = replace(EXACT, tolerances=Tolerances(0.1, 0, 0, 0))
     drawings = []
@@ -211,6 +221,7 @@ def _waffle(share: float) -> str:
 
 OTHERS: dict[str, Callable[[], Pair]] = {
     "press-fit": _press_fit,
+    "pressure-rating": _pressure_rating,
     "pin-fit": _pin_fit,
     "bridges": lambda: _of_sheet("bridges", 1, narrowed),
     "nets": _nets,

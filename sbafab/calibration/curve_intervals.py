@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sbafab.calibration.fit import GROUP_OF, MIDDLES, relative_errors, term_of
 from sbafab.calibration.model_values import ModelledActuator, ModelValue, NoModel, model_values
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import SHARE, deviations
+from sbafab.models.calibrated import SHARE, Ends, deviations
 from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
 from sbafab.models.unknowns import factors_at
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from sbafab.models.calibrated import ModelCalibration
     from sbafab.models.figures import Factors
 
-Ends = tuple[float, float]
 """Least and largest value."""
 
 

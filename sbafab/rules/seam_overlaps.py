@@ -28,7 +28,7 @@ NEAR: Final = 1e-5
 PART: Final = 0.5
 """Radians that a part of an arc turns by at most."""
 
-Error = Callable[[SeamTool], float]
+ToolError = Callable[[SeamTool], float]
 """Farthest that a seam of a tool lies off its path, mm."""
 
 
@@ -62,7 +62,9 @@ class SeamEnds(NamedTuple):
     edges: Sequence[EdgeBond] = ()
 
 
-def seam_ends(laminate: Laminate, interfaces: Sequence[Interface], error: Error) -> list[SeamEnds]:
+def seam_ends(
+    laminate: Laminate, interfaces: Sequence[Interface], error: ToolError
+) -> list[SeamEnds]:
     """Return what seams end on in each interface; nothing where films are pressed."""
     if all(gap.pressed or not gap.seams for gap in interfaces):
         return [SeamEnds() for _ in interfaces]
@@ -110,7 +112,7 @@ class _Seams(NamedTuple):
 
     gap: Interface
     voids: _Voids
-    error: Error
+    error: ToolError
 
     def overlaps(self) -> Iterator[Overlap]:
         bare = self.gap.contact - self.gap.mask

@@ -296,7 +296,7 @@ a tenth, which one chamber at 5 kPa takes in SOFA's scenes, it bends some 10 deg
 
 
 @dataclass(frozen=True)
-class Limits:
+class PhysicalLimits:
     """Limits of what a laminate can do.
 
     ``highest`` is how far its tip may rise, in mm, None round a tube; whether its tip must stand,
@@ -308,7 +308,7 @@ class Limits:
     least_air: float
 
 
-def limits(laminate: Laminate, requested: Collection[float]) -> Limits:
+def limits(laminate: Laminate, requested: Collection[float]) -> PhysicalLimits:
     """Return the limits of a laminate with these pressures or volumes in its chambers.
 
     A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
@@ -320,15 +320,15 @@ def limits(laminate: Laminate, requested: Collection[float]) -> Limits:
     least_air = -NO_AIR * thick * math.pi * sum(radius**2 for radius in radii) / chambers
     highest = None if laminate.tube is not None else 2 * STRETCH * sum(radii) / chambers
     must_stand = highest is not None and len(set(requested)) == 1 and min(requested) >= 0
-    return Limits(highest, must_stand and why_not_round(laminate) is None, least_air)
+    return PhysicalLimits(highest, must_stand and why_not_round(laminate) is None, least_air)
 
 
-def impossible(state: State, can_be: Limits, passed: float = 0.0) -> str | None:
+def impossible(state: State, can_be: PhysicalLimits, passed: float = 0.0) -> str | None:
     """Return what is impossible in a state, or None; ``passed`` is the ``overlap`` in ul."""
     return next(_wrong(state, can_be, passed), None)
 
 
-def _wrong(state: State, can_be: Limits, passed: float) -> Iterator[str]:
+def _wrong(state: State, can_be: PhysicalLimits, passed: float) -> Iterator[str]:
     tip, tilt = state.tip, state.tilt
     if not all(map(math.isfinite, (*state.volumes.values(), *(tip or ()), tilt or 0.0))):
         yield "a place or a volume is no finite number"
