@@ -143,10 +143,10 @@ def simulate(
     """Runs a simulator that is installed into ``out/<name>/<simulator>/``.
 
     ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes what it reads and runs
-    nothing. ``pressure`` kPa, ``chambers`` kPa by name and all after them are the fields of
-    ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul by chamber;
-    ``tables`` are those of the design. Raises DesignError for another simulator or word and for
-    what cannot be done, and OutputError.
+    nothing. ``pressure`` kPa (a vacuum is negative), ``chambers`` kPa by name and all after them
+    are the fields of ``SimulationRequest``: ``h`` in mm, ``seconds`` of simulated time, ``volumes``
+    in ul by chamber; ``tables`` are those of the design. Raises DesignError for another simulator
+    or word and for what cannot be done, OutputError, and VoidError where the result cannot be.
     """
     request = SimulationRequest(
         pressure, chambers or {}, minutes, h, symmetry, procedure, scene, seconds, volumes or {}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +40,8 @@ MOST_MINUTES = 10_000
     "--pressure",
     type=PRESSURE.read,
     metavar="P",
-    help='Pressure in all chambers, kPa or with a unit ("60 mbar").  '
-    "[default: calculix 6, others 5]",
+    help='Gauge pressure in all chambers, kPa or with a unit ("60 mbar"); a vacuum is negative and '
+    "for calculix.  [default: calculix 6, others 5; of a design that works under a vacuum -6]",
 )
 @click.option(
     "--chamber",
@@ -103,7 +106,7 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     """
     wish = SimulationRequest(**settings)
     design = load_design(request.designs[0], request.assignments, request.waivers)
-    with shown_progress(request.as_json) as progress:
+    with shown_progress(request.as_json) as progress, _printed_warnings():
         simulation = run(design, simulator, wish, request.out, progress, export)
     if simulation.folder is None:
         if request.as_json:
@@ -128,6 +131,15 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
     if result is not None and result.stopped is not None:
         print_error(result.stopped)
         click.get_current_context().exit(RULE_FAILED)
+
+
+@contextmanager
+def _printed_warnings() -> Iterator[None]:
+    """Print warnings as sentences on standard error at once: a run may take hours after them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = lambda message, *_: print_error(f"warning: {message}")
+        yield
 
 
 def _print(name: str, result: Result | None, folder: Path) -> None:

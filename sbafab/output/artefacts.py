@@ -57,7 +57,7 @@ from sbafab.pressing.work_plan import batch_json, plan_csv
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
-from sbafab.simulators.simulator import Name, SimulationRequest, simulator
+from sbafab.simulators.simulator import Name, SimulationRequest, simulator, under_vacuum
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
@@ -352,7 +352,10 @@ def _write_simulation(name: Name, folder: DesignFolder) -> None:
     reason = simulator(name).why_not(folder.laminate)
     if reason is None:
         try:
-            simulator(name).export(folder.laminate, SimulationRequest(), folder.path / name)
+            request = SimulationRequest()
+            if folder.design.form.works_under_vacuum:
+                request = under_vacuum(name, request)
+            simulator(name).export(folder.laminate, request, folder.path / name)
         except (DesignError, OutputError) as error:
             # The meshes of CalculiX take an extra, which may be missing.
             reason = str(error)

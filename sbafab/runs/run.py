@@ -45,7 +45,14 @@ from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
 from sbafab.runs.stock import cut_from_stock
-from sbafab.simulators.simulator import Name, Result, SimulationRequest, refuse_unused, simulator
+from sbafab.simulators.simulator import (
+    Name,
+    Result,
+    SimulationRequest,
+    refuse_unused,
+    simulator,
+    under_vacuum,
+)
 
 if TYPE_CHECKING:
     from sbafab.meshing.conforming.layup import MeshSettings
@@ -335,6 +342,7 @@ def simulate(
     """
     progress = progress or ignore_progress
     refuse_unused(name, wish)
+    wish = under_vacuum(name, wish) if design.form.works_under_vacuum else wish
     result = None
     with tempfile.TemporaryDirectory() as temporary:
         checked = check(design, progress)

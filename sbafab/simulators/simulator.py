@@ -9,7 +9,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from numbers import Real
 from pathlib import Path
@@ -33,6 +33,8 @@ MOST_PRESSURE = 1000.0
 """kPa: nearly three times what bursts the paper's actuators."""
 LARGEST_VACUUM = 101.325
 """kPa below the air outside, which no vacuum exceeds."""
+VACUUM = -6.0
+"""kPa in a design that works under a vacuum, by default: as far from 0 as CalculiX inflates."""
 
 
 CHOICES = {
@@ -47,7 +49,8 @@ CHOICES = {
 class SimulationRequest:
     """Settings of a simulation; None where the simulator's default will do.
 
-    ``pressure`` in kPa for every chamber that ``chambers`` does not name; ``minutes`` is the most
+    ``pressure`` in kPa, as a gauge shows it (a vacuum is negative), for every chamber that
+    ``chambers`` does not name; ``minutes`` is the most
     real time a run may take. Each simulator's ``USES`` names the others that it reads:
     ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber;
     ``CHOICES`` tells the words of the rest. Raises DesignError for another word, and for what is
@@ -228,6 +231,26 @@ def refuse_unused(name: Name, request: SimulationRequest) -> None:
             )
 
 
+def under_vacuum(name: Name, request: SimulationRequest) -> SimulationRequest:
+    """Return the request for a design that works under a vacuum, by default one of ``VACUUM``.
+
+    Raises DesignError for a pressure above 0, and for a simulator that takes no vacuum.
+    """
+    if name != "calculix":
+        raise DesignError(f"the design works under a vacuum, and {name} takes none; take calculix")
+    pressures = {"pressure": request.pressure or 0.0}
+    pressures |= {f"pressure of {chamber}": kpa for chamber, kpa in request.chambers.items()}
+    for label, kpa in pressures.items():
+        if kpa > 0:
+            raise DesignError(
+                f"{label} = {kpa:g} kPa is out of range; give {-LARGEST_VACUUM:g} to 0 kPa, as a "
+                f"gauge shows it; a vacuum is negative: write {-kpa:g}"
+            )
+    if request.pressure is None and not request.chambers:
+        return replace(request, pressure=VACUUM)
+    return request
+
+
 def chamber_pressures(
     names: Sequence[str],
     request: SimulationRequest,
@@ -251,8 +274,9 @@ def chamber_pressures(
     pressures = {name: request.chambers.get(name, in_all) for name in names}
     for name, value in pressures.items():
         if not (math.isfinite(value) and least <= value <= most):
+            hint = "; a vacuum is for calculix" if least == 0 > value else ""
             raise DesignError(
-                f"pressure of {name} = {value:g} kPa must be from {least:g} to {most:g} kPa"
+                f"pressure of {name} = {value:g} kPa must be from {least:g} to {most:g} kPa{hint}"
             )
     if not any(pressures.values()):
         raise DesignError("pressure is 0 kPa in every chamber; give one of them more")

@@ -6,6 +6,8 @@ import json
 import re
 import shutil
 import sys
+import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +22,15 @@ from sbafab.errors import OutputError, VoidError
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.simulators.calculix import results
 from sbafab.simulators.calculix.deck import DeckSettings
-from sbafab.simulators.calculix.run import History, run_ccx, simulate
+from sbafab.simulators.calculix.run import (
+    GROWTH,
+    MEASURED_EQUATIONS,
+    MEASURED_SECONDS,
+    History,
+    deck_mesh,
+    run_ccx,
+    simulate,
+)
 from tests.site.formats import hold
 
 pytest.importorskip("netgen")
@@ -200,6 +210,38 @@ def test_a_first_result_that_cannot_be_voids_a_run(
     with pytest.raises(VoidError, match=r"at 0\.5 kPa, cannot be: chamber1 holds -"):
         simulate(laminate, mesh, settings, tmp_path / "run", 300, lambda *_: None)
     assert not (tmp_path / "run" / "history.csv").exists()
+
+
+def test_a_run_of_hours_is_warned_of_before_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six balloons of three chambers have 127,618 nodes; ccx took 30.7 s for an iteration."""
+    stand_in(tmp_path, monkeypatch, 'print("*ERROR in nothing: no memory left.")')
+    settings = DeckSettings({"chamber1": 6.0})
+    small = build(load_design("1dof-5mm", ("stack.balloons=1",)))
+    with warnings.catch_warnings(), pytest.raises(OutputError):
+        warnings.simplefilter("error")
+        simulate(small, MeshSettings(0.75), settings, tmp_path / "run", 60, lambda *_: None)
+    mesh = deck_mesh(small, MeshSettings(0.75))
+    large = replace(mesh, points=np.zeros((127_618 * 3, 3)))
+    monkeypatch.setattr("sbafab.simulators.calculix.run.deck_mesh", lambda *_: large)
+    monkeypatch.setattr("sbafab.simulators.calculix.run.write_deck", lambda *_: None)
+    monkeypatch.setattr("sbafab.simulators.calculix.run.started", lambda *_: large)
+    with pytest.warns(UserWarning, match="not end in an hour") as told, pytest.raises(OutputError):
+        simulate(small, MeshSettings(0.75), settings, tmp_path / "run", 60, lambda *_: None)
+    (hours,) = re.findall(r"take (\S+) hours, right within", str(told[0].message))
+    # Three times as many equations take 3 to 9 times as long: a band of a matrix is solved in
+    # proportion to its width, a whole one at worst with the square of the number.
+    assert 3 * 30.7 * 100 / 3600 < float(hours) < 9 * 30.7 * 100 / 3600
+
+
+@pytest.mark.parametrize(
+    ("equations", "seconds"), [(57_328, 1.29), (298_524, 19.0), (380_757, 30.7)]
+)
+def test_the_time_of_an_iteration_is_near_what_was_measured(equations: int, seconds: float) -> None:
+    """CalculiX 2.20, processor time: a quarter of fifteen balloons, a sector, six balloons."""
+    found = MEASURED_SECONDS * (equations / MEASURED_EQUATIONS) ** GROWTH
+    assert found == pytest.approx(seconds, rel=0.25)
 
 
 def test_a_run_that_reaches_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,6 +95,7 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "calculix", "--symmetry", "sector"], "symmetry sector is not this laminate's"),
         (["--with", "sofa", "--scene", "beam"], "scene beam needs three chambers or more"),
         (["--with", "sofa", "--pressure", "0"], "0 kPa in every chamber"),
+        (["--with", "mujoco", "--pressure", "-5"], "to 1000 kPa; a vacuum is for calculix"),
         (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
         (["--with", "mujoco", "--chamber", "left=3"], "names chamber left, which is not there"),
         (["--with", "mujoco", "--seconds", "1"], "simulated time = 1 s"),
@@ -108,6 +109,42 @@ def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
     assert result.exit_code == 2, result.output
     assert words in result.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--with", "calculix", "--pressure", "20"], "a vacuum is negative: write -20"),
+        (["--with", "calculix", "--chamber", "stack=20"], "stack = 20 kPa is out of range"),
+        (["--with", "calculix", "--pressure", "-102"], "must be from -101.325 to"),
+        (["--with", "sofa"], "works under a vacuum, and sofa takes none; take calculix"),
+    ],
+)
+@pytest.mark.usefixtures("no_programs")
+def test_a_vacuum_has_one_sign(tmp_path: Path, options: list[str], words: str) -> None:
+    result = CliRunner().invoke(app, ["simulate", "vacuum", "-o", str(tmp_path), *options])
+    assert result.exit_code == 2, result.output
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_design_under_a_vacuum_is_drawn_in_by_default(tmp_path: Path) -> None:
+    pytest.importorskip("netgen")
+    given = [
+        "simulate",
+        "vacuum",
+        "--with",
+        "calculix",
+        "--export",
+        "--h",
+        "4",
+        "--symmetry",
+        "half",
+    ]
+    result = CliRunner().invoke(app, [*given, "-o", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    deck = (tmp_path / "vacuum" / "calculix" / "actuator.inp").read_text()
+    assert "stack -6 kPa" in deck
 
 
 def test_parts_that_are_images_take_one_pressure(tmp_path: Path) -> None:
