@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
@@ -213,9 +213,18 @@ DRAWN = "drawn"
 
 class DrawnDesign(Design):
     """Layers whose shapes are drawn, bottom to top. Never built: rules read them as any laminate's,
-    and what has no model is left out of predictions. ``bond.width``, ``mask.overhang``,
-    ``fillet.radius`` and ``bore.diameter`` move no shape: rules and pins read the last.
+    and what has no model is left out of predictions. ``bore.diameter`` moves no shape: rules and
+    pins read it.
     """
+
+    unused: ClassVar[Mapping[str, str]] = {
+        "bond": "remove it, and draw bonds as wide as they shall be",
+        "mask": "remove it, and draw masks as large as they shall be",
+        "fillet": "remove it, and round a shape by {fillet = SHAPE, radius = 1}",
+        "chamber": "remove it, and name a drawn outline in a shape: shapes.pocket.file",
+        "panel": "remove it, for drawn layers go in no registered sheets",
+        "registration.pin_clearance": "remove it, and give pins their clearance, in pins",
+    }
 
     model_config = card(
         "Drawn layers",
@@ -434,11 +443,6 @@ def _check(design: DrawnDesign) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DesignError(f"chambers has {shown(twice)} twice; give each chamber its name")
-    if design.chamber.outline is not None:
-        raise DesignError(
-            "chamber.outline is not for drawn layers; name the file in a shape: "
-            f"shapes.pocket.file = {shown(design.chamber.outline)}"
-        )
     method = design.registration.method
     if method == "sheet" or (method == "ears" and design.pins is None):
         remedy = ", or draw the ears and list their pins" if method == "ears" else ""

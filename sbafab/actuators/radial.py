@@ -6,8 +6,9 @@ Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -109,6 +110,10 @@ class RadialDesign(Design):
         "M22.5 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z"
         "M37 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z",
     )
+
+    unused: ClassVar[Mapping[str, str]] = {
+        "panel": "remove it, for radial designs go in no registered sheets"
+    }
 
     family: Literal["radial"]
     """Which kind of actuator this is."""

@@ -140,7 +140,8 @@ def _unknown_key(
         return f"{field} is not a key of this family; it belongs to {listed(families_with_key)}"
     if where[-2:-1] == ["faces"]:
         return f"{field} is not a key of a film's faces; they are upper and lower"
-    paths = key_paths(record)
+    is_used = getattr(record, "uses", bool)
+    paths = [path for path in key_paths(record) if is_used(path)]
     table = ".".join(where[:-1])
     own = next(_tables_at(record, where[:-1]), None)
     siblings = [f"{table}.{key}".lstrip(".") for key in _keys(own)] if own else []

@@ -14,7 +14,7 @@ from sbafab.design.files import (
 )
 from sbafab.design.films import UNCALIBRATED, LayerFilms
 from sbafab.design.kits import DEFAULT, SCHEMA, Kit, KitFile, load_kit
-from sbafab.design.records import Design, resolved, without_none
+from sbafab.design.records import Design, with_unused, without_none
 from sbafab.design.sections import (
     Acceptance,
     Inlet,
@@ -88,7 +88,7 @@ def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
 
 def design_sha256(design: Design) -> str:
     """Return the hash of all that decides the output; a drawn outline counts by its content."""
-    return _sha256(_with_drawing(_as_first_hashed(resolved(design), design), design))
+    return _sha256(_with_drawing(_as_first_hashed(with_unused(design), design), design))
 
 
 def actuator_sha256(design: Design) -> str:
@@ -98,7 +98,7 @@ def actuator_sha256(design: Design) -> str:
     registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
     Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
     """
-    table = _with_drawing(resolved(design), design)
+    table = _with_drawing(with_unused(design), design)
     for section in NO_ACTUATOR:
         table.pop(section, None)
     films = _films(design)
@@ -175,7 +175,7 @@ def kit_of(design: Design) -> Kit:
 def departures(design: Design) -> list[str]:
     """Return the dotted keys that a design sets otherwise than its kit."""
     kit = kit_of(design)
-    values, kit_values = resolved(design), dict(_values(kit))
+    values, kit_values = with_unused(design), dict(_values(kit))
     keys = [key for key, value in kit_values.items() if _at(values, key) != value]
     tube = kit.tubes.get(design.inlet.tube)
     if kit.tubes and tube is None:

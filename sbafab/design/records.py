@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import (
     ConfigDict,
@@ -69,6 +69,11 @@ from sbafab.laminate.base_plate import lone_pin_error, pin_error
 from sbafab.laminate.joints import FaceBond, Fold
 from sbafab.notebook import table_html
 
+if TYPE_CHECKING:
+    from pydantic import GetJsonSchemaHandler
+    from pydantic.json_schema import JsonSchemaValue
+    from pydantic_core import CoreSchema
+
 
 def card(title: str, symbol: str) -> ConfigDict:
     """Return what forms show of a family: a few words, and a drawing.
@@ -87,6 +92,10 @@ REGISTRATIONS = {
 
 class Design(Section):
     """The sections that all families share; a family adds its own, sets ``family`` and ``form``."""
+
+    unused: ClassVar[Mapping[str, str]] = {}
+    """Of the sections and keys below those that a family does not use, each with what to do in its
+    place. Nobody can set them, and no file and no form has them."""
 
     name: str = Field(pattern=NAME_PATTERN)
     """Names the output folder: letters, digits, dot, dash, underscore."""
@@ -245,6 +254,20 @@ class Design(Section):
     @abstractmethod
     def form(self) -> Form:
         """Form of the actuator, for models, checks and pages. Raises DesignError."""
+
+    @classmethod
+    def uses(cls, key: str) -> bool:
+        """Return True unless a key, or the section it is in, is none that the family uses."""
+        return not {key, key.partition(".")[0]} & cls.unused.keys()
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        schema = handler.resolve_ref_schema(handler(core_schema))
+        for key in cls.unused:
+            schema["properties"].pop(key, None)
+        return schema
 
     @property
     def free(self) -> tuple[Free, ...]:
@@ -449,8 +472,9 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
     data = override(data, changes)
     suggest_from_user_folder(data, changes)
     open_what_fits(data, changes)
-    data = under_kit(data, design.folder)
     family = type(design)
+    _refuse_unused(data, family, design.family)
+    data = under_kit(data, design.folder)
     return checked(family, data, {design.family: family}).placed(design.folder).fitted()
 
 
@@ -473,17 +497,31 @@ def validated(
         near = difflib.get_close_matches(shown(family).strip("'"), families, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise DesignError(f"family = {shown(family)} must be one of {listed(families)}{hint}")
+    _refuse_unused(data, families[family], family)
     return checked(families[family], under_kit(data, folder), families).placed(folder).fitted()
+
+
+def _refuse_unused(data: Mapping[str, Any], record: type[Design], family: str) -> None:
+    """Raises DesignError for a key that the family does not use, whatever it says."""
+    for key, _ in dotted(data):
+        if not record.uses(key):
+            instead = record.unused.get(key) or record.unused[key.partition(".")[0]]
+            raise DesignError(f"{key} is a key that family {family} does not use; {instead}")
 
 
 def resolved(design: Design) -> dict[str, Any]:
     """Return the design with every default written out, as plain TOML values."""
+    return _used(with_unused(design), design)
+
+
+def with_unused(design: Design) -> dict[str, Any]:
+    """Return the same with the keys that its family does not use, which have their defaults."""
     return _tables(design.completed())
 
 
 def plain_tables(design: Design) -> dict[str, Any]:
     """The design as tables of a TOML file, defaults that depend on other values left open."""
-    tables = _tables(design)
+    tables = _used(_tables(design), design)
     if design.is_solved:
         del tables["chamber"]["diameter"]
     return tables
@@ -494,6 +532,13 @@ def _tables(design: Design) -> dict[str, Any]:
     if not tables.get(FITS):
         # Nothing is asked for: an empty table would say nothing.
         tables.pop(FITS, None)
+    return tables
+
+
+def _used(tables: dict[str, Any], design: Design) -> dict[str, Any]:
+    for key in design.unused:
+        section, _, name = key.partition(".")
+        (tables[section] if name else tables).pop(name or section, None)
     return tables
 
 
@@ -517,10 +562,10 @@ def keys_of(design: Design) -> list[tuple[str, object, object]]:
     ]
 
 
-def dotted(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
+def dotted(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield dotted key and value of every key of nested tables."""
     for key, value in table.items():
-        if isinstance(value, dict):
+        if isinstance(value, Mapping):
             yield from dotted(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value

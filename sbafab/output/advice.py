@@ -45,6 +45,8 @@ OTHERWISE = {
 class Advice:
     """The least ``bond`` and ``overhang`` (mm) that reach ``target``, and the share of good builds
     that another seed gives them; None where none does.
+
+    A design whose bonds and overhangs are drawn takes neither: its share is that of it as drawn.
     """
 
     target: float
@@ -55,6 +57,8 @@ class Advice:
 
     @property
     def sentence(self) -> str:
+        if self.share is not None and self.bond is None:
+            return self._as_drawn(self.share)
         if self.share is None:
             remedy = OTHERWISE.get(self.method, OTHERWISE["ears"])
             return (
@@ -67,6 +71,21 @@ class Advice:
             f"A yield of {self.target:.4g} needs bond.width = {self.bond:.2f} and mask.overhang = "
             f"{self.overhang:.2f} at least; built so, another seed gives {self.share.value:.2%} "
             f"good builds of {self.share.builds} (95 % interval {low:.2%} to {high:.2%})."
+        )
+
+    def _as_drawn(self, share: Share) -> str:
+        low, high = share.interval
+        reached = "reaches" if low >= self.target else "does not reach"
+        text = (
+            f"As drawn it {reached} a yield of {self.target:.4g}: {share.value:.2%} of "
+            f"{share.builds} random builds are good (95 % interval {low:.2%} to {high:.2%})"
+        )
+        if low >= self.target:
+            return f"{text}."
+        return (
+            f"{text}. Its layers are drawn, so no key makes bonds and overhangs wider: draw them "
+            "wider where registration-worst-case finds the least, or place and cut more exactly "
+            "(registration.plate_made_by, registration.hand_placement, registration.seam_error)."
         )
 
     def as_dict(self) -> dict[str, object]:
@@ -84,6 +103,9 @@ def advise(design: Design, target: float, progress: Progress = ignore_progress) 
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``, from the
     rules' limits on.
     """
+    if not design.uses(BOND):
+        share = simulate(build(design), limits(design), CHECK_SEED).whole
+        return Advice(target, design.registration.method, share=share)
     rules = design.rules
     start = {BOND: rules.bond_width, OVERHANG: rules.mask_overhang}
     trials = _Trials(design, start, target, progress)
@@ -188,7 +210,8 @@ def reach_yield(
     passes every other rule; one that fails another rule as it is given is returned unchanged.
     """
     asked = design.with_({TARGET: target})
-    start = {key: value_of(asked, key) for key in (BOND, OVERHANG) if key not in fixed}
+    free = (key for key in (BOND, OVERHANG) if key not in fixed and asked.uses(key))
+    start = {key: value_of(asked, key) for key in free}
     as_given = _Trials(asked, start, target, progress)
     if as_given.broken(AS_GIVEN) - {WORST_CASE, PIN_FIT}:
         return YieldDesign(target, design, asked)

@@ -184,7 +184,7 @@ REFUSED: list[tuple[Sequence[str], object, str]] = [
     (("layers",), [], "layers is missing; add a list of"),
     (("stack",), {"balloons": 2}, "stack.balloons = 2, and layers has 1 gaps with"),
     (("registration",), {"method": "ears"}, "'ears' adds parts to layers"),
-    (("chamber",), {"outline": "a.dxf"}, "chamber.outline is not for drawn layers"),
+    (("chamber",), {"outline": "a.dxf"}, "chamber.outline is a key that family drawn does not use"),
 ]
 
 

@@ -1,0 +1,88 @@
+"""Keys that a family does not use: refused by name at every door, and written in no file."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sbafab
+from sbafab.actuators import FAMILIES, load_design, schema
+from sbafab.design.files import read_toml, templates_folder
+from sbafab.design.records import Design, Free, design_toml, dotted, plain_tables
+from sbafab.errors import DesignError
+
+TEMPLATES = {"1dof": "1dof-5mm", "lobed": "3dof-15mm", "radial": "radial-15mm", "drawn": "pouch"}
+EVERY = {
+    key: value
+    for key, value in dotted(load_design("1dof-5mm").model_dump(mode="json"))
+    if key.partition(".")[0] in Design.model_fields and "." in key
+}
+"""The keys of the sections that all families share."""
+UNUSED = [
+    (family, key) for family in TEMPLATES for key in EVERY if not FAMILIES[family].record.uses(key)
+]
+
+
+def test_drawn_layers_use_no_key_that_shapes_others() -> None:
+    keys = {key for family, key in UNUSED if family == "drawn"}
+    assert {"bond.width", "mask.overhang", "fillet.radius", "panel.margin"} <= keys
+    assert not {"bore.diameter", "inlet.width", "rules.bond_width"} & keys
+    assert {family for family, _ in UNUSED} == {"drawn", "radial"}
+
+
+@pytest.mark.parametrize(("family", "key"), UNUSED)
+def test_each_is_refused_by_name(family: str, key: str, tmp_path: Path) -> None:
+    """Whatever it says, its default too."""
+    value = EVERY[key]
+    section, name = key.split(".")
+    words = rf"^{key} is a key that family {family} does not use; remove it"
+    design = load_design(TEMPLATES[family])
+    with pytest.raises(DesignError, match=words):
+        design.with_({section: {name: value}})
+    with pytest.raises(DesignError, match=words):
+        load_design(TEMPLATES[family], [f"{key}={value if isinstance(value, float) else 'x'}"])
+    file = tmp_path / "design.toml"
+    text = (templates_folder() / f"{TEMPLATES[family]}.toml").read_text(encoding="utf-8")
+    file.write_text(f"{section}.{name} = 1\n{text}", encoding="utf-8")
+    if section not in read_toml(templates_folder() / f"{TEMPLATES[family]}.toml"):
+        with pytest.raises(DesignError, match=words):
+            load_design(file)
+
+
+def test_sweeps_and_searches_refuse_them(tmp_path: Path) -> None:
+    words = r"bond\.width is a key that family drawn does not use"
+    with pytest.raises(DesignError, match=words):
+        sbafab.sweep("pouch", vary=["bond.width=0.8,0.9"], out=tmp_path)
+    with pytest.raises(DesignError, match=words):
+        sbafab.find("pouch", least={"mass": 0}, free=[Free("bond.width", 0.7, 0.9, 0.1)])
+
+
+@pytest.mark.parametrize("family", TEMPLATES)
+def test_what_is_written_has_none_and_loads(family: str, tmp_path: Path) -> None:
+    design = load_design(TEMPLATES[family]).placed(templates_folder())
+    written: dict[str, Any] = tomllib.loads(design_toml(design))
+    record = FAMILIES[family].record
+    assert all(record.uses(key) for key, _ in dotted(written))
+    assert all(record.uses(key) for key, _ in dotted(plain_tables(design)))
+    file = tmp_path / "design.toml"
+    file.write_text(design_toml(design), encoding="utf-8")
+    assert plain_tables(load_design(file)).keys() == plain_tables(design).keys()
+    sections = schema()["$defs"][record.__name__]["properties"]
+    assert all(record.uses(key) for key in sections)
+
+
+def test_a_kit_may_give_what_other_families_use(tmp_path: Path) -> None:
+    """A lab's clearance of ears is no fault of a design that has none."""
+    kit = tmp_path / "lab.toml"
+    kit.write_text(
+        'schema = "sbafab/kit@1"\nname = "lab"\nversion = "1"\n'
+        '[registration]\npin_clearance = {value = 0.05, source = "measured"}\n',
+        encoding="utf-8",
+    )
+    text = (templates_folder() / "pouch.toml").read_text(encoding="utf-8")
+    file = tmp_path / "d.toml"
+    file.write_text(f'kit = "lab.toml"\n{text}', encoding="utf-8")
+    assert load_design(file).with_({"name": "other"}).kit == "lab.toml"
