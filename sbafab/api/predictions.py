@@ -103,7 +103,7 @@ def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     if outcome is None or not isinstance(placed, PlacedSba):
         return None
     free = (outcome.free - outcome.deflated) / 2 / placed.made.laminate.balloons
-    return outcome, gripping(placed, outcome.room or free)
+    return outcome, gripping(placed, outcome.deflated, outcome.room or free)
 
 
 @command

@@ -381,8 +381,9 @@ def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
 ACROSS, ALONG, HALVINGS = 13, 17, 50
 
 
-def gripping(placed: PlacedSba, height: float) -> Surface:
-    """Balloons ``height`` mm high each on the tangents of their tube, in the part's own frame.
+def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
+    """Return balloons ``height`` mm high each on the tangents of their tube, in the part's own
+    frame; ``deflated`` is the diameter in mm over the flat films.
 
     Across, a film is an arc that keeps its pocket's width (the lens of ``models.lens``); towards
     the pocket's round ends the lens shrinks with its chord.
@@ -398,7 +399,7 @@ def gripping(placed: PlacedSba, height: float) -> Surface:
             ((x, y, _),) = placed.turned(np.array([[*middle, 0.0]]))
             angle = x / radius if radius else 0.0
             for level in range(laminate.balloons):
-                out = radius + laminate.thickness + (level + 0.5) * height + lens.points[:, 2]
+                out = deflated / 2 + (level + 0.5) * height + lens.points[:, 2]
                 aside, along = lens.points[:, 0], lens.points[:, 1] + y
                 faces.append(lens.faces + sum(map(len, points)))
                 points.append(

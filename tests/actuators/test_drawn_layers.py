@@ -251,9 +251,9 @@ def test_predictions_leave_out_in_a_sentence_what_has_no_model() -> None:
     data = tables()
     del data["mechanism"]
     design = validated(data, {"drawn": FAMILIES["drawn"].record}, Path())
-    prediction = predict(design, PredictionRequest((100.0,)))
+    prediction = predict(design, PredictionRequest((10.0,)))
     reasons = {item.reason for item in prediction.left_out}
-    assert {figure.group for figure in prediction.figures} <= {"size", "inlet"}
+    assert {figure.group for figure in prediction.figures} <= {"size", "inlet", "strength"}
     assert len(reasons) == 1
     assert "no model knows the form of layers drawn one by one" in reasons.pop()
 

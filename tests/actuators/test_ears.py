@@ -85,6 +85,9 @@ def test_nothing_fails_warns_or_is_waived(name: str, assignments: list[str]) -> 
     findings = check(design).findings
     for finding in findings:
         allowed = {"pass"}
+        if finding.rule == "pressure-rating" and design.acceptance.working_pressure_kpa is None:
+            # Held against 100 kPa, at which the paper gives forces.
+            allowed = {"pass", "warn"}
         if finding.rule == "registration-worst-case" and name == "radial-15mm":
             # Upper oblong masks have one pin, and are not round.
             allowed = {"pass"} if design.stack.balloons == 1 else {"pass", "warn"}

@@ -91,7 +91,7 @@ def test_every_film_has_its_files_sheets_and_rows(run: Run) -> None:
     ]
     assert {"Knife only."} < set(run.manifest["warnings"])
     page = (run.folder / "traveller.html").read_text()
-    for said in ("TPU50 film", "PET that does not stretch", "Knife only.", "kit lab, version 2"):
+    for said in ("TPU50 film", "PET that does not stretch", "Knife only.", "kit lab, version 3"):
         assert said in page
 
 

