@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import click
+from click.shell_completion import CompletionItem
 
-from sbafab.cli.options import explainable, json_option
+from sbafab.cli.options import completions, json_option
 from sbafab.cli.printing import print_facts, print_json
 from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
 from sbafab.rules.explained import EXPLAINED
@@ -28,8 +29,12 @@ class DesignKey(NamedTuple):
     families: tuple[str, ...] = ()
 
 
+def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    return completions(typed, ((name, None) for name in explainable_names()))
+
+
 @click.command()
-@click.argument("name", required=False, shell_complete=explainable)
+@click.argument("name", required=False, shell_complete=_completed)
 @json_option
 def explain(name: str | None, as_json: bool) -> None:
     """Explain a rule, a key of design files, or a quantity of find and predict.

@@ -104,13 +104,6 @@ def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comple
     return completions(typed, ((name, rule.holds) for name, rule in EXPLAINED.items()))
 
 
-def explainable(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Complete the names of rules, keys and quantities."""
-    from sbafab.cli.explain import explainable_names
-
-    return completions(typed, ((name, None) for name in explainable_names()))
-
-
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
     """Complete ``KEY=``, and after it the values of a key that has a choice."""
     key, equals, _ = typed.partition("=")
