@@ -264,9 +264,9 @@ class Design(Section):
     def __get_pydantic_json_schema__(
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        schema = handler.resolve_ref_schema(handler(core_schema))
+        schema: JsonSchemaValue = super().__get_pydantic_json_schema__(core_schema, handler)
         for key in cls.unused:
-            schema["properties"].pop(key, None)
+            handler.resolve_ref_schema(schema)["properties"].pop(key, None)
         return schema
 
     @property
