@@ -13,7 +13,7 @@ from typing import Any
 from sbafab.actuators import load_design
 from sbafab.actuators.drawn import DRAWN, DrawnDesign
 from sbafab.design.drawing import OUTLINE, seam_layer
-from sbafab.design.files import ASSEMBLY, kit_names, listed, read_toml
+from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
 from sbafab.design.records import Design, plain_tables, without_kit
 from sbafab.design.sections import Inlet as Inlets
@@ -80,7 +80,10 @@ def import_laminate(path: Path) -> Imported:
     laminate = read_laminate(path)
     remarks: list[str] = []
     films, names = _film_tables(laminate, remarks)
-    stock = Films.model_validate(films).stock
+    try:
+        stock = checked(Films, films, {}, "films.").stock
+    except DesignError as error:
+        raise DesignError(f"{path.name} holds a film that no design takes: {error}") from None
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
         if stock[names[film.material]].shade != film.shade:
             # Films that no layer is cut from count for the colours of the others.

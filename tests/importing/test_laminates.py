@@ -234,6 +234,27 @@ def test_an_assembly_is_refused_with_its_designs(importing: Importing, tmp_path:
     assert f'import one of its designs: "1dof-5mm" in {folder}' in said
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("limit", 500, r"films\.ptfe\.temperature_limit = 500 must be at most 400"),
+        ("limit", -5, r"films\.ptfe\.temperature_limit = -5 must be greater than 0"),
+        ("density", 1e8, r"films\.tpe\.density = 100000000\.0 must be at most 20000"),
+        ("softens_above", -40, r"films\.tpe\.melting_point = -40 must be greater than 0"),
+    ],
+)
+def test_a_film_that_no_design_takes_is_named(
+    key: str, value: float, words: str, tmp_path: Path
+) -> None:
+    data = json.loads(laminate_json(build(load_design("1dof-5mm"))))
+    for film in data["films"]:
+        film[key] = value
+    path = tmp_path / FILE
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(DesignError, match=f"^{FILE} holds a film that no design takes: {words}"):
+        import_laminate(path)
+
+
 def test_a_design_that_cannot_be_built_leaves_nothing(tmp_path: Path) -> None:
     path = tmp_path / FILE
     path.write_text(laminate_json(build(load_design("1dof-5mm"))), encoding="utf-8")
