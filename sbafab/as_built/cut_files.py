@@ -25,6 +25,7 @@ from sbafab.cutting.properties import (
     CUT_OUTER,
     CUT_SEQUENCE,
     REFERENCE,
+    CutSettings,
     chord_error_of,
     curves_property,
     kerf_of,
@@ -33,17 +34,17 @@ from sbafab.cutting.properties import (
 )
 from sbafab.cutting.seam_files import (
     CENTRED,
+    WIDTH,
     deviation,
     moved,
-    offset_text,
     read_seam,
     seam_path,
+    seam_properties,
     stated_width,
 )
 from sbafab.cutting.verify import check_datum
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material
 from sbafab.laminate.joints import Seam
@@ -292,13 +293,18 @@ def read_seams(
         return None, problems
     seams = []
     claimed = {claim.name: claim for claim in claims.seams}
+    settings = CutSettings(
+        claims.name,
+        claims.design_sha256,
+        generator=claims.generator,
+        seam_offsets=design.seam_offsets,
+    )
     for seam in designed:
         claim = claimed.get(seam.name)
         if claim is None:
             continue
         try:
-            offset = design.seam_offsets.get(seam.tool)
-            seams.append(_read_seam(folder, claim, seam, offset, problems))
+            seams.append(_read_seam(folder, claim, seam, settings, problems))
         except OutputError as error:
             reason = str(error).removeprefix(f"{PurePosixPath(claim.file or claim.name).name}: ")
             problems.append(Problem(INTEGRITY, f"seam {seam.name} ({claim.file}): {reason}"))
@@ -340,29 +346,31 @@ def _read_seam(
     folder: Path,
     claim: SeamClaim,
     seam: Seam,
-    offset: Point | None,
+    settings: CutSettings,
     problems: list[Problem],
 ) -> Seam:
     path = path_in_folder(folder, claim.file)
     sound_digest(path)
     chains, properties = read_seam(path)
-    chains = moved(chains, offset or CENTRED)
-    stated = None if offset is None else offset_text(offset)
-    if properties.get("TOOL_OFFSET") != stated:
-        problems.append(
-            Problem(
-                CLAIMS,
-                f"seam {seam.name} ({claim.file}): TOOL_OFFSET is "
-                f"{properties.get('TOOL_OFFSET')!r}, and by design.toml {stated!r}",
-            )
+    chains = moved(chains, settings.seam_offsets.get(seam.tool, CENTRED))
+    stated: dict[str, str | None] = {"TOOL_OFFSET": None, **seam_properties(seam, settings)}
+    del stated[WIDTH]
+    problems += [
+        Problem(
+            CLAIMS,
+            f"seam {seam.name} ({claim.file}): {name} is {properties.get(name)!r}, and by "
+            f"design.toml {value!r}",
         )
+        for name, value in stated.items()
+        if properties.get(name) != value
+    ]
     width = stated_width(properties)
     if width is None or abs(width - claim.width) > TOLERANCE:
         problems.append(
             Problem(
                 CLAIMS,
-                f"seam {seam.name} ({claim.file}): TOOL_WIDTH is "
-                f"{properties.get('TOOL_WIDTH')!r}, and the manifest says {claim.width:g} mm",
+                f"seam {seam.name} ({claim.file}): {WIDTH} is {properties.get(WIDTH)!r}, and the "
+                f"manifest says {claim.width:g} mm",
             )
         )
     drawn = seam if deviation(chains, seam.path) is None else replace(seam, path=chains)

@@ -391,7 +391,7 @@ def read_with_ezdxf(text: str) -> ReadBack:
         if layout is not model and any(entity.dxftype() != "VIEWPORT" for entity in layout):
             raise OutputError(f"layout {layout.name} is not empty; draw in model space only.")
     return _put_together(
-        map(_drawn, model),
+        map(drawn_entity, model),
         dict(document.header.custom_vars.properties),
         "mm" if says_units else "",
         document,
@@ -471,13 +471,16 @@ def _is_short(edge: Edge) -> bool:
     return may_be and edge.length < EPSILON
 
 
-def _drawn(entity: DXFEntity) -> DrawnEntity:
-    """Return the drawing of an entity; polylines on the layers of strokes may be open."""
+def drawn_entity(entity: DXFEntity, may_be_open: bool = False) -> DrawnEntity:
+    """Return the drawing of an entity; polylines on the layers of strokes may be open, or all.
+
+    Raises OutputError for one that cannot be cut.
+    """
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
 
     kind, dxf = entity.dxftype(), entity.dxf
-    may_be_open = dxf.layer not in (CUT_INNER, CUT_OUTER)
+    may_be_open = may_be_open or dxf.layer not in (CUT_INNER, CUT_OUTER)
     if kind not in DRAWN or (isinstance(entity, Polyline) and not _is_plain(entity)):
         raise OutputError(f"{kind} (handle {dxf.handle}) cannot be cut; use {', '.join(DRAWN)}.")
     if not all(math.isfinite(value) for value in _numbers(entity)):

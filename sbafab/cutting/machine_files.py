@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from sbafab.cutting.beam_check import BETWEEN, BeamCurve, BeamRun
 from sbafab.cutting.beam_paths import LaserRun
-from sbafab.cutting.dxf_read import polyline
+from sbafab.cutting.dxf_read import drawn_entity
 from sbafab.cutting.dxf_write import number
 from sbafab.cutting.properties import (
     COLOURS,
@@ -41,6 +41,8 @@ RGB = {ENGRAVE: "#000000", CUT_INNER: "#0000ff", CUT_OUTER: "#ff0000", CUT_SHEET
 """Colours of the layers in the order of cutting, pure ones that a driver can map."""
 HAIRLINE = 0.0254
 """mm: 0.001 in."""
+UNITLESS, MILLIMETRES = 0, 4
+"""Values of $INSUNITS."""
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -58,6 +60,24 @@ def read_machine_file(path: Path, program: LaserProgram) -> list[BeamRun]:
         raise OutputError(f"{path.name}: {error}; regenerate it") from error
     except (OSError, ValueError, LookupError, ArithmeticError, SyntaxError) as error:
         raise OutputError(f"{path.name}: it cannot be read ({error}); regenerate it") from error
+
+
+def rdworks_difference(path: Path, expected: Path) -> str:
+    """Return how an RDWorks file departs from the expected one, in words; "" if it cuts the same.
+
+    Raises OutputError for one that cannot be read.
+    """
+    read, runs = (read_machine_file(file, "rdworks") for file in (path, expected))
+    if len(read) != len(runs):
+        return f"it has {len(read)} lines, not {len(runs)}"
+    for drawn, run in zip(read, runs, strict=True):
+        x, y = run.curves[0].start
+        if drawn.layer != run.layer:
+            return f"the line at x {x:.3f}, y {y:.3f} is one of {drawn.layer}, not of {run.layer}"
+        edges = [edge for edge in run.curves if isinstance(edge, Line | Arc)]
+        if not _agrees(drawn.curves, edges):
+            return f"the line at x {x:.3f}, y {y:.3f} is another"
+    return ""
 
 
 def verify_machine_file(path: Path, program: LaserProgram, expected: Sequence[LaserRun]) -> None:
@@ -148,33 +168,31 @@ def _r12_entity(run: LaserRun) -> str:
 
 
 def _read_rdworks(path: Path) -> Iterator[BeamRun]:
-    """Yield the runs of a DXF as ezdxf reads it, by the colour of each entity."""
-    from ezdxf.entities.circle import Circle
-    from ezdxf.entities.polyline import Polyline
+    """Yield the runs of a DXF as ezdxf reads it, by the colour of each entity.
+
+    Its polylines may be of a later DXF than was written. It names no unit, which RDWorks takes for
+    mm, or mm.
+    """
     from ezdxf.filemanagement import readfile
-    from ezdxf.lldxf.const import DXFError
+    from ezdxf.lldxf.const import BYLAYER, DXFError
 
     layers = {COLOURS[layer]: layer for layer in RGB}
     try:
-        entities = list(readfile(path).modelspace())
+        document = readfile(path)
     except DXFError as error:
         raise OutputError(f"it is no sound DXF ({error})") from error
-    for entity in entities:
-        layer = layers.get(entity.dxf.color)
+    unit = document.header.get("$INSUNITS", UNITLESS)
+    if unit not in (UNITLESS, MILLIMETRES):
+        raise OutputError(f"not in millimetres: $INSUNITS is {unit}")
+    for entity in document.modelspace():
+        colour = entity.dxf.color
+        if colour == BYLAYER and entity.dxf.layer in document.layers:
+            colour = abs(document.layers.get(entity.dxf.layer).dxf.color)
+        layer = layers.get(colour)
         if layer is None:
-            raise OutputError(f"a line has the colour {entity.dxf.color}, which no layer has")
-        if isinstance(entity, Circle):
-            x, y, _ = entity.dxf.center
-            yield BeamRun(layer, circle((x, y), entity.dxf.radius).edges)
-        elif isinstance(entity, Polyline):
-            rows = [
-                (p.x, p.y, 0.0, 0.0, vertex.dxf.get("bulge", 0.0))
-                for vertex in entity.vertices
-                for p in (vertex.dxf.location,)
-            ]
-            yield BeamRun(layer, polyline(rows, entity.is_closed, 0.0, True))
-        else:
-            raise OutputError(f"it holds a {entity.dxftype()}")
+            raise OutputError(f"a line has the colour {colour}, which no layer has")
+        drawn = drawn_entity(entity, may_be_open=True)
+        yield BeamRun(layer, drawn.edges if drawn.contour is None else drawn.contour.edges)
 
 
 # Epilog: SVG with hairlines.

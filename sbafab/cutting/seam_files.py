@@ -25,6 +25,7 @@ TOLERANCE = 0.001
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Places along an edge at which it is compared."""
 
+WIDTH = "TOOL_WIDTH"
 CENTRED: Point = (0.0, 0.0)
 """Offset of a tool in the place of its machine's head."""
 
@@ -46,7 +47,7 @@ def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
         "ORDER": str(seam.order),
         "LAYERS": f"{seam.below}, {seam.above}",
         "TOOL": seam.tool,
-        "TOOL_WIDTH": f"{seam.width:g}",
+        WIDTH: f"{seam.width:g}",
         "KIND": seam.kind,
         **({} if offset is None else {"TOOL_OFFSET": offset_text(offset)}),
         "UNITS": "mm",
@@ -143,7 +144,7 @@ def _ends(chain: Sequence[Edge]) -> tuple[Point, Point]:
 def stated_width(properties: Mapping[str, str]) -> float | None:
     """Return the width of the tool that a seam's file states, mm, or None."""
     try:
-        width = float(properties.get("TOOL_WIDTH", ""))
+        width = float(properties.get(WIDTH, ""))
     except ValueError:
         return None
     return width if 0 < width < math.inf else None

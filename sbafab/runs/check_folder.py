@@ -11,6 +11,7 @@ import csv
 import json
 import math
 import re
+import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
@@ -30,6 +31,7 @@ from sbafab.assemblies.build import assemble
 from sbafab.assemblies.files import DESIGN_FILE, load_assembly
 from sbafab.cutting.dxf_read import ReadBack, read_profile
 from sbafab.cutting.lightburn import ENDING
+from sbafab.cutting.machine_files import ENDINGS, rdworks_difference
 from sbafab.cutting.properties import FOLDER as LAYERS
 from sbafab.cutting.properties import curves_of
 from sbafab.cutting.sheets import SheetFile
@@ -381,6 +383,7 @@ GREY = 1.0
 VISIBLE, VISIBLE_SHARE = 48, 2e-4
 """Visible difference of a pixel, of 255 levels, and permitted share of such pixels."""
 UNREADABLE = (ValueError, LookupError, ArithmeticError, RecursionError, csv.Error)
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 PICTURE = re.compile(r"data:image/png;base64,([A-Za-z0-9+/=\s]+)")
 LONGEST_SHOWN = 40
@@ -395,6 +398,8 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
     if data == expected_data:
         return ""
     compare = _readers().get(expected.suffix)
+    if expected.name.endswith(ENDINGS["rdworks"]):
+        compare = rdworks_difference
     if compare is None:
         return f"{name} is not what design.toml makes: its bytes differ"
     try:
@@ -424,7 +429,8 @@ def _readers() -> dict[str, Callable[[Path, Path], str]]:
         ),
         ".csv": _table_difference,
         ".pdf": lambda path, expected: "it shows something else",
-        **dict.fromkeys((".svg", ".toml", ".html", ENDING), _text_difference),
+        ".toml": _table_of_keys_difference,
+        **dict.fromkeys((".svg", ".html", ENDING), _text_difference),
         **dict.fromkeys((".stl", ".3mf", ".glb"), mesh_difference),
     }
 
@@ -506,8 +512,14 @@ def _shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
+def _table_of_keys_difference(actual: Path, expected: Path) -> str:
+    actual_toml, expected_toml = (tomllib.loads(_text(path)) for path in (actual, expected))
+    return _value_difference(actual_toml, expected_toml, "")
+
+
 def _text_difference(actual: Path, expected: Path) -> str:
-    text, expected_text = _text(actual), _text(expected)
+    """Return the first difference of two texts of XML or HTML, in which comments do not count."""
+    text, expected_text = (COMMENT.sub("", _text(path)) for path in (actual, expected))
     pictures, expected_pictures = PICTURE.findall(text), PICTURE.findall(expected_text)
     if len(pictures) != len(expected_pictures):
         return f"it has {len(pictures)} pictures, not {len(expected_pictures)}"

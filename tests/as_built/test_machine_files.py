@@ -7,11 +7,14 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import ezdxf
 import pytest
+from ezdxf.document import Drawing
 
 from sbafab.actuators import load_design
 from sbafab.as_built.check import read_folder
 from sbafab.cutting.dxf_read import read_profile
+from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
 
@@ -147,3 +150,68 @@ def test_a_program_s_file_is_listed_and_measured(program_folder: Path, tmp_path:
     doctor.set_manifest(lambda manifest: manifest["sheets"][0].pop("machine_file"))
     told = [problem.message for problem in read_folder(doctor.folder).problems]
     assert any("is None, not sheets/TPE_1_" in message for message in told)
+
+
+def of_later_dxf(document: Drawing) -> Drawing:
+    """The same lines in today's entities, coloured by their layers, as other programs save them."""
+    later = ezdxf.new("R2018")
+    later.header["$INSUNITS"] = 4
+    for layer in document.layers:
+        if layer.dxf.name not in later.layers:
+            later.layers.add(layer.dxf.name, color=layer.dxf.color)
+    for entity in document.modelspace():
+        like = {"layer": entity.dxf.layer}
+        if entity.dxftype() == "CIRCLE":
+            later.modelspace().add_circle(entity.dxf.center, entity.dxf.radius, like)
+            continue
+        rows = [(*v.dxf.location.vec2, v.dxf.get("bulge", 0)) for v in entity.vertices]
+        later.modelspace().add_lwpolyline(rows, "xyb", close=entity.is_closed, dxfattribs=like)
+    return later
+
+
+def in_inches(document: Drawing) -> Drawing:
+    document.header["$INSUNITS"] = 1
+    return document
+
+
+@pytest.mark.parametrize(
+    ("save", "says"),
+    [
+        (lambda document: document, None),
+        (of_later_dxf, None),
+        (lambda document: in_inches(of_later_dxf(document)), "not in millimetres: $INSUNITS is 1"),
+    ],
+)
+def test_a_file_saved_anew_by_another_program_is_judged_by_what_it_cuts(
+    save: Callable[[Drawing], Drawing], says: str | None, tmp_path: Path
+) -> None:
+    """Tabs leave lines open, leads begin beside them."""
+    design = load_design("1dof-5mm", [*ASKED, "sheets.program=rdworks"])
+    doctor = Doctor(generate(RunRequest(design, tmp_path, ("cut",))).folder)
+    for path in doctor.folder.glob("sheets/*_rdworks.dxf"):
+        before = path.read_bytes()
+        save(ezdxf.readfile(path)).saveas(path)
+        assert path.read_bytes() != before
+    doctor.rehash()
+    found = [f.message for f in check_folder(doctor.folder) if f.verdict == "fail"]
+    assert all(says is not None and says in message for message in found)
+    assert bool(found) == (says is not None)
+
+
+def test_comments_are_no_difference(held: Path, tmp_path: Path) -> None:
+    """In pictures of sheets, in projects and in design.toml; a shape in one is missing, though."""
+    doctor = Doctor(Path(shutil.copytree(held, tmp_path / "1dof-5mm")))
+    pictures = [*doctor.folder.glob("sheets/*.svg"), *doctor.folder.glob("sheets/*.lbrn2")]
+    assert len(pictures) >= 4
+    for path in pictures:
+        text = path.read_text(encoding="utf-8")
+        path.write_text(re.sub(r"(<svg.*?>|<LightBurn.*?>)", r"\1<!-- Ann: 3 mm < 4 -->", text))
+    design = doctor.folder / "design.toml"
+    design.write_text(f"# cut by Ann\n{design.read_text(encoding='utf-8')}", encoding="utf-8")
+    doctor.rehash()
+    assert not [f for f in check_folder(doctor.folder) if f.verdict == "fail"]
+    text = pictures[0].read_text(encoding="utf-8")
+    pictures[0].write_text(re.sub(r"(<(path|circle) [^>]*/>)", r"<!-- \1 -->", text, count=1))
+    doctor.rehash()
+    (found,) = [f for f in check_folder(doctor.folder) if f.verdict == "fail"]
+    assert (found.rule, pictures[0].name in found.message) == ("as-designed", True)

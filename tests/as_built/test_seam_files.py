@@ -17,6 +17,7 @@ from sbafab.api import check_folder, generate, press
 from sbafab.as_built.check import read_back
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
+from tests.as_built.doctoring import Doctor
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +144,43 @@ def test_an_unsound_seam_file_is_named(
     resave(folder, lambda document: (spoil(document), None)[1])
     found = failures(folder)
     assert words in found["file-integrity"].message
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("TOOL", "laser"),
+        ("LAYERS", "2, 3"),
+        ("ORDER", "2"),
+        ("SEAM", "other"),
+        ("KIND", "fin"),
+        ("UNITS", "inch"),
+        ("DESIGN_SHA256", "0" * 64),
+        ("TOOL_OFFSET", "1, 2"),
+    ],
+)
+def test_what_a_seam_file_states_is_held_against_the_design(
+    name: str, value: str, welded: dict[str, bytes], tmp_path: Path
+) -> None:
+    """With the manifest's hash of the file put right."""
+    doctor = Doctor(laid_out(welded, tmp_path))
+
+    def change(document: Drawing) -> None:
+        properties = document.header.custom_vars
+        assert properties.get(name) != value
+        properties.remove(name, all=True) if properties.has_tag(name) else None
+        properties.append(name, value)
+
+    resave(doctor.folder, lambda document: None)
+    doctor.rehash()
+    assert failures(doctor.folder) == {}
+    resave(doctor.folder, change)
+    doctor.rehash()
+    found = failures(doctor.folder)
+    assert set(found) == {"manifest-claims"}
+    assert f"{SEAM_FILE}): {name} is {value!r}, and by design.toml" in (
+        found["manifest-claims"].message
+    )
 
 
 def test_a_missing_file_and_another_width_are_named(

@@ -143,7 +143,12 @@ FAULTS: list[tuple[LaserProgram, Callable[[str], str], str]] = [
     ("rdworks", once(r"( 62\n1\n 10\n\d+\.\d)", r"\g<1>2"), "differs from what was written|circle"),
     ("rdworks", once(r"42\n0\.414", "42\n0.424"), "differs from what was written"),
     ("rdworks", lambda text: text[: len(text) // 2], "no sound DXF|cannot be read"),
-    ("rdworks", once("CIRCLE", "POINT"), "it holds a POINT"),
+    ("rdworks", once("CIRCLE", "POINT"), "POINT .* cannot be cut"),
+    (
+        "rdworks",
+        once("AC1009\n", "AC1009\n  9\n$INSUNITS\n 70\n1\n"),
+        r"not in millimetres: \$INSUNITS is 1",
+    ),
     ("epilog", once("#0000ff", "#ff0000"), "is one of CUT_OUTER, not of CUT_INNER"),
     ("epilog", once("#0000ff", "#00ff00"), "no hairlines in a colour of a layer"),
     ("epilog", once("0.0254", "0.254"), "no hairlines in a colour of a layer"),
