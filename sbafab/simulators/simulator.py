@@ -412,7 +412,7 @@ def overlap(
     up = normals[lower] + normals[upper]
     up /= np.maximum(np.linalg.norm(up, axis=1), np.finfo(float).tiny)[:, None]
     apart = np.einsum("ij,ij->i", points[upper] - points[lower], up)
-    return float(-(np.minimum(apart, 0.0) * areas[upper]).sum())
+    return float(np.maximum(-apart, 0.0) @ areas[upper])
 
 
 def drift(states: Sequence[State]) -> float:

@@ -38,17 +38,20 @@ def test_the_files_are_those_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("design", [BALLOON, LOBED, ("1dof-10mm",), ("1dof-5mm",)], ids=" ".join)
 def test_mujoco_reads_the_mesh_as_it_was_meant(tmp_path: Path, design: tuple[str, ...]) -> None:
-    """Node i is body i + 1: flat at qpos0, where MuJoCo takes its lengths, inflated in the key."""
+    """Node i is body i + 1: flat at qpos0, where MuJoCo takes its lengths, inflated in the key.
+
+    The model's lengths are cm.
+    """
     mesh = actuator(sbafab.build(*design)).mesh
     model = mujoco.MjModel.from_xml_path(str(written(tmp_path, *design)))
     state = mujoco.MjData(model)
     mujoco.mj_kinematics(model, state)
-    assert state.xpos[1:] == pytest.approx(np.array(mesh.rest), abs=1e-9)
+    assert 10 * state.xpos[1:] == pytest.approx(np.array(mesh.rest), abs=1e-7)
     mujoco.mj_resetDataKeyframe(model, state, model.key("inflated").id)
     mujoco.mj_kinematics(model, state)
     still = model.body_dofnum[1:, None] == 0
     expected = np.where(still, mesh.rest, mesh.position)
-    assert state.xpos[1:] == pytest.approx(expected, abs=1e-9)
+    assert 10 * state.xpos[1:] == pytest.approx(expected, abs=1e-7)
     assert model.nflexelem == len(mesh.single) + len(mesh.double)
     bodies = model.flex_vertbodyid - 1
     corners = model.flex_elem.reshape(-1, 3)

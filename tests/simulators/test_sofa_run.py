@@ -16,6 +16,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
+from sbafab.simulators.coarse.shell import nearly_flat
 from sbafab.simulators.simulator import State, drift, impossible, limits, overlap, tilt_of
 from sbafab.simulators.sofa.run import (
     RecordedFilms,
@@ -27,7 +28,7 @@ from sbafab.simulators.sofa.run import (
     simulate,
 )
 from sbafab.simulators.sofa.scenes import write_scenes
-from sbafab.simulators.sofa.shell import nearly_flat, round_actuator, round_shell
+from sbafab.simulators.sofa.shell import round_actuator, round_shell
 
 HALF_TURN = "T= 0.3\n  X= 0 0 5 0 1 5 0 0 6\n"
 """Three points whose plane has the normal (1, 0, 0)."""

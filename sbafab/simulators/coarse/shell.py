@@ -96,6 +96,15 @@ def standing(balloon: float) -> Start:
     return start
 
 
+RISE = 0.15
+"""mm a balloon of 5 mm is high at the start: a dome so flat that the film is nearly at rest."""
+
+
+def nearly_flat(pocket: float, neck: float) -> Meridian:
+    """A balloon that has only just risen."""
+    return standing(RISE * pocket / 2.5)(pocket, neck)
+
+
 def holding(neck: float, length: float, volume: float) -> Meridian:
     """The shape of this volume, or the one that holds most."""
     most = _holding_most(neck, length).slope

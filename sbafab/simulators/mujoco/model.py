@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -12,12 +13,16 @@ from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.rounds import why_not_round
-from sbafab.simulators.coarse.shell import CoarseActuator, Triangle, actuator, area
+from sbafab.simulators.coarse.shell import CoarseActuator, Triangle, actuator, area, nearly_flat
 
 DT = 0.01
 """s: a step. The integrator is implicit; four times as long does as well."""
 SOLVER_STEPS = 1000
 """Of the solver in each time step; the usual 100 do not suffice for long stacks."""
+LENGTH = 10.0
+"""mm in a unit of the model's length. MuJoCo's contact of films keeps them a thousandth of a unit
+apart and calls them at rest below a twentieth of a unit in a second: in cm that is 0.01 mm, a
+quarter of a film, and in mm it takes forty times the iterations."""
 START = "inflated"
 COLOURS = {
     "lower": "0.35 0.60 0.85 1",
@@ -40,9 +45,13 @@ def model_text(actuator: CoarseActuator) -> str:
             "iterations": str(SOLVER_STEPS),
         },
     )
-    ET.SubElement(option, "flag", {"contact": "disable", "autoreset": "disable"})
+    contact = {"ipc": "enable"} if has_contact(actuator) else {"contact": "disable"}
+    ET.SubElement(option, "flag", {**contact, "autoreset": "disable"})
     height = actuator.mesh.height
-    centre = {"center": f"0 0 {_number(height / 2)}", "extent": _number(max(height, 5.0))}
+    centre = {
+        "center": f"0 0 {_number(height / 2 / LENGTH)}",
+        "extent": _number(max(height, 5.0) / LENGTH),
+    }
     ET.SubElement(root, "statistic", centre)
     _add_nodes(ET.SubElement(root, "worldbody"), actuator)
     _add_films(ET.SubElement(root, "deformable"), actuator)
@@ -50,6 +59,11 @@ def model_text(actuator: CoarseActuator) -> str:
     ET.indent(root, " ")
     body = ET.tostring(root, encoding="unicode")
     return f'<?xml version="1.0"?>\n<!--\n{_note(actuator)}\n-->\n{body}\n'
+
+
+def has_contact(actuator: CoarseActuator) -> bool:
+    """Return True if films touch: those of chambers that are told less than others."""
+    return len({pressure for _, pressure in actuator.pressures}) > 1
 
 
 def fixed_nodes(actuator: CoarseActuator) -> frozenset[int]:
@@ -65,7 +79,7 @@ def _add_nodes(world: ET.Element, actuator: CoarseActuator) -> None:
     still = fixed_nodes(actuator)
     masses = _masses(actuator)
     for node, place in enumerate(actuator.mesh.rest):
-        body = ET.SubElement(world, "body", {"name": f"n{node}", "pos": _numbers(place)})
+        body = ET.SubElement(world, "body", {"name": f"n{node}", "pos": _lengths(place)})
         if node in still:
             continue
         mass = _number(masses[node])
@@ -90,18 +104,19 @@ def _add_films(deformable: ET.Element, actuator: CoarseActuator) -> None:
             {
                 "name": name,
                 "dim": "2",
-                "radius": _number(thickness / 2),
+                "radius": _number(thickness / 2 / LENGTH),
                 "rgba": COLOURS[name],
                 "body": " ".join(f"n{node}" for node in nodes),
                 "element": " ".join(str(place[node]) for t in triangles for node in t),
             },
         )
-        contact = {"selfcollide": "none", "contype": "0", "conaffinity": "0"}
-        ET.SubElement(flex, "contact", contact)
+        touches = {"selfcollide": "auto", "contype": "1", "conaffinity": "1"}
+        apart = {"selfcollide": "none", "contype": "0", "conaffinity": "0"}
+        ET.SubElement(flex, "contact", touches if has_contact(actuator) else apart)
         elasticity = {
-            "young": _number(actuator.young),
+            "young": _number(actuator.young * LENGTH),
             "poisson": _number(actuator.poisson),
-            "thickness": _number(thickness),
+            "thickness": _number(thickness / LENGTH),
             "elastic2d": "both",
         }
         ET.SubElement(flex, "elasticity", elasticity)
@@ -116,7 +131,7 @@ def _add_start(keyframe: ET.Element, actuator: CoarseActuator) -> None:
         if node not in still
         for p, q in zip(rest, position, strict=True)
     )
-    ET.SubElement(keyframe, "key", {"name": START, "qpos": _numbers(moved)})
+    ET.SubElement(keyframe, "key", {"name": START, "qpos": _lengths(moved)})
 
 
 def film_groups(actuator: CoarseActuator) -> list[tuple[str, Sequence[Triangle], int]]:
@@ -150,12 +165,13 @@ def _masses(actuator: CoarseActuator) -> list[float]:
 def _note(actuator: CoarseActuator) -> str:
     mesh = actuator.mesh
     triangles = len(mesh.single) + len(mesh.double)
+    contact = "the flag ipc is on" if has_contact(actuator) else "all are told the same here"
     # Two hyphens in a row would end an XML comment.
     name = actuator.stack.name.replace("--", "- -")
     return f"""\
 {name}: a stack of balloons for MuJoCo 4.0 or newer. Up to 3.17 a flex of dimension 2
 stretches with a quarter of its modulus: do not run it there.
-Units: mm, kg, s; so force mN, pressure and modulus kPa, volume ul.
+Units: cm, kg, s; so force cN, pressure and modulus mbar, volume ml.
 Mesh: {len(mesh.rest)} nodes, {triangles} triangles, rings of {actuator.sectors} nodes: not mesh
 converged. Node i is the body n<i>. It stands flat, where the film is free of stress; the key
 "{START}" is where runs start.
@@ -163,7 +179,8 @@ Pressure is not in this file: inflate.py puts it on the cavities that actuator.j
 Not scaled: mass ({actuator.mass:.3g} kg), modulus and thickness are the film's. No damping is set,
 but steps of {DT:g} s of an implicit integrator damp all that is faster: transients and settling
 times mean nothing, only the state at rest.
-Not in it: gravity, contact of films, inlet tabs and strips. Not validated by a measurement."""
+Films of chambers that are told less than others touch: {contact}.
+Not in it: gravity, inlet tabs and strips. Not validated by a measurement."""
 
 
 def _number(value: float) -> str:
@@ -171,8 +188,8 @@ def _number(value: float) -> str:
     return f"{value + 0.0:.9g}"
 
 
-def _numbers(values: Iterable[float] | Vector) -> str:
-    return " ".join(_number(round(value, 9)) for value in values)
+def _lengths(values: Iterable[float] | Vector) -> str:
+    return " ".join(_number(round(value / LENGTH, 9)) for value in values)
 
 
 # The model of a design as files.
@@ -200,6 +217,9 @@ def write_model(
     make a ring. Raises DesignError where the pockets are not round or a chamber is unknown.
     """
     coarse = actuator(laminate, pressures, sectors)
+    if has_contact(coarse):
+        # Films that fall a long way onto each other take many iterations.
+        coarse = replace(coarse, start=nearly_flat)
     texts = {
         MODEL: model_text(coarse),
         DATA: json.dumps(_data(coarse), separators=(",", ":")) + "\n",
@@ -217,6 +237,7 @@ def _data(coarse: CoarseActuator) -> dict[str, object]:
         "schema": "sbafab/mujoco@1",
         "name": coarse.stack.name,
         "units": {"length": "mm", "mass": "kg", "time": "s", "pressure": "kPa", "volume": "ul"},
+        "length": LENGTH,
         "start": START,
         "pressures": dict(coarse.pressures),
         "films": 2 * coarse.balloons * coarse.stack.film.thickness,

@@ -166,7 +166,7 @@ class _Inflation:
 
     def _placed(self) -> Any:
         self.mujoco.mj_kinematics(self.model, self.data)
-        return self.data.xpos[1:].copy()
+        return self.data.xpos[1:] * self.told["length"]
 
     def step(self) -> None:
         """One time step under the pressures of this time, which follow the films."""
@@ -179,7 +179,7 @@ class _Inflation:
             push = np.cross(b - a, c - a) * (share * self.told["pressures"][name] / 6)
             for corner in triangles.T:
                 np.add.at(forces, corner, push)
-        self.data.qfrc_applied[:] = forces[self.free].ravel()
+        self.data.qfrc_applied[:] = forces[self.free].ravel() / self.told["length"]
         self.mujoco.mj_step(self.model, self.data)
         self.nodes = self._placed()
 
@@ -229,7 +229,8 @@ class _Inflation:
             first = model.flex_elemdataadr[flex]
             corners = model.flex_elem[first : first + 3 * model.flex_elemnum[flex]]
             films.append(nodes[corners.reshape(-1, 3)])
-        return overlap(self.nodes, model.body_pos[1:], self.start, np.concatenate(films))
+        flat = model.body_pos[1:] * self.told["length"]
+        return overlap(self.nodes, flat, self.start, np.concatenate(films))
 
 
 @contextmanager

@@ -15,7 +15,13 @@ from sbafab.geometry.edges import Point
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.simulators.coarse.rounds import elastic_of, why_not_round
-from sbafab.simulators.coarse.shell import CoarseActuator, CoarseMesh, Triangle, standing
+from sbafab.simulators.coarse.shell import (
+    CoarseActuator,
+    CoarseMesh,
+    Triangle,
+    nearly_flat,
+    standing,
+)
 from sbafab.simulators.sofa.shell import (
     COARSE_SECTORS,
     FilmGroup,
@@ -23,7 +29,6 @@ from sbafab.simulators.sofa.shell import (
     conforming_shell,
     film_groups,
     half_full,
-    nearly_flat,
     round_actuator,
     round_shell,
 )

@@ -27,7 +27,7 @@ from sbafab.simulators.coarse.shell import (
     actuator,
     checked,
     holding,
-    standing,
+    nearly_flat,
 )
 
 if TYPE_CHECKING:
@@ -41,8 +41,6 @@ SECTORS = 12
 """Nodes of a ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
 COARSE_SECTORS = 8
 """Nodes of a ring in the other scenes."""
-RISE = 0.15
-"""mm a balloon of 5 mm is high at the start: a dome so flat that the film is nearly at rest."""
 
 
 class FilmGroup(NamedTuple):
@@ -77,11 +75,6 @@ class Shell:
     size: float
     about: str
     reading: Reading = "tip"
-
-
-def nearly_flat(pocket: float, neck: float) -> Meridian:
-    """A balloon that has only just risen."""
-    return standing(RISE * pocket / 2.5)(pocket, neck)
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
