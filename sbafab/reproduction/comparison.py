@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sbafab.calibration.curve_intervals import Ends, curve_intervals, uncertainty_for
+from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
 from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.evidence.records import Evidence, MeasuredCurve
-from sbafab.models.calibrated import ModelCalibration
+from sbafab.models.calibrated import Ends, ModelCalibration
 from sbafab.models.figures import Factors
 from sbafab.output.schema_ids import COMPARISON_SCHEMA
 
