@@ -157,7 +157,7 @@ def simulate(
     def report(reached: float) -> None:
         # Time says nothing of the load, which rises with its square, nor of how long the rest
         # takes: steps get shorter where films wrinkle.
-        progress(f"ccx, {top * settings.share(reached):.3g} of {top:g} kPa", 0, 1)
+        progress(f"ccx, {top * settings.share(reached) + 0.0:.3g} of {top:g} kPa", 0, 1)
 
     report(0.0)
     ending = run_ccx(folder, JOB, settings.ramp, timeout, report)
