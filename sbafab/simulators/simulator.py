@@ -128,7 +128,8 @@ SAME_TIME = 1e-6
 
 @dataclass(frozen=True)
 class Result:
-    """Result of a run: its ``states`` in order of time, and ``figures`` by name of ``FIGURES``.
+    """Result of a run: its ``states`` in order of time, and ``figures`` (mm, ul, MPa, uJ or
+    steps/s) by name of ``FIGURES``.
 
     ``stopped`` is one sentence if it ended early; the results until then are valid.
     """

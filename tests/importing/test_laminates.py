@@ -74,6 +74,13 @@ def untimed(press: bytes) -> bytes:
     )
 
 
+def measured(checks: bytes) -> bytes:
+    """Return a folder's findings without their sentences."""
+    found = json.loads(checks)["findings"]
+    rows = [{k: v for k, v in row.items() if k not in ("message", "remedy")} for row in found]
+    return json.dumps(rows).encode()
+
+
 def imported(folder: Path, file: Path) -> Written:
     return write_imported(import_folder(folder), file, folder.name)
 
@@ -103,6 +110,9 @@ def test_a_folder_comes_back_with_the_same_bytes(name: str, tmp_path: Path) -> N
         if path.name == "press.json":
             # Nobody timed the work at drawn layers, so that their minutes are null.
             ours_text, theirs_text = untimed(ours_text), untimed(theirs_text)
+        if path.name == "checks.json":
+            # What mends a family's design, a wider bond say, mends no drawn one.
+            ours_text, theirs_text = measured(ours_text), measured(theirs_text)
         assert theirs_text.replace(theirs, ours) == ours_text, path.name
 
 
