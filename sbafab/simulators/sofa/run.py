@@ -169,7 +169,7 @@ def run_scene(
     state.unlink(missing_ok=True)
     films = RecordedFilms(scene)
     recorded = folder / RECORDED_SCENE
-    recorded.write_text(films.recording(), encoding="utf-8")
+    recorded.write_text(films.recording(), encoding="utf-8", newline="\n")
     # The tip is written at the beginning of a step: one more step writes the last.
     steps = round(seconds / dt) + 1
     log_path = folder / LOG_FILE
