@@ -72,7 +72,6 @@ from sbafab.notebook import table_html
 if TYPE_CHECKING:
     from pydantic import GetJsonSchemaHandler
     from pydantic.json_schema import JsonSchemaValue
-    from pydantic_core import CoreSchema
 
 
 def card(title: str, symbol: str) -> ConfigDict:
@@ -262,7 +261,7 @@ class Design(Section):
 
     @classmethod
     def __get_pydantic_json_schema__(
-        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+        cls, core_schema: Any, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         schema: JsonSchemaValue = super().__get_pydantic_json_schema__(core_schema, handler)
         for key in cls.unused:
