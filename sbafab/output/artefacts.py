@@ -544,7 +544,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
         "cut",
         "of a batch: the bill of materials",
         _bill,
-        needs=frozenset(("press",)),
+        needs=frozenset(("press", "preview")),
         is_page=True,
     ),
     Artefact(

@@ -166,7 +166,7 @@ def test_running_the_design_again_removes_a_foreign_file(
 
 def test_files_of_other_commands_belong_to_the_folder(tmp_path: Path) -> None:
     """Cut files first, meshes and a schedule in runs of their own; nothing of them is foreign."""
-    design = load_design("1dof-5mm", FEW)
+    design = load_design("1dof-5mm", (*FEW, "order.copies=2"))
     for part in ("cut", "mesh", "press"):
         folder = generate(RunRequest(design, tmp_path, (part,))).folder
     assert not failing(folder)

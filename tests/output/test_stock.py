@@ -196,7 +196,7 @@ def batch(tmp_path: Path, items: list[dict[str, Any]]) -> tuple[Path, Path]:
     source = tmp_path / "little.toml"
     source.write_text(template_text("1dof-5mm"), encoding="utf-8")
     design = load_design(source, (f"sheets.stock={shelf.name}", "order.copies=20"))
-    return generate(RunRequest(design, tmp_path / "out", ("cut", "press"))).folder, shelf
+    return generate(RunRequest(design, tmp_path / "out", ("cut", "press", "preview"))).folder, shelf
 
 
 def test_a_bill_says_what_the_stock_lacks(tmp_path: Path) -> None:
