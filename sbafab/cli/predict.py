@@ -51,7 +51,7 @@ from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
 from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
 from sbafab.reports.assembly_prediction import AssemblyPrediction, as_json, predict_assembly
-from sbafab.runs.run import Run, RunRequest, generate
+from sbafab.runs.run import RunRequest, generate
 
 if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
@@ -128,8 +128,8 @@ def predict(
 
     Prints the main figures, with the paper's measurements where models differ from them by more
     than a quarter. -v and predict.json, which is written with plots, hold all figures with their
-    models and validity. A design that fails a rule is predicted on the screen only (exit code 1),
-    and so is one whose folder holds another design's files.
+    models and validity. A design that fails a rule is predicted on the screen only (exit code 1).
+    Where the folder holds another design's files, the prediction goes into one beside it.
     Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
     one pressure (default 10 kPa).
     """
@@ -162,8 +162,7 @@ def predict(
         document = prediction_json(design, prediction)
         if sensitivity:
             document["sensitivity"] = [row._asdict() for row in rows]
-        folder = None if run.occupied else str(run.folder)
-        print_json({**document, "failed": failed, "folder": folder})
+        print_json({**document, "failed": failed, "folder": str(run.folder)})
     else:
         print_listed("size", size_phrases(design, run.laminate, prediction.asked.factors))
         print_prediction(prediction, verbose)
@@ -173,22 +172,17 @@ def predict(
             details = "" if verbose else " Details: -v"
             print_verdict(
                 f"{design.name} predicted: {len(prediction.figures)} figures with models and "
-                f"validity. {_place(run)}{details}",
-                None if run.occupied else run.folder,
+                f"validity. Written to {run.folder}: predict.json, predict/.{details}",
+                run.folder,
             )
+    if run.beside:
+        print_error(f"{run.beside}; the prediction was put into {run.folder}")
     if run.failed:
         print_error(
             f"{design.name} failed: {', '.join(failed)}. It may leak or burst, and no prediction "
             "was written. Change the design or waive the rule by name"
         )
         click.get_current_context().exit(RULE_FAILED)
-
-
-def _place(run: Run) -> str:
-    """Return where a prediction was written, or why it was not."""
-    if run.occupied:
-        return f"Nothing was written: {run.occupied}."
-    return f"Written to {run.folder}: predict.json, predict/."
 
 
 def _print_sensitivity(rows: Sequence[SensitivityRow], pressure: float) -> None:

@@ -24,7 +24,6 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import Group, print_failed, print_findings, print_json, print_verdict
 from sbafab.cli.progress import shown_progress
-from sbafab.models.paper import BURST
 from sbafab.output.checked import checks
 from sbafab.runs.run import result_json
 from sbafab.runs.run import simulate as run
@@ -122,12 +121,6 @@ def simulate(request: Request, simulator: Name, export: bool, **settings: Any) -
         _print(design.name, result, simulation.folder)
     if simulation.beside:
         print_error(f"{simulation.beside}; the results were put into {simulation.folder}")
-    highest = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
-    if highest > BURST.value:
-        print_error(
-            f"warning: the paper's actuators burst at {BURST.value:g} kPa; films cannot tear or "
-            f"yield in the simulation, so its results at {highest:g} kPa are not physical"
-        )
     if result is not None and result.stopped is not None:
         print_error(result.stopped)
         click.get_current_context().exit(RULE_FAILED)

@@ -22,6 +22,8 @@ from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
 
+EARS = 'set registration.method = "ears", or draw ears and list their pins if layers are drawn'
+"""Remedy where a hand places what pins could hold."""
 INSIDE: Final = 0.05
 """mm from an edge at which shapes are tested for overlap before booleans are computed."""
 BESIDE: Final = 4

@@ -15,7 +15,7 @@ from sbafab.geometry.on_demand import np
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import Freedom
+from sbafab.rules.freedoms import EARS, Freedom
 from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
 from sbafab.rules.margins import (
     InterfaceMargins,
@@ -137,8 +137,8 @@ RULE = Rule(
     Explanation(
         "with every error at its worst 0.5 mm of a bond and 0.25 mm of an overhang are left",
         "Cutting and pins must leave that (else it fails); what a hand may take only warns.",
-        'Lay up with care, set registration.method = "ears", make bond and overhang larger, or run '
-        "seams farther past each other and past edges.",
+        f"Lay up with care, {EARS}, make bond and overhang larger, or run seams farther past each "
+        "other and past edges.",
         (
             "rules.worst_bond_width",
             "rules.worst_mask_overhang",
@@ -287,7 +287,7 @@ def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> 
     on_its_own = loose.lowest == loose.highest
     masks_pocket = on_its_own and laminate.layer(loose.lowest).role == "chamber-mask"
     if laminate.registration == "channel-pin" and not masks_pocket:
-        return f'align {where} with care, or set registration.method = "ears", which pins it'
+        return f"align {where} with care, or {EARS}"
     return (
         f"align {where} with care (registration.hand_placement, registration.hand_turn), or "
         f"{REMEDY[quantity]}"

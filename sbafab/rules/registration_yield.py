@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from sbafab.geometry.on_demand import np
 from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
-from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.freedoms import EARS, Freedom, Freedoms
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
 from sbafab.rules.margins import QUANTITIES, LinearForms, Owner, Quantity, seated
 from sbafab.rules.measures import Measures
@@ -628,7 +628,7 @@ def _remedy(laminate: Laminate) -> str:
     """Remedy for a low yield."""
     wider = "ask `sbafab check --target-yield 0.95` how much wider bonds and overhangs should be"
     if laminate.registration == "channel-pin":
-        return f'{wider}, or set registration.method = "ears"'
+        return f"{wider}, or {EARS}"
     return wider
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -21,6 +22,7 @@ from sbafab.assemblies.records import Assembly
 from sbafab.cutting.properties import TRUE_ARCS, Curves
 from sbafab.design.records import Design
 from sbafab.errors import DefectError, OccupiedError, OutputError
+from sbafab.laminate.burst import burst
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.figures import Prediction
 from sbafab.notebook import table_html
@@ -105,8 +107,8 @@ class Run:
     """Files of an older run of another design or version that this one removed."""
     kept: bool = False
     """True if it failed and ``folder`` was left as it was."""
-    occupied: str = ""
-    """Why a prediction was not written: ``folder`` holds another design's files."""
+    beside: str = ""
+    """Why ``folder`` is one beside the design's own: that one holds another design's files."""
     left_out: tuple[tuple[str, str], ...] = ()
     """Simulators that got no input, with the reason."""
 
@@ -164,9 +166,9 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     """Write the folder of a request and return the outcome.
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
-    meshes; a folder that holds another design's is then left untouched (``Run.kept``), and so it
-    is where a prediction alone would be written (``Run.occupied``). Of several
-    designs nothing is written if one fails. With some of the ``parts`` only, the others stay if
+    meshes; a folder that holds another design's is then left untouched (``Run.kept``). A prediction
+    alone goes into a folder beside such a one (``Run.beside``). Of several designs nothing is
+    written if one fails. With some of the ``parts`` only, the others stay if
     they are of the same design. Raises DesignError or OutputError, also where other parts are
     another design's, and DefectError where the cut files read back are not what was checked; the
     old folder is then whole.
@@ -174,12 +176,15 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     progress = progress or ignore_progress
     job = cut_from_stock(check_job(request.source, request.name, progress))
     target = request.out / job.name
+    beside = ""
     try:
         parts = _parts_to_write(request, job, target)
     except OccupiedError as reason:
         if set(request.parts) != {"predict"}:
             raise
-        return Run(job, target, occupied=str(reason))
+        beside = str(reason)
+        target = request.out / f"{job.name}-predict"
+        parts = _parts_to_write(request, job, target)
     if parts is None:
         return Run(job, target, kept=True)
     plan = _plan(request, job, parts, target, progress)
@@ -192,7 +197,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
         if plan.is_cut:
             verify_written(plan, folder, progress)
     removed = removed_files(listed, written.index)
-    return Run(job, target, written.index, plan, removed, left_out=written.left_out)
+    return Run(job, target, written.index, plan, removed, beside=beside, left_out=written.left_out)
 
 
 def _parts_to_write(request: RunRequest, job: CheckedJob, target: Path) -> set[RunPart] | None:
@@ -351,6 +356,7 @@ def simulate(
         # Said before a run of hours, not after it.
         refuse_to_replace(out / design.name, design, checked.waived, (name,))
         refuse_busy(out / design.name)
+        _warn_past_burst(checked.laminate, wish)
         # A folder in the temporary one has the usual rights, the temporary one itself has not.
         folder = Path(temporary) / name
         if export:
@@ -371,6 +377,17 @@ def simulate(
                 checked.findings, _kept(folder, out / f"{design.name}-{name}"), result, str(error)
             )
     return Simulated(checked.findings, run.folder / name, result)
+
+
+def _warn_past_burst(laminate: Laminate, wish: SimulationRequest) -> None:
+    estimate = burst(laminate)
+    highest = max(wish.pressure or 0.0, *wish.chambers.values(), 0.0)
+    if estimate is not None and highest > estimate.kpa:
+        warnings.warn(
+            f"{highest:g} kPa is past the estimated burst pressure, {estimate.kpa:.3g} kPa; films "
+            "cannot tear or yield in the simulation, so its results there are not physical",
+            stacklevel=3,
+        )
 
 
 def _kept(folder: Path, place: Path) -> Path:

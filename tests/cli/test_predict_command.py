@@ -98,22 +98,26 @@ def test_twice_the_same_bytes_and_a_later_run_keeps_them(
     assert {"predict.json", "predict/force.svg", "press.json"} <= set(kept.manifest["files"])
 
 
-def test_a_prediction_leaves_another_designs_folder_and_says_so(
+def test_a_prediction_goes_beside_another_designs_folder_and_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     wide = sbafab.load("1dof-5mm", "stack.balloons=1", "chamber.diameter=6")
     folder = generate(RunRequest(wide, tmp_path, ("cut",))).folder
     before = file_hashes(folder)
+    beside = tmp_path / "1dof-5mm-predict"
     arguments = ["1dof-5mm", "--set", "stack.balloons=1", "-o", str(tmp_path)]
     code, out, err = run(arguments, capsys)
-    assert (code, err) == (0, "")
-    told = " ".join(out.split())
-    assert f"Nothing was written: {folder} holds layers, sheets" in told
+    assert code == 0
+    assert f"Written to {beside}" in " ".join(out.split())
+    told = " ".join(err.split())
+    assert f"{folder} holds layers, sheets" in told
     assert "another design (chamber.diameter = 6.0 there, 5.0 here); take" in told
-    code, out, err = run([*arguments, "--json"], capsys)
-    assert (code, err) == (0, "")
+    assert f"the prediction was put into {beside}" in told
+    code, out, _ = run([*arguments, "--json"], capsys)
+    assert code == 0
     hold("predict", json.loads(out))
-    assert json.loads(out)["folder"] is None
+    assert json.loads(out)["folder"] == str(beside)
+    assert (beside / "predict.json").is_file()
     assert file_hashes(folder) == before
 
 

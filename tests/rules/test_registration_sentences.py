@@ -11,7 +11,7 @@ import pytest
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules import registration_worst_case
 from sbafab.rules.finding import Finding, Place
-from sbafab.rules.freedoms import Freedom
+from sbafab.rules.freedoms import EARS, Freedom
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.margins import Push
 from sbafab.rules.measures import Measures
@@ -164,9 +164,7 @@ def test_a_layer_laid_by_hand_costs_most(good: Good) -> None:
         "; largest contribution: hand placement of layer 4 in step 3, 0.300 mm; that is short of "
         "0.5 at 4 interfaces, though pins and cutting alone leave 0.750 mm"
     )
-    assert bond.remedy == (
-        'align layer 4 in step 3 with care, or set registration.method = "ears", which pins it'
-    )
+    assert bond.remedy == f"align layer 4 in step 3 with care, or {EARS}"
     assert bond.message.startswith(f"{bond.remedy}: at worst 0.150 mm is left")
     assert ": at worst nothing is left of the 0.500 mm overhang" in overhang.message
 

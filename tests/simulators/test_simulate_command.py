@@ -165,6 +165,15 @@ def test_a_design_that_breaks_a_rule_is_not_simulated(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("kpa", "warned"), [("183", False), ("184", True)])
+def test_past_this_designs_burst_is_warned_of(kpa: str, warned: bool, tmp_path: Path) -> None:
+    """Pockets twice as wide as the paper's, which burst at 367 kPa: half of that by film stress."""
+    arguments = ["1dof-10mm", "--with", "sofa", "--export", "--pressure", kpa, "-o", str(tmp_path)]
+    result = CliRunner().invoke(app, ["simulate", *arguments])
+    assert result.exit_code == 0
+    assert ("past the estimated burst pressure" in result.stderr) == warned
+
+
 def test_export_keeps_what_is_there(tmp_path: Path) -> None:
     folder = tmp_path / "1dof-5mm"
     for command in (["press"], ["simulate", "--with", "sofa", "--export", "--pressure", "3"]):

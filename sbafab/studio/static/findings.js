@@ -69,7 +69,8 @@ export class Findings {
     const row = (figure) => {
       const was = before.get(named(figure));
       const change = was === undefined || was === figure.value ? "" : `${figure.value > was ? "+" : "−"}${significant(Math.abs(figure.value - was))}`;
-      const beside = figure.measured ? `(${figure.measured.sentence})` : "";
+      const said = [...(figure.flags ?? []).map((flag) => flag.replaceAll("-", " ")), ...(figure.measured ? [figure.measured.sentence] : [])];
+      const beside = said.length ? `(${said.join("; ")})` : "";
       const range = figure.interval ? el("small", { class: "beside", title: "90 % interval" }, `90 %: ${figure.interval.map((end) => significant(end)).join(" to ")}`) : null;
       return el("tr", { title: `${figure.model}. ${figure.trust}` }, el("td", {}, figure.name, range, beside ? el("small", { class: "beside" }, beside) : null), el("td", { class: "v" }, significant(figure.value)), el("td", { class: "n" }, figure.unit), reference ? el("td", { class: "d" }, change) : null);
     };
