@@ -9,13 +9,13 @@ from typing import Any
 from sbafab.api.designs import Source, command
 from sbafab.cutting.calibration import Calibration, calibrated, read_measurements
 from sbafab.design.files import Change
+from sbafab.errors import DesignError
 from sbafab.reports.traveller.record_sheet import RecordTable
 from sbafab.results import recording
-from sbafab.results.history import HistoryEntry, StoredEntry, entries_of, store_photograph
-from sbafab.results.records import Record
+from sbafab.results.records import HistoryEntry, Record, columns, row_of
 from sbafab.results.report import Report
 from sbafab.results.report import report as report_of
-from sbafab.results.store import Lab
+from sbafab.results.store import Lab, store_photograph
 
 
 def kerf(
@@ -49,13 +49,12 @@ def record(
     design. A ``table`` (CSV) says it of a batch instead. ``again`` records new attempts of
     actuators that were mended and tested again. Raises DesignError, OutputError.
     """
-    results_by_name = {
-        name: value for name, value in values.items() if name in recording.RESULT_NAMES
-    }
-    tables = {name: value for name, value in values.items() if name not in recording.RESULT_NAMES}
-    results = recording.results_of(results_by_name, table)
-    built = recording.built_from(source, [*changes, tables] if tables else changes)
-    return recording.record(Lab(Path(lab)), built, results, again)
+    result = {name: values.pop(name) for name in columns(Record) if name in values}
+    if table is not None and result:
+        raise DesignError(f"a table says it all; leave out {', '.join(result)}")
+    rows = [row_of(Record, result)] if table is None else recording.read_batch(Path(table))
+    built = recording.built_from(source, [*changes, values] if values else changes)
+    return recording.record(Lab(Path(lab)), built, rows, again)
 
 
 def record_history(
@@ -64,7 +63,7 @@ def record_history(
     entries: Sequence[Mapping[str, Any]],
     lab: str | Path = "lab.sqlite",
     again: bool = False,
-) -> list[StoredEntry]:
+) -> list[HistoryEntry]:
     """Record lines of the history of devices in the lab's file; return the entries added.
 
     An entry has ``serial`` (several with commas between them) and ``date``, ``step``, ``item``,
@@ -79,9 +78,9 @@ def record_history(
         if isinstance(content, bytes):
             values["photograph"] = store_photograph(Path(lab), content, f"photograph {number}")
         step = values.get("step") or values.get("item")
-        lines += entries_of(values, f"{step}" if step else f"entry {number}")
+        lines += recording.entries_of(values, f"{step}" if step else f"entry {number}")
     built = recording.built_from(source, changes)
-    return recording.record_history(Lab(Path(lab)), built, lines, again)
+    return recording.record(Lab(Path(lab)), built, lines, again)
 
 
 def record_sheet(source: Source, *changes: Change) -> tuple[RecordTable, ...]:
@@ -98,4 +97,5 @@ def report(lab: str | Path = "lab.sqlite") -> Report:
     Units stand in the names and in ``unit``; shares come with their interval of 95 %. Raises
     OutputError where the file cannot be read.
     """
-    return report_of(*Lab(Path(lab)).contents())
+    records, _, builds = Lab(Path(lab)).contents()
+    return report_of(records, builds)

@@ -15,7 +15,7 @@ from sbafab.cli.options import (
     out_option,
     set_option,
 )
-from sbafab.cli.printing import console, print_json, print_line, print_verdict
+from sbafab.cli.printing import print_json, print_table, print_verdict
 from sbafab.cli.progress import shown_progress
 from sbafab.search.compare import (
     PAGE,
@@ -84,33 +84,17 @@ def _counted(number: int, noun: str) -> str:
 
 def print_comparison(comparison: DesignComparison) -> None:
     """Print keys and rules that differ, and the main figures of both designs."""
-    names = comparison.names
+    names = ("", *comparison.names)
     print_table("Keys", names, [(r.key, *map(value_text, r.values)) for r in comparison.keys])
     print_table("Rules", names, [(r.rule, *map(margin_text, r.margins)) for r in comparison.rules])
     print_figures(comparison, names)
 
 
-def print_figures(comparison: DesignComparison, names: tuple[str, str]) -> None:
-    """Print the main figures of both designs."""
+def print_figures(comparison: DesignComparison, names: Sequence[str]) -> None:
+    """Print the main figures of both designs, below the names of the columns."""
     main = [
         (f"{pair.name}, {pair.unit}", *map(reached_text, pair.figures))
         for pair in comparison.figures
         if pair.is_main
     ]
     print_table("Figures, in parentheses the 90 % interval", names, main)
-
-
-def print_table(title: str, names: tuple[str, str], rows: Sequence[tuple[str, ...]]) -> None:
-    """Print a table of two designs; nothing without rows."""
-    from rich.table import Table
-    from rich.text import Text
-
-    if not rows:
-        return
-    print_line(title, "bold")
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", *names):
-        table.add_column(Text(name))
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console().print(table)

@@ -16,7 +16,7 @@ from sbafab.cli.options import (
     sheet_options,
     target_yield_option,
 )
-from sbafab.cli.printing import console, facts_table, print_line, print_wrapped
+from sbafab.cli.printing import console, facts_table, print_line, print_table, print_wrapped
 from sbafab.cli.progress import shown_progress
 from sbafab.cli.run import add_batch, print_run, print_run_verdict, run_json, run_request
 from sbafab.design.files import changed_keys
@@ -70,7 +70,7 @@ def _generate_for_yield(
 ) -> None:
     """Write the folder of a design changed for a yield; exits with 1 if none reaches it."""
     # Both designs are predicted, which a plain run does not do: models load slowly.
-    from sbafab.cli.compare import print_figures, print_table
+    from sbafab.cli.compare import print_figures
     from sbafab.search.compare import value_text
     from sbafab.search.target_yield import DESIGNS, reach_yield
 
@@ -83,9 +83,10 @@ def _generate_for_yield(
 
     def show(run: Run) -> None:
         if reached.comparison is not None:
+            names = ("", *DESIGNS)
             rows = [(row.key, *map(value_text, row.values)) for row in reached.changes]
-            print_table("Changed for the yield", DESIGNS, rows)
-            print_figures(reached.comparison, DESIGNS)
+            print_table("Changed for the yield", names, rows)
+            print_figures(reached.comparison, names)
         print_wrapped(reached.sentence)
         print_line("")
         print_run(run)

@@ -66,6 +66,22 @@ def print_line(text: str, style: str = "") -> None:
     console().print(Text(text, style=style), soft_wrap=True)
 
 
+def print_table(title: str, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table below its title; nothing without rows."""
+    from rich.table import Table
+    from rich.text import Text
+
+    if not rows:
+        return
+    print_line(title, "bold")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in names:
+        table.add_column(Text(name), overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console().print(table)
+
+
 def print_facts(facts: Iterable[tuple[str, str]]) -> None:
     """Print a table of labels and texts."""
     from rich.text import Text

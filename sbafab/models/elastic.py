@@ -330,7 +330,8 @@ def _forces(
             if pose and not pose.stable:
                 model = replace(model, trust=f"{BUCKLES}; {model.trust}")
             value *= actuator.form.pushing
-            yield Figure("force", name, value, "N", model, pressure_kpa=pressure), pose
+            figure = Figure("force", name, value, "N", model, pressure_kpa=pressure)
+            yield replace(figure, quantity="flat_force") if share == 0 else figure, pose
 
 
 def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:

@@ -33,6 +33,8 @@ FLAGS: Mapping[Flag, str] = {
     NEAR_BURST: "above half of the estimated burst pressure",
 }
 """What a figure's flags say."""
+FigureQuantity = Literal["reference_stroke", "flat_force", "folded_height", "mass", "burst"]
+"""What a lab measures of a built actuator: of ``flat_force`` at a figure's pressure."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Figure:
     The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
     What would be measured lies in the ``interval``, in the same ``unit``, with a probability of
     90 %, where a calibration says so. It is at ``pressure_kpa`` (gauge, a vacuum below 0), if at
-    any. ``flags`` say what it is not to be trusted for.
+    any. ``flags`` say what it is not to be trusted for. ``quantity`` names what a lab measures.
     """
 
     group: str
@@ -76,6 +78,7 @@ class Figure:
     interval: tuple[float, float] | None = None
     pressure_kpa: float | None = None
     flags: tuple[Flag, ...] = ()
+    quantity: FigureQuantity | None = None
 
     @property
     def counterpart(self) -> str:

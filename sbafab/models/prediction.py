@@ -113,16 +113,15 @@ def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure |
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     if actuator.has_reference:
         model = reference_model(actuator)
-        scaled = {
-            "reference stroke": actuator.reference_stroke,
-            "reference height": actuator.reference_height,
-        }
         flags: tuple[Flag, ...] = ()
         if actuator.radii:
             sizes_here = sizes_of(actuator.form, actuator.laminate)
             flags = flags_at(farther(sizes_here, PAPER_3DOF, False))
-        for name, value in scaled.items():
-            yield Figure("stroke", name, value, "mm", model, flags=flags)
+        stroke = Figure(
+            "stroke", "reference stroke", actuator.reference_stroke, "mm", model, flags=flags
+        )
+        yield replace(stroke, quantity="reference_stroke")
+        yield replace(stroke, name="reference height", value=actuator.reference_height)
         for k in actuator.kinematics:
             at_full = float(k.volume(actuator.reference_stroke))
             yield Figure(
@@ -163,7 +162,9 @@ def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
                 value = _force(actuator, k, pressure, share * actuator.reference_stroke, request)
                 name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
                 model = _force_model(actuator, k, request)
-                yield Figure("force", name, float(value), "N", model, pressure_kpa=pressure)
+                figure = Figure("force", name, float(value), "N", model, pressure_kpa=pressure)
+                is_measured = share == 0 and not _each(actuator)
+                yield replace(figure, quantity="flat_force") if is_measured else figure
 
 
 def _force(
@@ -609,7 +610,14 @@ def _burst(laminate: Laminate) -> Figure | LeftOut:
         "The interval has the paper's scatter, and what is assumed for other sizes and shapes",
     )
     return Figure(
-        "strength", BURST, estimate.kpa, "kPa", model, interval=interval, flags=flags_at(missed)
+        "strength",
+        BURST,
+        estimate.kpa,
+        "kPa",
+        model,
+        interval=interval,
+        flags=flags_at(missed),
+        quantity="burst",
     )
 
 
@@ -729,7 +737,9 @@ def _sizes(actuator: Actuator, factors: Factors) -> Iterator[Figure]:
     for name, value in sizes(actuator.design, actuator.laminate, factors).items():
         if name != "thickness":
             model = models.get(name, GEOMETRY)
-            yield Figure("size", name.replace("_", " "), value, "mm", model)
+            figure = Figure("size", name.replace("_", " "), value, "mm", model)
+            is_folded = name == "folded_height"
+            yield replace(figure, quantity="folded_height") if is_folded else figure
 
 
 def _folded_model(folded: FoldedHeight) -> Model:
@@ -746,7 +756,8 @@ def _mass(laminate: Laminate) -> Figure | LeftOut:
     except DesignError as error:
         return LeftOut("mass", str(error))
     trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
-    return Figure("size", "mass", grams, "g", Model("area x thickness x density", "", trust))
+    model = Model("area x thickness x density", "", trust)
+    return Figure("size", "mass", grams, "g", model, quantity="mass")
 
 
 def _tubes(actuator: Actuator) -> Iterator[Figure | LeftOut]:

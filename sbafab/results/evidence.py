@@ -18,35 +18,30 @@ from sbafab.evidence.records import (
     Setup,
     StatedError,
 )
-from sbafab.results.records import Build
 from sbafab.results.report import Built, items
-from sbafab.results.store import Lab, rebuilt
+from sbafab.results.store import Lab
 
 
 class _Recorded(NamedTuple):
     quantity: str
-    x_name: str
-    x: float
-    setup: Setup
-    unknown: str
+    setup: Setup = Setup()
+    unknown: tuple[str, ...] = ()
+    x_name: str = ""
 
 
 RECORDED = {
-    "stroke_mm": _Recorded(
-        "stroke_mm", "", 0.0, Setup(tip="free"), "The pressure is not recorded."
-    ),
+    "stroke_mm": _Recorded("stroke_mm", Setup(tip="free"), ("The pressure is not recorded.",)),
     "force_n": _Recorded(
         "force_n",
-        "height_share",
-        0.0,
         Setup(pressure_kpa=100.0, tip="held"),
-        "How the sensor holds the tip is not recorded.",
+        ("How the sensor holds the tip is not recorded.",),
+        "height_share",
     ),
-    "height_mm": _Recorded("flat_height_mm", "", 0.0, Setup(tip="free"), ""),
-    "mass_g": _Recorded("mass_g", "", 0.0, Setup(), ""),
-    "burst_kpa": _Recorded("burst_kpa", "", 0.0, Setup(), ""),
+    "height_mm": _Recorded("flat_height_mm", Setup(tip="free")),
+    "mass_g": _Recorded("mass_g"),
+    "burst_kpa": _Recorded("burst_kpa"),
 }
-"""Recorded numbers that are evidence, as ``sbafab record`` defines them."""
+"""Recorded numbers that are evidence, as ``sbafab record`` defines them; x is 0 if it is named."""
 
 
 def from_lab_records(lab: Lab) -> Evidence:
@@ -55,15 +50,11 @@ def from_lab_records(lab: Lab) -> Evidence:
     No error of a value is recorded; that of the curve is the scatter of its actuators. An actuator
     that was repaired counts by its first attempt. Raises DesignError where no number is recorded.
     """
-    records, builds = lab.contents()
-    by_actuator: dict[str, list[Built]] = defaultdict(list)
+    records, _, builds = lab.contents()
+    by_design: dict[str, list[Built]] = defaultdict(list)
     for built in items(records, builds):
-        by_actuator[built.actuator].append(built)
-    curves = tuple(
-        curve
-        for actuator in by_actuator.values()
-        for curve in _curves(actuator, builds[actuator[0].design_sha256])
-    )
+        by_design[built.design].append(built)
+    curves = tuple(curve for actuators in by_design.values() for curve in _curves(actuators))
     if not curves:
         raise DesignError(
             f"{lab.path} has no record with any of {', '.join(RECORDED)}; record one, such as "
@@ -72,8 +63,9 @@ def from_lab_records(lab: Lab) -> Evidence:
     return Evidence(_id(lab.path.stem), f"build records in {lab.path.name}", "", _renamed(curves))
 
 
-def _curves(actuators: Sequence[Built], build: Build) -> list[MeasuredCurve]:
-    measured = MeasuredActuator(toml=build.toml) if rebuilt(build) else MeasuredActuator()
+def _curves(actuators: Sequence[Built]) -> list[MeasuredCurve]:
+    build = actuators[0].build
+    measured = MeasuredActuator(toml=build.toml) if build.design else MeasuredActuator()
     curves = []
     for name, kind in RECORDED.items():
         values = tuple(a.numbers[name] for a in actuators if name in a.numbers)
@@ -86,12 +78,12 @@ def _curves(actuators: Sequence[Built], build: Build) -> list[MeasuredCurve]:
                 place=f"{len(values)} actuators",
                 y=values,
                 x_name=kind.x_name,
-                x=(kind.x,) * len(values) if kind.x_name else (),
+                x=(0.0,) * len(values) if kind.x_name else (),
                 actuator=measured,
                 setup=kind.setup,
                 error=StatedError(source="not recorded"),
                 group=_id(actuators[0].design),
-                unknown=(kind.unknown,) if kind.unknown else (),
+                unknown=kind.unknown,
             )
         )
     return curves

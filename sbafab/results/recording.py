@@ -1,44 +1,33 @@
-"""Results of built actuators: recorded from Python or a batch's table, and found again."""
+"""Rows of what was built: recorded from values and files, found again, written as CSV and JSON."""
 
 from __future__ import annotations
 
-import csv
+import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import tomllib
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from sbafab.actuators import build as laminate_of
 from sbafab.assemblies.build import Assembled, assemble
-from sbafab.assemblies.files import assembly_sha256, load
-from sbafab.cutting.calibration import table_text
+from sbafab.assemblies.files import load
+from sbafab.cutting.calibration import row_cells, table_text
 from sbafab.design.files import Change
-from sbafab.design.identity import design_sha256
+from sbafab.design.identity import kit_of
 from sbafab.design.records import Design
-from sbafab.errors import DesignError
+from sbafab.errors import DesignError, OutputError
 from sbafab.output.checked import press_settings
+from sbafab.output.schema_ids import HISTORY_SCHEMA
+from sbafab.output.swap import replace_text
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
-from sbafab.results.history import HistoryEntry, StoredEntry
-from sbafab.results.records import (
-    COLUMNS,
-    ERRORS,
-    NUMBERS,
-    TEXTS,
-    Build,
-    LabResult,
-    Record,
-    checked,
-    kit_name,
-    promised,
-    promised_assembly,
-)
-from sbafab.results.store import Lab
+from sbafab.results.builds import Build, promised, recorded_sha256
+from sbafab.results.records import HistoryEntry, LabRow, Record, Row, columns, row_of
+from sbafab.results.store import Contents, Lab
+from sbafab.spreadsheet import csv_text
 from sbafab.version import GENERATOR
-
-RESULT_NAMES = (*TEXTS, "leak", *(quantity.name for quantity in (*NUMBERS, *ERRORS)))
-"""Names of the values that a result of an actuator may have."""
 
 
 def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:
@@ -51,67 +40,25 @@ def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> D
 
 
 def record(
-    lab: Lab, built: Design | Assembled, results: Sequence[LabResult], is_again: bool = False
-) -> list[Record]:
-    """Store results of a built design, with what it promises; all or none.
+    lab: Lab, built: Design | Assembled, rows: Sequence[Row], is_again: bool = False
+) -> list[Row]:
+    """Store rows about devices of what was built, with what it promises; all or none.
 
-    ``is_again``: as new attempts of actuators that were mended and tested again. Raises
-    DesignError.
+    Results get the kit of the design. ``is_again``: as new attempts of devices that were mended and
+    tested again. Raises DesignError, OutputError.
     """
-    if isinstance(built, Design):
-        kit = kit_name(built)
-    else:
-        kit = ", ".join(dict.fromkeys(kit_name(part.design) for part in built.designs))
-    results = [replace(result, kit=result.kit or kit) for result in results]
-    sha256, promise = _promise(lab, built)
-    return lab.add(sha256, promise, results, is_again)
+    designs = [built] if isinstance(built, Design) else [part.design for part in built.designs]
+    kit = ", ".join(dict.fromkeys(kit_of(design).name for design in designs))
+    rows = [_with_kit(row, kit) for row in rows]
+    sha256 = recorded_sha256(built)
+    known = lab.contents().builds.get(sha256) if lab.path.exists() else None
+    build = promised(built) if known is None or known.generator != GENERATOR else None
+    return lab.add(sha256, build, rows, is_again)
 
 
-def record_history(
-    lab: Lab, built: Design | Assembled, entries: Sequence[HistoryEntry], is_again: bool = False
-) -> list[StoredEntry]:
-    """Store lines of the history of devices of a built design; all or none. Raises DesignError."""
-    sha256, promise = _promise(lab, built)
-    return lab.add_entries(sha256, promise, entries, is_again)
-
-
-def _promise(lab: Lab, built: Design | Assembled) -> tuple[str, Build | None]:
-    """Return the hash of what was built, and its promises where the lab does not know them yet."""
-    if isinstance(built, Design):
-        sha256 = design_sha256(built)
-        return sha256, None if lab.knows(sha256, GENERATOR) else promised(built)
-    sha256 = assembly_sha256(built)
-    return sha256, None if lab.knows(sha256, GENERATOR) else promised_assembly(built)
-
-
-def results_of(values: Mapping[str, Any], table: str | Path | None = None) -> list[LabResult]:
-    """Return one result from values by name, or those of a table. Raises DesignError.
-
-    Errors are one number or several.
-    """
-    if table is not None:
-        if values:
-            raise DesignError(f"a table says it all; leave out {', '.join(values)}")
-        return read_batch(Path(table))
-    if not values.get("serial"):
-        raise DesignError("an actuator needs its serial; give serial, as on its traveller")
-    errors = {q.name: values[q.name] for q in ERRORS if q.name in values}
-    serial, operator, kit, note, leak = (str(values.get(name, "")) for name in (*TEXTS, "leak"))
-    result = LabResult(
-        serial=serial,
-        leak=leak,
-        operator=operator,
-        kit=kit,
-        note=note,
-        numbers={q.name: float(values[q.name]) for q in NUMBERS if q.name in values},
-        errors={
-            name: tuple(map(float, (value,) if isinstance(value, int | float) else value))
-            for name, value in errors.items()
-        },
-    )
-    if result.is_empty:
-        raise DesignError('say what came out, such as leak="pass" or a note')
-    return [checked(result)]
+def _with_kit(row: Row, kit: str) -> Row:
+    is_result = isinstance(row, Record) and not row.kit
+    return row.model_copy(update={"kit": kit}) if is_result else row
 
 
 def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
@@ -122,17 +69,61 @@ def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
     return record_tables(built, laminate, schedule(laminate, press_settings(built)))
 
 
-# A batch's table as it was filled in: a row an actuator, all rows or none.
+# Rows from values, and from files: all or none.
 
 
-_NUMBER = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
+def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]:
+    """Return a line of history for each serial of ``values``, by column.
+
+    Serials are a list, or a text with commas between them. Raises DesignError.
+    """
+    serials = values.get("serial") or ""
+    if not isinstance(serials, list | tuple):
+        serials = re.split(r"\s*,\s*", str(serials).strip(" ,"))
+    return [
+        row_of(HistoryEntry, {**values, "serial": serial}, where)
+        for serial in dict.fromkeys(map(str, serials))
+    ]
 
 
-def read_batch(path: Path) -> list[LabResult]:
-    """Return a result for each row of a table with some of COLUMNS, "serial" among them.
+def read_batch(path: Path) -> list[Record]:
+    """Return a result for each row of a batch's table, as it was filled in.
 
-    Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas;
-    several errors stand in one cell, separated by blanks. Raises DesignError with the line.
+    Its columns are some of those of a Record. Several errors stand in one cell, separated by
+    blanks. Raises DesignError with the line.
+    """
+    records = [row_of(Record, row, where) for where, row in _csv_rows(path)]
+    if not records:
+        raise DesignError(
+            f"{path} has no result; its first line names columns ({', '.join(columns(Record))}), "
+            "and each row below is an actuator"
+        )
+    return records
+
+
+def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
+    """Return the lines of history in a file, with ``defaults`` where it states nothing else.
+
+    CSV has a row a line, and its columns are some of those of a HistoryEntry. TOML and JSON have a
+    list ``entry``, and beside it values that go for all of them. Photographs are found beside the
+    file. Raises DesignError with the line or the entry.
+    """
+    rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _table_rows(path)
+    entries: list[HistoryEntry] = []
+    for where, row in rows:
+        values = {**defaults, **{name: v for name, v in row.items() if v not in ("", None)}}
+        if values.get("photograph"):
+            values["photograph"] = str(path.parent / str(values["photograph"]))
+        entries += entries_of(values, where)
+    if not entries:
+        raise DesignError(f"{path} holds no entry; fill in a row")
+    return entries
+
+
+def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the filled rows below the header, with their places; ``#`` begins a remark.
+
+    Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas.
     """
     lines = [
         (f"{path}, line {number}", line)
@@ -140,108 +131,48 @@ def read_batch(path: Path) -> list[LabResult]:
         if line.strip(' ,;\t"') and not line.lstrip(' "').startswith("#")
     ]
     if not lines:
-        raise DesignError(f"{path} is empty; its first line names columns: {', '.join(COLUMNS)}")
+        return
     separator = max(",;\t", key=lines[0][1].count)
-    names = [name.lower() for name in _cells(lines[0], separator)]
-    _check_names(names, path)
-    results = [_result(_row(line, names, separator), line[0]) for line in lines[1:]]
-    if not results:
-        raise DesignError(f"{path} has no row below its columns; fill in one for each actuator")
-    return results
+    names = [name.lower() for name in row_cells(lines[0][1], separator, lines[0][0])]
+    named = [name for name in names if name]
+    if len(set(named)) != len(named):
+        raise DesignError(f"{path} names a column twice; keep one of each")
+    for where, line in lines[1:]:
+        cells = row_cells(line, separator, where)
+        while len(cells) > len(names) and not cells[-1]:
+            cells.pop()
+        if len(cells) != len(names):
+            raise DesignError(
+                f"{where} has {len(cells)} cells where the header has {len(names)}; write decimal "
+                "points, or part columns by semicolons"
+            )
+        yield where, {name: cell for name, cell in zip(names, cells, strict=True) if name or cell}
 
 
-def _check_names(names: Sequence[str], path: Path) -> None:
-    for name in names:
-        if name and name not in COLUMNS:
-            raise DesignError(f"{path} has a column {name[:40]!r}; known are {', '.join(COLUMNS)}")
-        if name and names.count(name) > 1:
-            raise DesignError(f"{path} has two columns {name}; keep one")
-    if "serial" not in names:
-        raise DesignError(f"{path} has no column serial; each actuator needs one")
+_PARSERS: Mapping[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 
 
-def _cells(line: tuple[str, str], separator: str) -> list[str]:
+def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables of the list ``entry`` with what goes for all, with their places."""
+    parser = _PARSERS.get(path.suffix.lower())
+    if parser is None:
+        raise DesignError(f"{path} ends in none of .csv, {', '.join(_PARSERS)}; save it as one")
+    text = table_text(path)
     try:
-        return [cell.strip() for cell in next(csv.reader([line[1]], delimiter=separator))]
-    except csv.Error as error:
-        raise DesignError(f"{line[0]} cannot be read ({error}); save the table as CSV") from None
-
-
-def _row(line: tuple[str, str], names: Sequence[str], separator: str) -> dict[str, str]:
-    cells = _cells(line, separator)
-    while len(cells) > len(names) and not cells[-1]:
-        cells.pop()
-    if len(cells) != len(names):
-        raise DesignError(
-            f"{line[0]} has {len(cells)} cells where the header has {len(names)}; write decimal "
-            "points, or part columns by semicolons"
-        )
-    return {name: cell for name, cell in zip(names, cells, strict=True) if name and cell}
-
-
-def _result(row: dict[str, str], where: str) -> LabResult:
-    if "serial" not in row:
-        raise DesignError(f"{where} has no serial")
-    serial, operator, kit, note = (row.get(name, "") for name in TEXTS)
-    result = LabResult(
-        serial=serial,
-        operator=operator,
-        kit=kit,
-        note=note,
-        leak=row.get("leak", "").lower(),
-        numbers={q.name: _number(row[q.name], q.name, where) for q in NUMBERS if q.name in row},
-        errors={
-            q.name: tuple(_number(text, q.name, where) for text in row[q.name].split())
-            for q in ERRORS
-            if q.name in row
-        },
-    )
-    if result.is_empty:
-        raise DesignError(
-            f"{where}: nothing is said of {result.serial}; fill in a cell or remove it"
-        )
-    return checked(result, where)
-
-
-def _number(text: str, column: str, where: str) -> float:
-    if _NUMBER.fullmatch(text) is None:
-        raise DesignError(f"{where}: {column} is {text[:40]!r}, not a number such as 16.8")
-    return float(text.replace(",", "."))
-
-
-# Records found by a traveller's code, a serial or a design's name.
-
-
-_HASH = re.compile(r"\b[0-9a-f]{8,64}\b")
-
-
-RecordRow = Record | StoredEntry
-"""What is stored of a device."""
-Stored = TypeVar("Stored", Record, StoredEntry)
-
-
-def all_rows(records: Sequence[Record], entries: Sequence[StoredEntry]) -> list[RecordRow]:
-    """Return entries and records in one list, entries first, as the work goes."""
-    return [*entries, *records]
-
-
-def found_by(
-    text: str, serial: str, records: Sequence[Record], builds: Mapping[str, Build]
-) -> list[Record]:
-    """Return the records that ``matching`` returns. Raises DesignError where there are none."""
-    matches = matching(text, serial, records, builds)
-    if not matches:
-        query = " ".join([*text.split(), serial]).strip()[:60]
-        raise DesignError(
-            f"no record goes with {query!r}; give a serial, a design's name, 8 "
-            "digits or more of its sha256, or what the traveller's code says"
-        )
-    return matches
+        table = parser(text)
+    except (ValueError, RecursionError) as error:
+        raise DesignError(f"{path} cannot be read: {error}") from None
+    rows = table.get("entry") if isinstance(table, dict) else None
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise DesignError(f"{path} needs a list of tables called entry, a table an entry")
+    common = {name: value for name, value in table.items() if name != "entry"}
+    for number, row in enumerate(rows, start=1):
+        yield f"{path}, entry {number}", {**common, **row}
 
 
 def matching(
-    text: str, serial: str, stored: Sequence[Stored], builds: Mapping[str, Build]
-) -> list[Stored]:
+    text: str, serial: str, stored: Sequence[Row], builds: Mapping[str, Build]
+) -> list[Row]:
     """Return the rows of the design whose hash (eight digits or more of it) the text holds.
 
     With them come those of other designs that build the same actuator. Else those of a serial or of
@@ -249,7 +180,7 @@ def matching(
     given.
     """
     text = text.strip()
-    hashes = _HASH.findall(text.lower())
+    hashes = re.findall(r"\b[0-9a-f]{8,64}\b", text.lower())
     actuators = {
         build.actuator
         for build in builds.values()
@@ -260,37 +191,82 @@ def matching(
         matches = [
             row
             for row in stored
-            if text in (row.serial, builds[row.design_sha256].name, row_number(row))
+            if text in (row.serial, builds[row.design_sha256].name, row.number)
         ]
     return [row for row in matches if serial in ("", row.serial)]
 
 
-def row_number(row: RecordRow, number: int | None = None) -> str:
-    """Return the number of a record, such as 3, or of an entry of history, such as e3.
+# Rows written out. The same rows give the same bytes.
 
-    ``number`` is that of another row of its kind.
+
+HEAD = ("row", "recorded", "design", "design_sha256", "attempt", "corrects", "withdrawn")
+CSV_COLUMNS = tuple(dict.fromkeys((*HEAD, *columns(HistoryEntry), "expired", *columns(Record))))
+
+
+def write_history(contents: Contents, path: Path) -> int:
+    """Write rows as CSV or JSON, by the file's ending, swapped in; return the number of devices.
+
+    Raises DesignError for another ending, and OutputError.
     """
-    sign = "e" if isinstance(row, StoredEntry) else ""
-    return f"{sign}{row.id if number is None else number}"
+    writers = {".csv": csv_history, ".json": json_history}
+    writer = writers.get(path.suffix.lower())
+    if writer is None:
+        raise DesignError(f"{path} ends in none of {', '.join(writers)}; choose one of them")
+    devices = _devices(contents)
+    write_text(path, writer(devices, contents.builds))
+    return len(devices)
 
 
-def row_words(row: RecordRow) -> str:
-    """Return what a row states, in one line; units stand in the names."""
-    if isinstance(row, Record):
-        parts = [f"{name} {value}" for name, value in row.once.items()]
-        parts += [
-            f"{name} {' '.join(f'{v:g}' for v in sizes)}" for name, sizes in row.errors.items()
-        ]
-        return ", ".join([*parts, *([row.note] if row.note else [])])
-    parts = [
-        row.day,
-        f"step {row.step}" if row.step else "",
-        f"{row.item} lot {row.lot}" if row.lot else row.item,
-        f"expires {row.expires}" if row.expires else "",
-        *(f"{name} {value:g}" for name, value in row.readings.items()),
-        f"{row.decision}: {row.reason}" if row.reason else row.decision,
-        f"photograph {row.photograph[:12]}" if row.photograph else "",
-        row.note,
-        f"initials {row.initials}" if row.initials else "",
-    ]
-    return ", ".join(part for part in parts if part)
+def write_text(path: Path, text: str) -> None:
+    """Write a file beside an old one and swap it in. Raises OutputError."""
+    try:
+        replace_text(path, text)
+    except OSError as error:
+        raise OutputError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def _devices(contents: Contents) -> list[Sequence[LabRow]]:
+    """Return the rows of each device, entries first, as the work goes; sorted by design, serial."""
+    rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
+    for row in (*contents.entries, *contents.records):
+        build = contents.builds[row.design_sha256]
+        rows[build.actuator, row.serial].append(row)
+    return sorted(
+        rows.values(),
+        key=lambda rows: (contents.builds[rows[0].design_sha256].name, rows[0].serial),
+    )
+
+
+def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
+    """Return a document with a device's rows together."""
+    listed = []
+    for rows in devices:
+        build = builds[rows[0].design_sha256]
+        head = {"serial": rows[0].serial, "design": build.name, "actuator_sha256": build.actuator}
+        records = [row.as_dict() for row in rows if isinstance(row, Record)]
+        entries = [row.as_dict() for row in rows if isinstance(row, HistoryEntry)]
+        listed.append({**head, "records": records, "entries": entries})
+    document = {"schema": HISTORY_SCHEMA, "devices": listed}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
+    """Return a table with a row each of a device's."""
+    cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
+    return csv_text([CSV_COLUMNS, *([each.get(c, "") for c in CSV_COLUMNS] for each in cells)])
+
+
+def _cells(row: LabRow, design: str) -> dict[str, Any]:
+    cells: dict[str, Any] = {
+        "row": row.number,
+        "recorded": row.recorded,
+        "design": design,
+        "design_sha256": row.design_sha256,
+        "attempt": row.attempt,
+        "corrects": "" if row.corrects is None else f"{row.SIGN}{row.corrects}",
+        "withdrawn": int(row.withdrawn),
+        **row.cells,
+    }
+    if isinstance(row, HistoryEntry):
+        cells["expired"] = int(row.is_expired)
+    return cells

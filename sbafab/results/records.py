@@ -1,265 +1,313 @@
-"""Records of built actuators: test results, operator, measurements, promises of the design."""
+"""Rows of a lab's file: results of built actuators, and lines of their history."""
 
 from __future__ import annotations
 
-import math
+import datetime
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
-from sbafab.actuators import build as laminate_of
-from sbafab.assemblies.build import Assembled
-from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_toml
-from sbafab.design.identity import actuator_sha256, design_sha256, kit_of
-from sbafab.design.records import Design, design_toml
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    model_validator,
+)
+
+from sbafab.design.files import checked
 from sbafab.errors import DesignError
-from sbafab.models.figures import BURST, Prediction, PredictionRequest
-from sbafab.models.formulas import usual_pressures
-from sbafab.models.paper import FOLDED_HEIGHT
-from sbafab.models.prediction import predict
-from sbafab.output.checked import limits
-from sbafab.rules.registration_yield import simulate
-from sbafab.version import GENERATOR
 
-PASS, FAIL = "pass", "fail"
-LONGEST = {"serial": 64, "operator": 80, "kit": 120, "note": 400}
-"""Characters of a text."""
-UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+PASS = "pass"
+REJECT, REWORK = "reject", "rework"
 
 
-class Measurand(NamedTuple):
-    """A measured number: its unit, the largest plausible value, and the option's name."""
-
-    name: str
-    unit: str
-    most: float
-    option: str
-    says: str
-
-
-NUMBERS = (
-    Measurand("burst_kpa", "kPa", 10_000, "burst", "Pressure at which it burst."),
-    Measurand(
-        "stroke_mm",
-        "mm",
-        10_000,
-        "stroke",
-        "Stroke when full, beside the reference stroke.",
-    ),
-    Measurand("force_n", "N", 10_000, "force", "Blocked force at 100 kPa, flat."),
-    Measurand("height_mm", "mm", 10_000, "height", "Height after pressing, deflated."),
-    Measurand("mass_g", "g", 100_000, "mass", "Mass without tubes."),
-    Measurand("proof_kpa", "kPa", 10_000, "proof", "Pressure that it held in the proof test."),
-)
-"""Once an actuator."""
-ERRORS = (
-    Measurand("offset_mm", "mm", 10, "offset", "How far a layer that a hand laid lies off."),
-    Measurand("turn_deg", "deg", 45, "turn", "How far a layer that a hand laid is turned."),
-    Measurand("cut_mm", "mm", 10, "cut-error", "How far a cut edge lies off its place."),
-)
-"""As often as one likes."""
-TEXTS = ("serial", "operator", "kit", "note")
-COLUMNS = (*TEXTS[:3], "leak", *(q.name for q in (*NUMBERS, *ERRORS)), "note")
-"""Of a table of a batch."""
+NUMBERS = {
+    "burst_kpa": "kPa",
+    "stroke_mm": "mm",
+    "force_n": "N",
+    "height_mm": "mm",
+    "mass_g": "g",
+    "proof_kpa": "kPa",
+}
+"""Measured once an attempt, with their units; ``docs/recording.md`` says how."""
+ERRORS = ("offset_mm", "turn_deg", "cut_mm")
+"""Measured any number of times, without sign."""
+READINGS = ("kerf_mm", "temperature_c", "press_force_n", "minutes")
+"""Numbers of a line of history."""
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+_DECIMAL = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
 
 
-@dataclass(frozen=True)
-class LabResult:
-    """A record of the actuator ``serial``; a field that it does not state is empty.
+def _one_line(text: str) -> str:
+    if _UNWRITABLE.search(text):
+        raise ValueError("must be plain text in one line")
+    return text
 
-    ``leak`` is "pass", "fail" or "". ``operator`` built it. Units stand in the names of NUMBERS
-    and ERRORS; errors are sizes without sign.
+
+def _day(text: str) -> str:
+    try:
+        is_day = not text or datetime.date.fromisoformat(text).isoformat() == text
+    except ValueError:
+        is_day = False
+    if not is_day:
+        raise ValueError("must be a day such as 2026-05-04")
+    return text
+
+
+def _number(value: object) -> object:
+    """Return a text as a number, with a decimal point or comma."""
+    if not isinstance(value, str):
+        return value
+    if _DECIMAL.fullmatch(value.strip()) is None:
+        raise ValueError("must be a number such as 16.8")
+    return float(value.strip().replace(",", "."))
+
+
+def _several(value: object) -> object:
+    """Return one number, or a text with blanks between several, as a list."""
+    if isinstance(value, str):
+        return value.split()
+    return list(value) if isinstance(value, Iterable) else [value]
+
+
+LINE = AfterValidator(_one_line)
+Text = Annotated[str, Field(max_length=400), LINE]
+Day = Annotated[str, AfterValidator(_day)]
+Number = Annotated[FiniteFloat, BeforeValidator(_number), Field(gt=0)]
+ErrorSize = Annotated[FiniteFloat, BeforeValidator(_number), Field(ge=0)]
+
+
+class LabRow(BaseModel):
+    """A row about the device ``serial``; a field that it does not state is empty.
+
+    The file adds the row's number ``id``, when it was ``recorded`` (UTC) and of which design. Of
+    two rows the one that ``corrects`` the other counts. ``attempt`` is 1, and one more each time
+    that the device was mended and tested again.
     """
 
-    serial: str = ""
-    leak: str = ""
-    operator: str = ""
-    kit: str = ""
-    note: str = ""
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    errors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    withdrawn: bool = False
-
-    @property
-    def is_empty(self) -> bool:
-        """True if no result is stated."""
-        return not (self.leak or self.note or self.numbers or self.errors)
-
-    @property
-    def once(self) -> dict[str, str | float]:
-        """The values that only one record of an actuator may state."""
-        texts = {"leak": self.leak, "operator": self.operator, "kit": self.kit}
-        return {**{name: text for name, text in texts.items() if text}, **self.numbers}
-
-    def changed(self, change: LabResult) -> LabResult:
-        """Return the result with all that ``change`` states in its place."""
-        texts = {
-            name: getattr(change, name) for name in (*TEXTS, "leak") if getattr(change, name) != ""
-        }
-        return replace(
-            self,
-            **texts,
-            numbers={**self.numbers, **change.numbers},
-            errors={**self.errors, **change.errors},
-            withdrawn=change.withdrawn,
-        )
-
-
-@dataclass(frozen=True)
-class Record(LabResult):
-    """A result as it is stored: its number, when (UTC), of which design, what it corrects.
-
-    ``attempt`` is 1, and one more each time that the actuator was mended and tested again.
-    """
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", str_strip_whitespace=True, coerce_numbers_to_str=True
+    )
+    NOUN: ClassVar[str]
+    """The row in messages, and its table in the file."""
+    SIGN: ClassVar[str] = ""
+    """Stands before the number."""
+    GROUPS: ClassVar[Mapping[str, Iterable[str]]]
+    """Measured numbers, which stand together in JSON."""
 
     id: int = 0
     recorded: str = ""
     design_sha256: str = ""
     corrects: int | None = None
-    attempt: int = 1
-
-    def as_dict(self) -> dict[str, Any]:
-        """The record for JSON; units stand in the keys."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self)}
-        return {**plain, "errors": {name: list(sizes) for name, sizes in self.errors.items()}}
-
-
-@dataclass(frozen=True)
-class Build:
-    """A design that was recorded, with what was predicted of it and the tolerances it states.
-
-    ``predicted``: quantity to value and model. ``tolerances``: key of the design to value.
-    ``good_builds``: of how many random builds how many keep every limit. ``actuator_sha256`` is
-    the hash of what is built, the same for designs that differ in how many, or on what sheets.
-    """
-
-    sha256: str
-    generator: str
-    name: str
-    family: str
-    method: str
-    toml: str
-    predicted: Mapping[str, tuple[float, str]]
-    tolerances: Mapping[str, float]
-    good_builds: tuple[int, int]
-    actuator_sha256: str = ""
+    withdrawn: bool = False
+    attempt: int = Field(default=1, ge=1)
+    serial: Annotated[str, Field(max_length=64), LINE] = ""
 
     @property
-    def actuator(self) -> str:
-        """The hash that actuators are grouped by; the design's own where the other is not known."""
-        return self.actuator_sha256 or self.sha256
+    def number(self) -> str:
+        """The number as it is shown and typed: 3 of a result, e3 of a line of history."""
+        return f"{self.SIGN}{self.id}"
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """The values by column, without empty ones and those that the file adds."""
+        values = {name: getattr(self, name) for name in columns(type(self))}
+        return {name: value for name, value in values.items() if value not in ("", None, ())}
+
+    @property
+    def cells(self) -> dict[str, Any]:
+        """The stated values for a table: several errors in one text."""
+        return {
+            name: " ".join(map(str, value)) if isinstance(value, tuple) else value
+            for name, value in self.stated.items()
+        }
+
+    def group(self, name: str) -> dict[str, Any]:
+        """Return the stated numbers of a group."""
+        return {
+            column: self.stated[column] for column in self.GROUPS[name] if column in self.stated
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row for JSON; units stand in the keys."""
+        grouped = {column for names in self.GROUPS.values() for column in names}
+        groups = {name: self.group(name) for name in self.GROUPS}
+        return {**self.model_dump(exclude=grouped), **groups}
+
+    def conflict(self, stored: Self) -> str:
+        """Return a sentence if this row repeats or contradicts one of the same attempt, or ""."""
+        raise NotImplementedError
+
+    def _problems(self) -> Iterator[str]:
+        """Yield sentences on fields that need another one."""
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        for problem in self._problems():
+            raise ValueError(problem)
+        return self
 
 
-def checked(result: LabResult, where: str = "") -> LabResult:
-    """The result, with texts stripped. Raises DesignError for what cannot be meant."""
-    place = f"{where}: " if where else ""
-    texts = {name: getattr(result, name).strip() for name in TEXTS}
-    for name, text in texts.items():
-        if len(text) > LONGEST[name]:
-            raise DesignError(
-                f"{place}{name} has {len(text)} characters; at most {LONGEST[name]} are kept"
+class Record(LabRow):
+    """A result of an actuator: "pass" or "fail" of its ``leak`` test, the ``operator`` who built it
+    and the ``kit``, and what was measured; units stand in the names.
+    """
+
+    NOUN: ClassVar[str] = "record"
+    GROUPS: ClassVar[Mapping[str, Iterable[str]]] = {"numbers": NUMBERS, "errors": ERRORS}
+
+    operator: Annotated[str, Field(max_length=80), LINE] = ""
+    kit: Annotated[str, Field(max_length=120), LINE] = ""
+    leak: Annotated[Literal["", "pass", "fail"], BeforeValidator(lambda v: str(v).lower())] = ""
+    burst_kpa: Annotated[Number, Field(le=10_000)] | None = None
+    stroke_mm: Annotated[Number, Field(le=10_000)] | None = None
+    force_n: Annotated[Number, Field(le=10_000)] | None = None
+    height_mm: Annotated[Number, Field(le=10_000)] | None = None
+    mass_g: Annotated[Number, Field(le=100_000)] | None = None
+    proof_kpa: Annotated[Number, Field(le=10_000)] | None = None
+    offset_mm: Annotated[
+        tuple[Annotated[ErrorSize, Field(le=10)], ...], BeforeValidator(_several)
+    ] = ()
+    turn_deg: Annotated[
+        tuple[Annotated[ErrorSize, Field(le=45)], ...], BeforeValidator(_several)
+    ] = ()
+    cut_mm: Annotated[
+        tuple[Annotated[ErrorSize, Field(le=10)], ...], BeforeValidator(_several)
+    ] = ()
+    note: Text = ""
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """What was measured once, by column."""
+        return self.group("numbers")
+
+    @property
+    def errors(self) -> dict[str, tuple[float, ...]]:
+        """The measured errors, by column."""
+        return self.group("errors")
+
+    def _problems(self) -> Iterator[str]:
+        if not self.serial:
+            yield "a result needs its serial, the actuator's number on its traveller"
+        if not (self.leak or self.note or self.numbers or self.errors or self.withdrawn):
+            yield f"{self.serial} has no result; give leak (pass or fail), a number or a note"
+
+    def conflict(self, stored: Self) -> str:
+        before = stored.stated
+        for name, value in self.stated.items():
+            is_once = name in ("leak", "operator", "kit", *NUMBERS) and name in before
+            if is_once and (before[name] != value or name not in ("operator", "kit")):
+                return (
+                    f"serial {self.serial} has {name} = {before[name]} in record {stored.id}; "
+                    f"correct that with --correct {stored.id}, record what was mended and tested "
+                    "again with --again, or choose another serial"
+                )
+        return ""
+
+
+class HistoryEntry(LabRow):
+    """A line of a device's history.
+
+    ``date`` is the day of the work, ``step`` a press step's number or a test's name, ``item`` a
+    film or the adhesive with its ``lot`` and last day ``expires``. ``photograph`` is the name of a
+    file in the folder beside the lab's file. Units stand in the names.
+    """
+
+    NOUN: ClassVar[str] = "entry"
+    SIGN: ClassVar[str] = "e"
+    GROUPS: ClassVar[Mapping[str, Iterable[str]]] = {"readings": READINGS}
+
+    date: Day = ""
+    step: Annotated[str, Field(max_length=40), LINE] = ""
+    item: Annotated[str, Field(max_length=60), LINE] = ""
+    lot: Annotated[str, Field(max_length=60), LINE] = ""
+    expires: Day = ""
+    kerf_mm: Annotated[Number, Field(le=1)] | None = None
+    temperature_c: Annotated[Number, Field(le=400)] | None = None
+    press_force_n: Annotated[Number, Field(le=1_000_000)] | None = None
+    minutes: Annotated[Number, Field(le=10_000)] | None = None
+    decision: Literal["", "accept", "reject", "rework"] = ""
+    reason: Annotated[str, Field(max_length=200), LINE] = ""
+    photograph: Text = ""
+    note: Text = ""
+    initials: Annotated[str, Field(max_length=16), LINE] = ""
+
+    @property
+    def readings(self) -> dict[str, float]:
+        """The numbers that were read, by column."""
+        return self.group("readings")
+
+    @property
+    def is_expired(self) -> bool:
+        """True if the lot had expired on the day of the work, or else of the record."""
+        return bool(self.expires) and self.expires < (self.date or self.recorded[:10])
+
+    def as_dict(self) -> dict[str, Any]:
+        return {**super().as_dict(), "expired": self.is_expired}
+
+    def _problems(self) -> Iterator[str]:
+        if not self.serial:
+            yield "an entry needs its serial, as on the traveller"
+        stated = self.lot or self.decision or self.photograph or self.note or self.readings
+        if not stated and not self.withdrawn:
+            yield (
+                f"an entry states a lot, a reading ({', '.join(READINGS)}), a decision, a "
+                "photograph or a note; fill in one of them"
             )
-        if UNWRITABLE.search(text):
-            raise DesignError(f"{place}{name} must be plain text in one line")
-    if result.leak not in ("", PASS, FAIL):
-        raise DesignError(f"{place}leak is {result.leak[:40]!r}; write {PASS} or {FAIL}")
-    for quantity in NUMBERS:
-        if quantity.name in result.numbers:
-            check_number(quantity, result.numbers[quantity.name], place, "above 0")
-    for quantity in ERRORS:
-        for value in result.errors.get(quantity.name, ()):
-            check_number(quantity, value, place, "0 or more, without sign")
-    return replace(result, **texts)
+        is_sent_back = self.decision in (REJECT, REWORK)
+        if is_sent_back and not self.reason:
+            yield f"a {self.decision} needs its reason; fill in reason"
+        if self.reason and not is_sent_back:
+            yield f"a reason goes with the decision {REJECT} or {REWORK}; fill in decision"
+        if self.lot and not self.item:
+            yield "a lot needs its item, the film or the adhesive, such as TPE"
+        if self.expires and not self.lot:
+            yield "a day of expiry needs its lot; fill in lot"
+        if self.readings.keys() - {"kerf_mm"} and not self.step:
+            yield "temperature_c, press_force_n and minutes need their step, such as 1"
 
-
-def check_number(quantity: Measurand, value: float, place: str, least: str) -> None:
-    """Raise DesignError for a number that is not ``least`` or is over the quantity's largest."""
-    is_low = value < 0 or (value == 0 and least == "above 0")
-    if not math.isfinite(value) or is_low or value > quantity.most:
-        raise DesignError(
-            f"{place}{quantity.name} is {value:g}; it must be {least}, at most {quantity.most:,g} "
-            f"{quantity.unit}"
+    def conflict(self, stored: Self) -> str:
+        if self.stated != stored.stated:
+            return ""
+        return (
+            f"serial {self.serial} has this line already, entry {stored.number}; leave it out, or "
+            "add a date or a note that tells them apart"
         )
 
 
-# Promises of a design, stored with its records so that a report needs no design file.
+Row = TypeVar("Row", bound=LabRow)
 
 
-FIGURES = {
-    "burst_kpa": (BURST, ""),
-    "stroke_mm": ("reference stroke", ""),
-    "force_n": ("blocked force at 100 kPa, flat", ""),
-    "height_mm": (FOLDED_HEIGHT, ""),
-    "mass_g": ("mass", ""),
-}
-"""The prediction's figure that a measured quantity is held against, of the model to design with,
-and how the model's title begins, if not anyhow.
-"""
-TOLERANCES = {
-    "offset_mm": "hand_placement",
-    "turn_deg": "hand_turn",
-    "cut_mm": "cutting_error",
-}
-"""The key of [registration] that bounds a measured error."""
+def columns(kind: type[LabRow]) -> list[str]:
+    """Return the columns of a table of rows, which are the fields that a user states."""
+    added = ("id", "recorded", "design_sha256", "corrects", "withdrawn", "attempt")
+    return [name for name in kind.model_fields if name not in added]
 
 
-def promised(design: Design) -> Build:
-    """The design with its predictions, tolerances and yield. Raises DesignError."""
-    laminate = laminate_of(design)
-    share = simulate(laminate, limits(design)).whole
-    registration = design.registration
-    return Build(
-        sha256=design_sha256(design),
-        generator=GENERATOR,
-        name=design.name,
-        family=design.family,
-        method=registration.method,
-        toml=design_toml(design),
-        predicted=_predicted(predict(design, PredictionRequest(usual_pressures(design.form)[-1:]))),
-        tolerances={name: getattr(registration, key) for name, key in TOLERANCES.items()},
-        good_builds=(share.good, share.builds),
-        actuator_sha256=actuator_sha256(design),
-    )
+def row_of(kind: type[Row], values: Mapping[str, Any], where: str = "") -> Row:
+    """Return a row of values by column; numbers may be texts, several errors a list or a text.
+
+    Raises DesignError with one sentence that begins with ``where``.
+    """
+    empty = (str, tuple, list, type(None))
+    stated = {name: v for name, v in values.items() if v or not isinstance(v, empty)}
+    place = f"{where}: " if where else ""
+    for name in stated:
+        if name not in (*columns(kind), "withdrawn"):
+            raise DesignError(f"{place}{name[:40]!r} is none of {', '.join(columns(kind))}")
+    try:
+        return checked(kind, stated, {}, place)
+    except DesignError as error:
+        # A sentence on the whole row begins where a field's name would stand.
+        raise DesignError(" ".join(str(error).split())) from None
 
 
-def promised_assembly(assembled: Assembled) -> Build:
-    """Return the promises of an assembly: it holds where every part holds. Raises DesignError."""
-    good, builds = 1.0, 0
-    for part in assembled.designs:
-        share = simulate(part.laminate, limits(part.design)).whole
-        good *= (share.good / share.builds) ** len(part.parts)
-        builds = max(builds, share.builds)
-    designs = [part.design for part in assembled.designs]
-    return Build(
-        sha256=assembly_sha256(assembled),
-        generator=GENERATOR,
-        name=assembled.assembly.name,
-        family="assembly",
-        method=", ".join(dict.fromkeys(design.registration.method for design in designs)),
-        toml=assembly_toml(assembled),
-        predicted={},
-        tolerances={
-            name: max(getattr(design.registration, key) for design in designs)
-            for name, key in TOLERANCES.items()
-        },
-        good_builds=(round(good * builds), builds),
-        actuator_sha256=assembled_sha256(assembled),
-    )
-
-
-def kit_name(design: Design) -> str:
-    """The name of the design's kit, as the kit's file says it. Raises DesignError."""
-    return kit_of(design).name
-
-
-def _predicted(prediction: Prediction) -> dict[str, tuple[float, str]]:
-    """Return the prediction of each quantity and its model."""
-    figures = {}
-    for quantity, (name, model) in FIGURES.items():
-        for figure in prediction.figures:
-            is_other = figure.other or not figure.model.title.startswith(model)
-            if figure.name == name and not is_other:
-                figures[quantity] = (figure.value, figure.model.title)
-                break
-    return figures
+def standing(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows that no other one corrects and none withdraws."""
+    rows = list(rows)
+    corrected = {row.corrects for row in rows}
+    return [row for row in rows if row.id not in corrected and not row.withdrawn]

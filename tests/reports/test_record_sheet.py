@@ -7,7 +7,7 @@ from typing import Any
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
-from sbafab.results.history import entries_of
+from sbafab.results.recording import entries_of
 from tests.reports.bench_pages import built, page, words_of
 
 ORDER = [field.label for field in HISTORY_FIELDS]

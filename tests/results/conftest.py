@@ -1,21 +1,23 @@
-"""A lab's file with one design, and results to store in it."""
+"""A lab's file with one design, and rows to store in it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from sbafab.results.records import Build
+from sbafab.results.builds import Build
+from sbafab.results.records import HistoryEntry, Record
 from sbafab.results.store import Lab
 
 SHA = "c0ffee" + 58 * "0"
 
 
 def build(**changed: object) -> Build:
-    """What is stored of a design: stated tolerances and predictions chosen by the test."""
+    """What is stored of a design: predictions chosen by the test."""
     plain = {
         "sha256": SHA,
         "generator": "sbafab 1.0.0",
@@ -24,11 +26,19 @@ def build(**changed: object) -> Build:
         "method": "channel-pin",
         "toml": "",
         "predicted": {"stroke_mm": (17.5, "the paper's height, scaled")},
-        "tolerances": {"offset_mm": 0.2, "turn_deg": 1.0, "cut_mm": 0.1},
         "good_builds": (900, 1000),
         "actuator_sha256": changed.get("sha256", SHA),
     }
     return Build(**{**plain, **changed})  # type: ignore[arg-type]
+
+
+def result(serial: str, leak: str = "", **values: Any) -> Record:
+    return Record(serial=serial, leak=leak, **values)
+
+
+def step(serial: str = "A1", **values: Any) -> HistoryEntry:
+    plain = {"step": "1", "initials": "AL", "temperature_c": 134.5, "minutes": 20}
+    return HistoryEntry(serial=serial, **{**plain, **values})
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from sbafab.assemblies.records import Assembly
 from sbafab.design.records import design_toml
 from sbafab.errors import DesignError
 from sbafab.reports.traveller.page import record_text
-from sbafab.results.recording import found_by
-from sbafab.results.records import promised
+from sbafab.results.builds import promised
+from sbafab.results.recording import matching
 from sbafab.results.store import Lab
 
 SMALL = {"stack": {"balloons": 2}, "rules": {"yield_builds": 100}}
@@ -36,17 +36,16 @@ def test_python_records_what_the_command_does(tmp_path: Path) -> None:
     assert [one.serial for one in sbafab.record(design, lab=lab, table=table)] == ["B1", "B2"]
     told = sbafab.report(lab)
     assert (told.records, told.items) == (4, 3)
-    records, _ = Lab(lab).contents()
-    assert records[0] == first
+    assert Lab(lab).contents().records[0] == first
 
 
 @pytest.mark.parametrize(
     ("said", "says"),
     [
         ({"leak": "pass"}, "needs its serial"),
-        ({"serial": "A1"}, "say what came out"),
-        ({"serial": "A1", "leak": "maybe"}, "write pass or fail"),
-        ({"serial": "A1", "stroke_mm": -1}, "stroke_mm is -1; it must be above 0"),
+        ({"serial": "A1"}, "A1 has no result; give leak"),
+        ({"serial": "A1", "leak": "maybe"}, "must be '', 'pass' or 'fail'"),
+        ({"serial": "A1", "stroke_mm": -1}, "stroke_mm = -1 must be greater than 0"),
         ({"serial": "A1", "leak": "pass", "table": "x.csv"}, "leave out serial, leak"),
     ],
 )
@@ -73,17 +72,16 @@ def test_an_assembly_is_recorded_as_a_whole(tmp_path: Path) -> None:
         (folder / own.design.name / "design.toml").write_text(design_toml(own.design))
     [again] = sbafab.record(folder, lab=lab, serial="S1", note="dropped")
     assert again.design_sha256 == made.design_sha256
-    records, builds = Lab(lab).contents()
+    records, _, builds = Lab(lab).contents()
     build = builds[made.design_sha256]
     assert (build.name, build.family, build.predicted) == ("standing", "assembly", {})
     assert made.kit == "paper"
     # Three actuators of one design: the whole holds where all three do.
     sbafab.record("3dof-15mm", lab=lab, serial="P1", leak="pass")
-    part = next(one for one in Lab(lab).contents()[1].values() if one.name == "3dof-15mm")
-    good, of = part.good_builds
-    assert build.good_builds[0] / build.good_builds[1] == pytest.approx((good / of) ** 3, abs=1e-4)
+    part = next(b for b in Lab(lab).contents().builds.values() if b.name == "3dof-15mm")
+    assert build.promise == pytest.approx(part.promise**3, abs=1e-4)
     scanned = record_text("standing", made.design_sha256, "sbafab 1.0.0")
-    assert found_by(scanned, "", records, builds) == [made, again]
+    assert matching(scanned, "", records, builds) == [made, again]
 
 
 def test_a_proof_test_is_recorded_and_the_burst_is_scaled(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.schedule import Schedule, SeamStep, Step
 
 ADHESIVE = "adhesive"
-DECISIONS = ("accept", "reject", "rework")
 TESTS = ("leak test", "proof test", "device")
 """Steps after the press; the last decides on the whole device."""
 

@@ -1,0 +1,130 @@
+"""Designs as they were recorded, with what they promise: figures and the share of good builds."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from sbafab.actuators import build as laminate_of
+from sbafab.actuators import records
+from sbafab.assemblies.build import Assembled
+from sbafab.assemblies.files import assembled_sha256, assembly_sha256, assembly_toml
+from sbafab.design.files import ASSEMBLY
+from sbafab.design.identity import actuator_sha256, design_sha256
+from sbafab.design.records import Design, design_toml, validated
+from sbafab.errors import DesignError
+from sbafab.models.figures import FigureQuantity, PredictionRequest
+from sbafab.models.formulas import usual_pressures
+from sbafab.models.paper import FORCE_KPA
+from sbafab.models.prediction import predict
+from sbafab.output.checked import limits
+from sbafab.rules.registration_yield import simulate
+from sbafab.version import GENERATOR
+
+MEASURED: Mapping[FigureQuantity, str] = {
+    "burst": "burst_kpa",
+    "reference_stroke": "stroke_mm",
+    "flat_force": "force_n",
+    "folded_height": "height_mm",
+    "mass": "mass_g",
+}
+"""By figure: the measured quantity that is held against it, by the model to design with."""
+
+
+@dataclass(frozen=True)
+class Build:
+    """A design that was recorded, with what was predicted of it.
+
+    ``predicted``: quantity to value and model. ``good_builds``: of how many random builds how many
+    keep every limit. ``actuator_sha256`` is the hash of what is built, the same for designs that
+    differ in how many, or on what sheets.
+    """
+
+    sha256: str
+    generator: str
+    name: str
+    family: str
+    method: str
+    toml: str
+    predicted: Mapping[str, tuple[float, str]]
+    good_builds: tuple[int, int]
+    actuator_sha256: str
+
+    @property
+    def promise(self) -> float:
+        """The share of random builds that keep every limit."""
+        return self.good_builds[0] / self.good_builds[1]
+
+    @cached_property
+    def design(self) -> Design | None:
+        """The design as this version reads it; None of an assembly and of what it cannot read.
+
+        All that its kit gave stands in the record, so the kit's file is not asked for. A drawn
+        outline does not: the file at its path may be another by now.
+        """
+        try:
+            tables = tomllib.loads(self.toml)
+            tables.pop("kit", None)
+            if not tables or tables.get("family") == ASSEMBLY:
+                return None
+            design = validated(tables, records(), Path())
+        except (tomllib.TOMLDecodeError, RecursionError, DesignError):
+            return None
+        return None if design.drawing is not None else design
+
+    @cached_property
+    def actuator(self) -> str:
+        """The hash that actuators are grouped by, as this version counts it.
+
+        So an earlier version's record groups with today's, also where keys were added since.
+        """
+        return self.actuator_sha256 if self.design is None else actuator_sha256(self.design)
+
+
+def recorded_sha256(built: Design | Assembled) -> str:
+    """Return the hash of what was built."""
+    return design_sha256(built) if isinstance(built, Design) else assembly_sha256(built)
+
+
+def promised(built: Design | Assembled) -> Build:
+    """Return what was built with its predictions and yield. Raises DesignError.
+
+    An assembly is good if every part is; no figure is predicted of it.
+    """
+    if isinstance(built, Design):
+        name, family, toml = built.name, built.family, design_toml(built)
+        actuator, predicted = actuator_sha256(built), _predicted(built)
+        parts = [(built, laminate_of(built), 1)]
+    else:
+        name, family, toml = built.assembly.name, ASSEMBLY, assembly_toml(built)
+        actuator, predicted = assembled_sha256(built), {}
+        parts = [(part.design, part.laminate, len(part.parts)) for part in built.designs]
+    designs = [design for design, _, _ in parts]
+    shares = [simulate(laminate, limits(design)).whole for design, laminate, _ in parts]
+    builds = max(share.builds for share in shares)
+    good = math.prod(share.value**count for share, (*_, count) in zip(shares, parts, strict=True))
+    return Build(
+        sha256=recorded_sha256(built),
+        generator=GENERATOR,
+        name=name,
+        family=family,
+        method=", ".join(dict.fromkeys(design.registration.method for design in designs)),
+        toml=toml,
+        predicted=predicted,
+        good_builds=(round(good * builds), builds),
+        actuator_sha256=actuator,
+    )
+
+
+def _predicted(design: Design) -> dict[str, tuple[float, str]]:
+    """Return value and model of each quantity that a lab measures."""
+    request = PredictionRequest(usual_pressures(design.form)[-1:])
+    return {
+        MEASURED[figure.quantity]: (figure.value, figure.model.title)
+        for figure in predict(design, request).figures
+        if figure.quantity and not figure.other and figure.pressure_kpa in (None, FORCE_KPA)
+    }
