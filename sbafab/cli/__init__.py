@@ -106,7 +106,6 @@ EXTRAS = {
     "optuna": ("optuna", "find --optuna"),
     "parquet": ("pyarrow", "tables of sweeps as Parquet"),
     "python": ("meshio", "meshes for meshio and PyVista"),
-    "quality": ("scipy", "record --charts, record --gauge"),
     "scan": ("skimage", "sbafab inspect"),
     "studio": ("starlette", "sbafab studio"),
     "yaml": ("yaml", "import of YAML, as foldable_robotics writes it"),

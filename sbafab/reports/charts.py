@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from sbafab.geometry.region import coord
 from sbafab.models.figures import Relation
@@ -36,24 +36,20 @@ MOST_STEPS = 8
 """Steps between the numbers at an axis."""
 MARGIN = 0.05
 """Share of the values' range by which an axis goes on."""
-STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "sbafab",
-    "font.family": "sans-serif",
-    # Comes with matplotlib, so that text is as wide on every machine; the others are for viewers.
-    "font.sans-serif": ["DejaVu Sans", "Arial", "Helvetica"],
-    "font.size": 9.0,
-    "axes.titlesize": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-}
-"""Settings of matplotlib, for charts and pages that it draws."""
-PLAIN: dict[str, Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+SPECKS = (
+    "m-.7 0a.7 .7 0 1 0 1.4 0a.7 .7 0 1 0-1.4 0z",
+    "m-.7-.5l.2-.2l.5.5l.5-.5l.2.2l-.5.5l.5.5l-.2.2l-.5-.5l-.5.5l-.2-.2l.5-.5z",
+    "m-.6-.6h1.2v1.2h-1.2z",
+    "m0-.8l.7 1.3h-1.4z",
+    "m0 .8l.7-1.3h-1.4z",
+)
+"""Filled marks of many values, from their middle."""
+SPECK_GRID = 4
+"""Specks of one colour in the same 1/4 mm are drawn once."""
+BAR = 0.4
+"""Half of a bar's width, of the distance between two."""
+MOST_NAMES = 8
+"""Names below bars, as many as have room."""
 
 
 class ChartCurve(NamedTuple):
@@ -75,6 +71,24 @@ class ChartPoints(NamedTuple):
     error: Sequence[float]
 
 
+class ChartSpecks(NamedTuple):
+    """Many values, each a small filled mark of SPECKS."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    colour: str
+    mark: int
+
+
+class ChartBars(NamedTuple):
+    """A bar a name of the panel, on top of those before: ``y`` are whole numbers."""
+
+    label: str
+    y: Sequence[int]
+    colour: str
+
+
 class Panel(NamedTuple):
     """One pair of axes; labels carry their units. A key names curves if any has a label."""
 
@@ -85,20 +99,38 @@ class Panel(NamedTuple):
     points: Sequence[ChartPoints] = ()
     from_zero: bool = True
     """Axes begin at 0 where nothing is negative: lengths of bars and slopes then mean something."""
+    specks: Sequence[ChartSpecks] = ()
+    bars: Sequence[ChartBars] = ()
+    names: Sequence[str] = ()
+    """Below the bars."""
 
 
-def chart_svg(title: str, panels: Sequence[Panel]) -> str:
-    """Return the panels beside each other, under one title."""
-    elements, end, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
-    for place, panel in enumerate(panels, start=1):
+def chart_svg(title: str, panels: Sequence[Panel], in_row: int = 1000) -> str:
+    """Return the panels under one title, so many in a row."""
+    elements, width, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
+    for first in range(0, len(panels), in_row):
+        drawn, end, below = _row(panels[first : first + in_row], first + 1)
+        if first:
+            drawn = [f'<g transform="translate(0 {coord(height)})">', *drawn, "</g>"]
+        elements += drawn
+        width, height = max(width, end), height + below
+    return draw.document(width, height, title, elements)
+
+
+def _row(panels: Sequence[Panel], first: int) -> tuple[list[str], float, float]:
+    """Return the elements of panels beside each other from number ``first`` on; width, height."""
+    elements: list[str] = []
+    end, height = 0.0, 0.0
+    for place, panel in enumerate(panels, start=first):
         plot = _plot(panel, end)
-        elements += [*_axes(plot, place), *_curves(plot, place), *_points(plot, place)]
+        elements += [*_axes(plot, place), *_bars(plot, place), *_specks(plot, place)]
+        elements += [*_curves(plot, place), *_points(plot, place)]
         rows = list(_key(panel))
         elements += [_key_row(plot, number, row) for number, row in enumerate(rows)]
         words = max((draw.text_width(row.label, draw.SMALL) for row in rows), default=0.0)
         end = plot.left + max(AXES[0], SIGN + 2 + words) + RIM
         height = max(height, HEAD + AXES[1] + FOOT + ROW * len(rows) + 1)
-    return draw.document(end, height, title, elements)
+    return elements, end, height
 
 
 class _Scale(NamedTuple):
@@ -130,26 +162,37 @@ class _Plot(NamedTuple):
 
 def _plot(panel: Panel, begin: float) -> _Plot:
     """Return the plot of a panel; the wider the numbers, the further right its axes."""
-    items: list[ChartCurve | ChartPoints] = [*panel.curves, *panel.points]
+    items: list[ChartCurve | ChartPoints | ChartSpecks]
+    items = [*panel.curves, *panel.points, *panel.specks]
     ends = [
         y + sign * error
         for points in panel.points
         for y, error in zip(points.y, points.error, strict=True)
         for sign in (-1, 1)
     ]
-    x = _scale([value for item in items for value in item.x], panel.from_zero)
-    y = _scale([*(value for item in items for value in item.y), *ends], panel.from_zero)
+    if panel.bars:
+        every = max(1, len(panel.names) // MOST_NAMES)
+        ticks = list(enumerate(panel.names))[::every]
+        x = _Scale(-2 * BAR, len(panel.names) - 1 + 2 * BAR, ticks)
+        tops = map(sum, zip(*(bars.y for bars in panel.bars), strict=True))
+        y = _scale(map(float, tops), True, least=1.0)
+    else:
+        x = _scale([value for item in items for value in item.x], panel.from_zero)
+        y = _scale([*(value for item in items for value in item.y), *ends], panel.from_zero)
     numbers = max(draw.text_width(text) for _, text in y.ticks)
     return _Plot(panel, begin, begin + draw.TEXT + 6 + numbers, x, y)
 
 
-def _scale(values: Iterable[float], from_zero: bool) -> _Scale:
-    """Return the axis of values, those that are no finite numbers left out."""
+def _scale(values: Iterable[float], from_zero: bool, least: float = 0.0) -> _Scale:
+    """Return the axis of values, those that are no finite numbers left out.
+
+    Numbers stand ``least`` or more apart.
+    """
     finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
     low, high = min(finite), max(finite)
     over = MARGIN * ((high - low) or abs(high) or 1.0)
     low, high = 0.0 if from_zero and low >= 0 else low - over, high + over
-    least = (high - low) / MOST_STEPS
+    least = max(least, (high - low) / MOST_STEPS)
     power = 10.0 ** math.floor(math.log10(least))
     step = next(each * power for each in (1, 2, 2.5, 5, 10) if each * power >= least * (1 - 1e-9))
     # A number at the end of an axis is not lost to rounding.
@@ -195,6 +238,37 @@ def _pens(panel: Panel) -> Iterator[tuple[str, str]]:
         yield colour, f"{pen}{dashed}"
 
 
+def _bars(plot: _Plot, place: int) -> Iterator[str]:
+    """Yield the bars of a label in panel number ``place`` as a group ``bars<place>.<number>``."""
+    below = [0] * len(plot.panel.names)
+    for number, bars in enumerate(plot.panel.bars, start=1):
+        boxes = ""
+        for name, (base, count) in enumerate(zip(below, bars.y, strict=True)):
+            if count:
+                left, low = plot.at(name - BAR, base)
+                right, high = plot.at(name + BAR, base + count)
+                boxes += draw.box((left, high), (right, low), fill=bars.colour)
+        below = [a + b for a, b in zip(below, bars.y, strict=True)]
+        yield f'<g id="bars{place}.{number}">{boxes}</g>'
+
+
+def _specks(plot: _Plot, place: int) -> Iterator[str]:
+    """Yield the specks of a label in panel number ``place``, ``specks<place>.<number>``."""
+    for number, specks in enumerate(plot.panel.specks, start=1):
+        middles = (plot.at(*pair) for pair in zip(specks.x, specks.y, strict=True))
+        # In a sweep of many designs most lie on others.
+        places = dict.fromkeys(
+            (round(x * SPECK_GRID) / SPECK_GRID, round(y * SPECK_GRID) / SPECK_GRID)
+            for x, y in middles
+        )
+        yield f'<g id="specks{place}.{number}">{_speck_path(specks, places)}</g>'
+
+
+def _speck_path(specks: ChartSpecks, places: Iterable[tuple[float, float]]) -> str:
+    data = "".join(f"M{coord(x)} {coord(y)}{SPECKS[specks.mark]}" for x, y in places)
+    return f'<path d="{data}" fill="{specks.colour}"/>'
+
+
 def _curves(plot: _Plot, place: int) -> Iterator[str]:
     """Yield each curve of panel number ``place`` as a group ``curve<place>.<number>``."""
     pairs = zip(plot.panel.curves, _pens(plot.panel), strict=True)
@@ -235,14 +309,19 @@ def _marker(number: int, at: tuple[float, float]) -> str:
 
 
 class _KeyRow(NamedTuple):
-    """A label with the pen of its curve, or without one the number of its points."""
+    """A label with the pen of its curve, or its specks, or else the number of its points."""
 
     label: str
     pen: str
     number: int = 0
+    specks: ChartSpecks | None = None
 
 
 def _key(panel: Panel) -> Iterator[_KeyRow]:
+    for bars in panel.bars:
+        yield _KeyRow(bars.label, f'stroke="{bars.colour}" stroke-width="2.4"')
+    for specks in panel.specks:
+        yield _KeyRow(specks.label, "", specks=specks)
     for curve, (_, pen) in zip(panel.curves, _pens(panel), strict=True):
         if curve.label:
             yield _KeyRow(curve.label, pen)
@@ -256,6 +335,8 @@ def _key_row(plot: _Plot, number: int, row: _KeyRow) -> str:
     x, y = plot.left, HEAD + AXES[1] + FOOT + ROW * (number + 0.5)
     if row.pen:
         sign = f'<path d="M{coord(x)} {coord(y)}h{SIGN:g}" {row.pen}/>'
+    elif row.specks:
+        sign = _speck_path(row.specks, [(x + SIGN / 2, y)])
     else:
         sign = _marker(row.number, (x + SIGN / 2, y))
     return sign + draw.text((x + SIGN + 2, y + 0.9), row.label, size=draw.SMALL)

@@ -8,9 +8,7 @@ it, nothing is fetched.
 from __future__ import annotations
 
 import csv
-import io
 import json
-import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
@@ -26,16 +24,13 @@ from sbafab.errors import OutputError
 from sbafab.models.figures import OF_CALIBRATION
 from sbafab.models.intervals import factors_of
 from sbafab.models.paper import counterpart_of_column
-from sbafab.reports.charts import PLAIN, STYLE
+from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.reports.html_templates import environment
 from sbafab.rules.deck import rule_names
 from sbafab.search.measure import SweepRow
 from sbafab.search.vary import Values, Varied
 from sbafab.spreadsheet import write_rows
 from sbafab.version import GENERATOR
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 # The tables: a design a row, in the order in which they were asked.
 
@@ -276,17 +271,17 @@ def stale_designs(path: Path, table: Table) -> int:
 
 
 LOOKS = {
-    "passes": ("#009e73", "o"),
-    "fails": ("#d55e00", "x"),
-    "refused": ("#999999", "s"),
-    "crashed": ("#000000", "^"),
-    "too long": ("#cc79a7", "v"),
+    "passes": "#009e73",
+    "fails": "#d55e00",
+    "refused": "#999999",
+    "crashed": "#000000",
+    "too long": "#cc79a7",
 }
-"""Colour and marker of an outcome: told apart by the colour blind and in grey."""
+"""Colour of an outcome, with a mark of its own: told apart by the colour blind and in grey."""
 BINS = 12
 MOST_BARS = 30
-MANY = 1500
-"""More points than this are drawn as a picture inside the drawing."""
+IN_ROW = 3
+"""Panels beside each other."""
 
 
 class Objective(NamedTuple):
@@ -322,70 +317,58 @@ def _is_number(value: object) -> bool:
 
 def passes_svg(dots: Dots, keys: Sequence[str]) -> str:
     """Outcomes by the value of each key; of two keys with numbers also by both."""
-    panels: list[Any] = [lambda axes, key=key: _bars(axes, dots, key) for key in keys]
+    panels = [_bars(dots, key) for key in keys]
     if len(keys) == 2 and all(any(map(_is_number, dots.columns[key])) for key in keys):
-        panels.append(lambda axes: _map(axes, dots, *keys))
-    return _drawn(panels)
+        x, y = keys
+        panels.append(Panel(f"{x} and {y}", x, y, (), (), False, _specks(dots, x, y, tuple(LOOKS))))
+    return _drawn("Outcomes", panels)
 
 
 def trades_svg(dots: Dots, pairs: Sequence[tuple[Objective, Objective]]) -> tuple[str, set[int]]:
     """A panel a pair with the front of what passes, and the numbers of the designs on any front."""
     on_front: set[int] = set()
+    panels = []
+    for x, y in pairs:
+        across, up, numbers = dots.both(x.column, y.column, "passes")
+        best = front(list(zip(across, up, strict=True)), (x.more, y.more))
+        on_front.update(numbers[place] for place in best)
+        line = sorted((across[place], up[place]) for place in best)
+        ends = [a for a, _ in line], [b for _, b in line]
+        curve = ChartCurve("Pareto front", *ends, dotted=True)
+        specks = _specks(dots, x.column, y.column, ("fails", "passes"))
+        panels.append(Panel("", _better(x), _better(y), [curve], (), False, specks))
+    return _drawn("Trade-offs", panels), on_front
 
-    def panel(axes: Axes, x: Objective, y: Objective) -> None:
-        on_front.update(_trade(axes, dots, x, y))
 
-    return _drawn([lambda axes, x=x, y=y: panel(axes, x, y) for x, y in pairs]), on_front
-
-
-def _drawn(panels: Sequence[Any]) -> str:
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
-
-    columns = min(3, len(panels))
-    rows = -(-len(panels) // columns)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(4.3 * columns, 3.5 * rows), layout="constrained")
-        FigureCanvasSVG(figure)
-        places = list(figure.subplots(rows, columns, squeeze=False).flat)
-        for axes, draw in zip(places, panels, strict=False):
-            draw(axes)
-        for axes in places[len(panels) :]:
-            axes.remove()
-        labels = {
-            text: handle
-            for axes in figure.axes
-            for handle, text in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(
-            labels.values(), labels.keys(), loc="outside upper left", ncols=max(1, len(labels))
-        )
-        written = io.StringIO()
-        figure.savefig(written, format="svg", metadata=PLAIN)
-    text = written.getvalue()
+def _drawn(title: str, panels: Sequence[Panel]) -> str:
+    text = chart_svg(title, panels, IN_ROW)
     return text[text.index("<svg") :]
 
 
-def _bars(axes: Axes, dots: Dots, key: str) -> None:
+def _bars(dots: Dots, key: str) -> Panel:
     """Designs of each outcome, one on top of the other, by value or in equal bins of it."""
-    column = dots.columns[key]
-    names, group = _groups(column)
-    below = [0] * len(names)
-    for outcome, (colour, _) in LOOKS.items():
-        counts = [0] * len(names)
-        for of, place in zip(dots.outcomes, group, strict=True):
-            counts[place] += of == outcome
-        if any(counts):
-            axes.bar(range(len(names)), counts, 0.8, below, color=colour, label=outcome)
-            below = [a + b for a, b in zip(below, counts, strict=True)]
-    every = max(1, len(names) // 8)
-    axes.set_xticks(range(0, len(names), every), names[::every])
-    axes.set_xlabel(key)
-    axes.set_ylabel("designs")
-    axes.locator_params("y", integer=True)
-    axes.grid(False, axis="x")
-    axes.set_axisbelow(True)
+    names, group = _groups(dots.columns[key])
+    counts = {outcome: [0] * len(names) for outcome in LOOKS}
+    for outcome, place in zip(dots.outcomes, group, strict=True):
+        counts[outcome][place] += 1
+    bars = [
+        ChartBars(outcome, each, LOOKS[outcome]) for outcome, each in counts.items() if any(each)
+    ]
+    return Panel("", key, "designs", (), bars=bars, names=names)
+
+
+def _specks(dots: Dots, x: str, y: str, outcomes: Sequence[str]) -> list[ChartSpecks]:
+    places = [*LOOKS]
+    values = ((outcome, *dots.both(x, y, outcome)[:2]) for outcome in outcomes)
+    return [
+        ChartSpecks(outcome, across, up, LOOKS[outcome], places.index(outcome))
+        for outcome, across, up in values
+        if across
+    ]
+
+
+def _better(objective: Objective) -> str:
+    return f"{objective.label} ({'more' if objective.more else 'less'} is better)"
 
 
 def _groups(column: Sequence[Any]) -> tuple[list[str], list[int]]:
@@ -407,50 +390,6 @@ def _tick(text: str) -> str:
         return f"{float(text):g}"
     except ValueError:
         return text.strip("'").rpartition("/")[2][:24]
-
-
-def _map(axes: Axes, dots: Dots, x: str, y: str) -> None:
-    for outcome in LOOKS:
-        _points(axes, outcome, *dots.both(x, y, outcome)[:2])
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-
-
-def _points(axes: Axes, outcome: str, x: list[float], y: list[float]) -> None:
-    if x:
-        colour, marker = LOOKS[outcome]
-        style: dict[str, Any] = {"color": colour, "marker": marker, "s": 22}
-        axes.scatter(
-            x, y, label=outcome, linewidths=1.0, alpha=0.85, rasterized=len(x) > MANY, **style
-        )
-
-
-def _trade(axes: Axes, dots: Dots, x: Objective, y: Objective) -> list[int]:
-    for outcome in ("fails", "passes"):
-        _points(axes, outcome, *dots.both(x.column, y.column, outcome)[:2])
-    across, up, numbers = dots.both(x.column, y.column, "passes")
-    best = front(list(zip(across, up, strict=True)), (x.more, y.more))
-    line = sorted((across[place], up[place]) for place in best)
-    axes.plot(
-        [point[0] for point in line],
-        [point[1] for point in line],
-        color="#0072b2",
-        lw=1.4,
-        marker="o",
-        ms=7,
-        mfc="none",
-        label="Pareto front",
-        zorder=5,
-    )
-    axes.set_xlabel(_wrapped(x))
-    axes.set_ylabel(_wrapped(y))
-    return [numbers[place] for place in best]
-
-
-def _wrapped(objective: Objective) -> str:
-    return textwrap.fill(
-        f"{objective.label} ({'more' if objective.more else 'less'} is better)", 42
-    )
 
 
 TEMPLATE = "sweep.html.j2"

@@ -8,7 +8,16 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import sbafab
-from sbafab.reports.charts import COLOURS, ChartCurve, ChartPoints, Panel, chart_svg, relation_svg
+from sbafab.reports.charts import (
+    COLOURS,
+    ChartBars,
+    ChartCurve,
+    ChartPoints,
+    ChartSpecks,
+    Panel,
+    chart_svg,
+    relation_svg,
+)
 from sbafab.reports.drawing import SMALL, text_width
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -142,3 +151,45 @@ def test_paper_s_points_are_drawn_where_it_measured() -> None:
     assert key("3dof-15mm") == {"paper: 3-DoF, 100 kPa"}
     assert key("3dof-15mm", "chamber.count=4") == set()
     assert key("1dof-10mm") == set()
+
+
+def test_bars_stand_on_each_other_above_their_names() -> None:
+    bars = [ChartBars("a", [2, 0, 1], "#111111"), ChartBars("b", [3, 4, 0], "#222222")]
+    svg = chart_svg("t", [Panel("p", "x", "n", [], bars=bars, names=["4", "4.5", "long"])])
+    up = tick_places(svg, "y")
+    assert all(number == int(number) for number in up)
+    boxes = [
+        [tuple(float(box.attrib[k]) for k in ("x", "y", "height")) for box in group(svg, name)]
+        for name in ("bars1.1", "bars1.2")
+    ]
+    scale = (up[0] - up[4]) / 4
+    assert [height / scale for *_, height in boxes[0]] == pytest.approx([2, 1])
+    assert [height / scale for *_, height in boxes[1]] == pytest.approx([3, 4])
+    (_, top, _), (x, low, height) = boxes[0][0], boxes[1][0]
+    assert (x, low + height) == pytest.approx((boxes[0][0][0], top))
+    assert {"4", "4.5", "long", "a", "b"} <= set(texts(svg))
+
+
+def test_specks_lie_where_the_ticks_say_and_equal_ones_are_drawn_once() -> None:
+    specks = ChartSpecks("many", [1.0, 1.0, 4.0] * 1000, [2.0, 2.0, 3.0] * 1000, "#111111", 1)
+    svg = chart_svg("t", [Panel("p", "x", "y", [], specks=[specks])])
+    (path,) = group(svg, "specks1.1")
+    places = [(float(x), float(y)) for x, y in re.findall(r"M(\S+) ([\d.]+)", path.attrib["d"])]
+    across, up = tick_places(svg, "x"), tick_places(svg, "y")
+    # To a quarter of a millimetre.
+    assert len(places) == 2
+    for found, expected in zip(places, [(across[1], up[2]), (across[4], up[3])], strict=True):
+        assert found == pytest.approx(expected, abs=0.13)
+
+
+def test_panels_stand_in_rows_below_each_other() -> None:
+    panels = [Panel(name, "x", "y", [ChartCurve("", [0.0, 1.0], [0.0, 1.0])]) for name in "abcd"]
+    sizes = [
+        [
+            float(size)
+            for size in ET.fromstring(chart_svg("t", panels, count)).attrib["viewBox"].split()[2:]
+        ]
+        for count in (4, 2)
+    ]
+    (wide, low), (narrow, high) = sizes
+    assert (narrow, high) == pytest.approx((wide / 2, 2 * low))

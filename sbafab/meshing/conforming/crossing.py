@@ -19,8 +19,8 @@ from sbafab.meshing.conforming.layup import FormedFilm, Layup
 from sbafab.meshing.conforming.mesh import TRIANGLE_PARTS
 
 if TYPE_CHECKING:
-    from matplotlib.tri import TriFinder
     from numpy.typing import NDArray
+    from shapely import STRtree
 
 SLACK = 0.002
 """mm by which a film may seem to lie in another: chords leave curved films by as much."""
@@ -109,17 +109,26 @@ class _Plane:
         self.edges = np.unique(np.sort(edges, axis=1), axis=0)
 
     @cached_property
-    def finder(self) -> TriFinder:
-        from matplotlib.tri import Triangulation
+    def tree(self) -> STRtree:
+        from shapely import STRtree, linearrings, polygons
 
-        x, y = self.points.T
-        return Triangulation(x, y, self.parts).get_trifinder()
+        return STRtree(polygons(linearrings(self.points[self.parts])))
+
+    def part_at(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the triangle that holds each of points (n, 2); -1 outside of all."""
+        from shapely import points as shapely_points
+
+        places, parts = self.tree.query(shapely_points(points), predicate="intersects")
+        holding = np.full(len(points), -1, dtype=np.int64)
+        # On an edge the first of those that share it.
+        holding[places[::-1]] = parts[::-1]
+        return holding
 
     def over(
         self, film: _Film, face: NDArray[np.float64], points: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Height of points (n, 3), in a film's frame, over a face of it; NaN beside the film."""
-        part = np.asarray(self.finder(points[:, 0], points[:, 1]), dtype=np.int64)
+        part = self.part_at(points[:, :2])
         there = np.flatnonzero(part >= 0)
         there = there[film.cells[self.cells[part[there]]]]
         height = np.full(len(self.points), np.nan)
