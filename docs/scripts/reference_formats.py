@@ -52,7 +52,6 @@ layer's lower face. Films and shapes stand once each; `film`, `shape` and `outli
 | `seams` | bonds of a tool between two layers: half of `width` on both sides of `path`, in `order` |
 | `folds` | `lower` and `upper` are halves of one film, which goes on at `line` |
 | `ports`, `nets` | places in the gap between two layers, and which of them are joined |
-| `panel` | registered sheets, `null` without |
 
 `python -I sbafab/laminate/laminate_validator.py FILE` names every fault at its place, with the standard library alone.
 

@@ -14,7 +14,6 @@ from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.registration_yield import simulate
-from tests.faults.panels import narrowed, over_the_tab
 from tests.rules.conftest import built, spoiled
 from tests.rules.routed import cut_through, laminate_of, straight
 from tests.rules.test_deck import EARS, EXACT, FAULTS, ONE
@@ -151,28 +150,6 @@ def _pin_fit() -> Pair:
     return Pair(*drawings, found.message)
 
 
-def _of_sheet(rule: str, index: int, change: Callable[[Region, Laminate], Region]) -> Pair:
-    settings = (
-        'registration.method="sheet"',
-        "registration.experimental=true",
-        "stack.balloons=2",
-        "order.copies=2",
-    )
-    good = built("1dof-5mm", *settings)
-    assert good.panel is not None
-    sheets = list(good.panel.sheets)
-    sheets[index - 1] = change(sheets[index - 1], good)
-    bad = replace(good, panel=replace(good.panel, sheets=tuple(sheets)))
-    assert bad.panel is not None
-    found = _found(rule, bad)
-    box = good.panel.outline.bounds
-    right, wrong = (
-        svg([Shape(own.sheets[index - 1], STRUCTURAL[0])], box, mark)
-        for own, mark in ((good.panel, None), (bad.panel, _place(found)))
-    )
-    return Pair(right, wrong, found.message)
-
-
 def _worst_case() -> Pair:
     """The wall of the lowest balloon as drawn, and moved by what a rough hand may move it."""
     good = built(*ONE)
@@ -223,9 +200,7 @@ OTHERS: dict[str, Callable[[], Pair]] = {
     "press-fit": _press_fit,
     "pressure-rating": _pressure_rating,
     "pin-fit": _pin_fit,
-    "bridges": lambda: _of_sheet("bridges", 1, narrowed),
     "nets": _nets,
-    "scrap": lambda: _of_sheet("scrap", 5, over_the_tab),
     "registration-worst-case": _worst_case,
     "registration-yield": _yield,
 }

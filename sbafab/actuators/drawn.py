@@ -222,7 +222,6 @@ class DrawnDesign(Design):
         "mask": "remove it, and draw masks as large as they shall be",
         "fillet": "remove it, and round a shape by {fillet = SHAPE, radius = 1}",
         "chamber": "remove it, and name a drawn outline in a shape: shapes.pocket.file",
-        "panel": "remove it, for drawn layers go in no registered sheets",
         "registration.pin_clearance": "remove it, and give pins their clearance, in pins",
     }
 
@@ -443,12 +442,10 @@ def _check(design: DrawnDesign) -> None:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise DesignError(f"chambers has {shown(twice)} twice; give each chamber its name")
-    method = design.registration.method
-    if method == "sheet" or (method == "ears" and design.pins is None):
-        remedy = ", or draw the ears and list their pins" if method == "ears" else ""
+    if design.registration.method == "ears" and design.pins is None:
         raise DesignError(
-            f"registration.method = {shown(method)} adds parts to layers, and drawn ones stay as "
-            f'they are; set it to "channel-pin"{remedy}'
+            "registration.method = 'ears' adds parts to layers, and drawn ones stay as they are; "
+            'set it to "channel-pin", or draw the ears and list their pins'
         )
     _check_order(roles)
     pairs = chamber_gaps(roles, design.seamed_layers)
@@ -634,7 +631,7 @@ def _check_folds(laminate: Laminate, design: DrawnDesign) -> None:
                 f"x {x:.3f}, y {y:.3f}; both must lie on one side of the line"
             )
     for root in {fold.lower for fold in laminate.folds} - {fold.upper for fold in laminate.folds}:
-        flat = laminate.first_cut(laminate.layer(root))
+        flat = laminate.as_cut(laminate.layer(root))
         parts = len(laminate.layer(root).profile.pieces)
         if len(flat.pieces) > parts:
             raise DesignError(

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from sbafab.actuators.ears import Ear, Holder, Ray, placed, tails
-from sbafab.actuators.panel import on_panel, roots, with_stubs
 from sbafab.actuators.stacking import (
     BalloonShape,
     BalloonStack,
@@ -75,8 +74,6 @@ def build_footprint(design: Design, footprint: Footprint) -> Laminate:
     )
     inlets = tuple(inlet for _, _, inlet in feeds)
     plates = union(shape.outline for shape in shapes)
-    bridges = roots(design, shapes, bottom.outline, inlets)
-    bottom, shapes = with_stubs(bottom, bridges), tuple(with_stubs(s, bridges) for s in shapes)
     ears: tuple[Ear, ...] = ()
     body = plates
     if design.registration.method == "ears":
@@ -93,8 +90,7 @@ def build_footprint(design: Design, footprint: Footprint) -> Laminate:
         tails(inlets, body, ears, design),
     )
     laminate = stacked(design, stack, chambers, inlets)
-    notes = (*footprint.notes, *laminate.notes)
-    return on_panel(replace(laminate, notes=notes, outline=plates), bridges, design)
+    return replace(laminate, notes=(*footprint.notes, *laminate.notes), outline=plates)
 
 
 def _plate(design: Design, hub: Region | None, pockets: Sequence[Region]) -> BalloonShape:

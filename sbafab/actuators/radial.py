@@ -6,9 +6,8 @@ Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field
 
@@ -23,7 +22,6 @@ from sbafab.actuators.ears import (
     with_mask_ears,
     with_sheet_ears,
 )
-from sbafab.actuators.panel import METHOD
 from sbafab.actuators.stacking import (
     BalloonShape,
     BalloonStack,
@@ -111,10 +109,6 @@ class RadialDesign(Design):
         "M37 15a4.5 4.5 0 0 1 9 0v10a4.5 4.5 0 0 1-9 0Z",
     )
 
-    unused: ClassVar[Mapping[str, str]] = {
-        "panel": "remove it, for radial designs go in no registered sheets"
-    }
-
     family: Literal["radial"]
     """Which kind of actuator this is."""
     stack: RadialStack = RadialStack.model_construct()
@@ -158,12 +152,6 @@ class RadialDesign(Design):
 
 def build(design: RadialDesign) -> Laminate:
     """Return the flat laminate of a radial design. Raises DesignError where parts do not fit."""
-    if design.registration.method == METHOD:
-        raise DesignError(
-            "a radial design cannot be made in registered sheets, for its balloons' bridges would "
-            "lie on the sheet that is wrapped, and the second cut would go through it; use "
-            'registration.method = "ears"'
-        )
     bond, overhang = design.bond.width, design.mask.overhang
     pocket = _pocket(design)
     check_neck(design, [pocket])

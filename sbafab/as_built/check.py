@@ -48,7 +48,7 @@ from sbafab.as_built.records import (
     read_claims,
     read_job,
 )
-from sbafab.as_built.sheets import DesignLot, SheetOrder, read_panel, sheet_problems
+from sbafab.as_built.sheets import DesignLot, SheetOrder, sheet_problems
 from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
@@ -58,7 +58,7 @@ from sbafab.design.records import Design, validated
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.region import Region
 from sbafab.laminate.folding import halves
-from sbafab.laminate.laminate import Laminate, SheetPanel
+from sbafab.laminate.laminate import Laminate
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import Checked
 from sbafab.output.checked import limits as limits_of
@@ -95,16 +95,11 @@ class AsBuiltFolder:
     def is_expected(self) -> bool:
         """True if every layer file cuts the design's layer; ``laminate`` is then the design's."""
         laminate, expected = self.laminate, self.expected
-        is_same_panel = (
-            laminate is None or expected is None or laminate.panel is expected.laminate.panel
-        )
         has_same_seams = (
             laminate is None or expected is None or laminate.seams == expected.laminate.seams
         )
-        return (
-            is_same_panel
-            and has_same_seams
-            and all(file.part is not None and file.part.is_expected for file in self.files)
+        return has_same_seams and all(
+            file.part is not None and file.part.is_expected for file in self.files
         )
 
 
@@ -242,21 +237,19 @@ def read_folder(
     files = _as_laid(files, expected)
     seams, file_errors = read_seams(folder, claims, design, expected)
     problems += file_errors
-    panel, files, file_errors = read_panel(folder, claims, files, expected)
-    problems += file_errors
     layers = stacked_layers(files, design)
     problems += height_problems(claims, layers, design)
     problems += property_problems(files, claims, design)
     problems += layer_problems(files, claims)
     problems += pattern_problems(layers, claims)
-    if not of_job and panel is None:
+    if not of_job:
         problems += _design_sheet_problems(folder, claims, design, files)
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
     if len(parts) == len(files):
         try:
-            laminate = _laminate(files, claims, design, expected, panel)
+            laminate = _laminate(files, claims, design, expected)
             if seams is not None:
                 laminate = replace(laminate, seams=seams)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
@@ -310,7 +303,6 @@ def _laminate(
     claims: Manifest,
     design: Design,
     expected: ExpectedLaminate | None,
-    panel: SheetPanel | None,
 ) -> Laminate:
     """Return the laminate as cut, with bores, inlets and pins of the design.
 
@@ -320,11 +312,10 @@ def _laminate(
     if expected is None or len(expected.laminate.layers) != len(files):
         return laminate_of(files, claims, design)
     if all(file.part is not None and file.part.is_expected for file in files):
-        laminate = expected.laminate
-        return laminate if panel is laminate.panel else replace(laminate, panel=panel)
+        return expected.laminate
     layers = zip(stacked_layers(files, design), expected.laminate.layers, strict=True)
     cut = tuple(replace(layer, pieces=layer_expected.pieces) for layer, layer_expected in layers)
-    return replace(expected.laminate, layers=cut, panel=panel)
+    return replace(expected.laminate, layers=cut)
 
 
 def layer_departures(built: AsBuiltFolder) -> list[Problem]:

@@ -261,11 +261,10 @@ def fixture_problems(folder: Path, laminate: Laminate, claims: Manifest) -> list
 
 
 def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list[Problem]:
-    """Return cycles that do not make all copies, and places too near each other or off the platen.
-
-    Registered sheets are pressed as one piece; their panel claims its places.
+    """Return cycles that do not make all copies, and places too near each other or off the
+    platen.
     """
-    if claims.copies == 1 or laminate.panel is not None:
+    if claims.copies == 1:
         return []
     batch = claims.batch
     if batch is None:

@@ -1,4 +1,4 @@
-"""Film sheets and registered sheets as on disk: pieces, layout and claims."""
+"""Film sheets as on disk: pieces, layout and claims."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from pathlib import Path, PurePosixPath
 
 from sbafab.as_built.claims import bare_problem, claim
 from sbafab.as_built.cut_files import LayerFile, check_sequence, path_in_folder, sound_digest
-from sbafab.as_built.expected import AGREEMENT, ExpectedLaminate, departure
-from sbafab.as_built.kerf_removed import remove_kerf
+from sbafab.as_built.expected import AGREEMENT
 from sbafab.as_built.measures import SHARE
 from sbafab.as_built.records import CLAIMS, INTEGRITY, Problem
 from sbafab.cutting.beam_check import BeamRun
@@ -29,7 +28,6 @@ from sbafab.cutting.properties import (
     kerf_suffix,
     limit_properties,
 )
-from sbafab.cutting.second_cut import PATH, ROOM, marks, second_path, severed, stack_kerf
 from sbafab.cutting.sheets import FOLDER, check_cuts, parts_cut
 from sbafab.cutting.verify import TOLERANCE, check_contours, check_surroundings
 from sbafab.design.records import Design
@@ -38,9 +36,8 @@ from sbafab.geometry.contour import Mark
 from sbafab.geometry.edges import Edge, Point, meeting_points
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.offset import Kerf
-from sbafab.geometry.region import Region, rectangle
+from sbafab.geometry.region import Region
 from sbafab.laminate.films import Material, in_order
-from sbafab.laminate.laminate import Layer, SheetPanel, freed
 from sbafab.nesting.check import check_placed, edge_distance
 from sbafab.nesting.records import TURNS, Stock, Turn, no_spares
 from sbafab.output.checked import entries, stocks
@@ -51,7 +48,6 @@ from sbafab.output.manifest import (
     Manifest,
     SheetClaim,
 )
-from sbafab.rules.bridges import mismatch_area
 
 # Pieces on film sheets, compared with the pieces of the layer files.
 
@@ -602,73 +598,3 @@ def _machine_problems(
             reason = str(error).removeprefix(f"{PurePosixPath(name).name}: ")
             problems.append(Problem(INTEGRITY, f"{name}: {reason}"))
     return problems
-
-
-# Registered sheets: the parts that the second cut frees.
-
-
-def read_panel(
-    folder: Path, claims: Manifest, files: Sequence[LayerFile], expected: ExpectedLaminate | None
-) -> tuple[SheetPanel | None, list[LayerFile], list[Problem]]:
-    """Return the panel of a folder's files, the layer files that it frees, and problems.
-
-    The panel is the design's own if all files agree with it. Of copies that differ, the one that
-    departs most from the design represents its layer.
-    """
-    panel = expected.laminate.panel if expected is not None else None
-    if expected is None or panel is None or len(files) != len(panel.sheets):
-        return panel, list(files), []
-    kerfs = {material: kerf.width for material, kerf in claims.kerf.items()}
-    kerf = stack_kerf(kerfs, severed(expected.laminate))
-    second, problems = _second_cut(folder, kerf or 0.0, panel)
-    parts = [file.part for file in files]
-    if second is panel.second and all(part is None or part.is_expected for part in parts):
-        return panel, list(files), problems
-    sheets = tuple(
-        sheet if part is None or part.is_expected else _seen_from_above(part.region, layer)
-        for sheet, part, layer in zip(panel.sheets, parts, expected.laminate.layers, strict=True)
-    )
-    panel_cut = replace(panel, sheets=sheets, second=second)
-    layers = expected.laminate.layers
-    return (
-        panel_cut,
-        [_with_part(*pair, panel_cut) for pair in zip(files, layers, strict=True)],
-        problems,
-    )
-
-
-def _seen_from_above(sheet: Region, layer: Layer) -> Region:
-    """Return a sheet as seen from above: sheets of masks are cut turned over."""
-    return sheet.mirrored() if layer.is_mask else sheet
-
-
-def _with_part(file: LayerFile, layer: Layer, panel: SheetPanel) -> LayerFile:
-    if file.part is None or file.part.is_expected:
-        return file
-    parts = [part for part in freed(panel, layer).parts if not part.is_empty]
-    # What is not freed at all is told by the rule bridges.
-    region = max(parts, key=lambda part: mismatch_area(part, layer.profile), default=layer.profile)
-    return replace(file, part=replace(file.part, region=region))
-
-
-def _second_cut(folder: Path, width: Kerf, panel: SheetPanel) -> tuple[Region, list[Problem]]:
-    """Return the slots in the file of the second cut, the panel's if they agree; and problems."""
-    try:
-        sound_digest(folder / PATH)
-        drawing = read_profile(folder / PATH)
-        check_sequence(drawing)
-        check_surroundings(drawing, marks(panel))
-    except (OutputError, ArithmeticError, ValueError, LookupError) as error:
-        reason = str(error).removeprefix(f"{Path(PATH).name}: ")
-        return panel.second, [Problem(INTEGRITY, f"{PATH}: {reason}")]
-    if not departure(drawing.region, second_path(panel, width)):
-        return panel.second, []
-    return _cut_slots(drawing.region, width), []
-
-
-def _cut_slots(path: Region, kerf: Kerf) -> Region:
-    """Return the region that a beam inside slots removes."""
-    x0, y0, x1, y1 = widened(path.bounds, ROOM)
-    inner = [contour.reversed() for contour in path.contours]
-    remaining = remove_kerf(Region((*rectangle((x0, y0), (x1, y1)).contours, *inner)), kerf).region
-    return Region(tuple(hole.reversed() for hole in remaining.holes))

@@ -18,7 +18,7 @@ from sbafab.cutting.calibration import Value
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.laminate.films import Film
 from sbafab.laminate.joints import FaceBond, Fold, Net, Port, PortKind, Seam
-from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, SheetPanel
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin
 from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
 from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
@@ -455,11 +455,9 @@ def _laminate() -> dict[str, Any]:
         "description": "start x, y, end x, y, centre x, y, radius; true: counter-clockwise",
     }
     contour = {**array({"oneOf": [line, arc]}), "description": "closed; holes run clockwise"}
-    regions = ("outline", "sheets", "second", "window")
-    panel = of(SheetPanel, *regions, **{**dict.fromkeys(regions, shape), "sheets": array(shape)})
     chains = {**array(array({"oneOf": [line, arc]})), "description": "chains, open or closed"}
     joints = ("seams", "folds", "ports", "nets", "bonds")
-    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", "panel", *joints)
+    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", *joints)
     return of(
         Laminate,
         *lists,
@@ -479,7 +477,6 @@ def _laminate() -> dict[str, Any]:
         nets=array(of(Net)),
         bonds=array(of(FaceBond)),
         outline=shape,
-        panel={**panel, "type": ["object", "null"]},
         shapes={**array(array(contour)), "description": "mm, the actuator's axis at 0, 0"},
     )
 
@@ -519,7 +516,7 @@ def _press() -> dict[str, Any]:
     for name in ("is_timed", "cautions", "remarks"):
         del body["properties"][name]
     given = [name for name in body["required"] if name != "cautions"]
-    body["required"] = ["schema", *given, "warnings"]
+    body["required"] = ["schema", *given, "hands_minutes", "warnings"]
     return body
 
 

@@ -148,31 +148,17 @@ Command = Callable[..., Any]
 
 _GIVEN = click.core.ParameterSource.COMMANDLINE
 
-EXPERIMENTAL = "registration.experimental=true"
-
 
 def set_option(command: Command) -> Command:
-    """Add ``--set`` and ``--experimental``, which sets a key."""
-
-    @functools.wraps(command)
-    def assigned(assignments: tuple[str, ...], experimental: bool, **parameters: Any) -> Any:
-        more = (EXPERIMENTAL,) if experimental else ()
-        return command(assignments=(*assignments, *more), **parameters)
-
-    keys = click.option(
+    """Add ``--set``."""
+    return click.option(
         "--set",
         "assignments",
         metavar="KEY=VALUE",
         multiple=True,
         shell_complete=assignments,
         help="Override a key of the design, e.g. --set chamber.diameter=6. Repeatable.",
-    )
-    proposals = click.option(
-        "--experimental",
-        is_flag=True,
-        help="Allow registered sheets, which are untested. Sets registration.experimental.",
-    )
-    return keys(proposals(assigned))
+    )(command)
 
 
 def calibration_options(command: Command) -> Command:

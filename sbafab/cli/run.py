@@ -187,15 +187,6 @@ def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
             "cut files",
             f"{len(cut)} in layers/{plate}, each read back and compared with the design",
         )
-    panel = index.get("panel")
-    if panel:
-        width, length = panel["size"]
-        batches = "1 batch" if panel["batches"] == 1 else f"{panel['batches']} batches"
-        yield (
-            "panel",
-            f"one sheet a layer, {width:.2f} x {length:.2f} mm; {batches} with places for "
-            f"{len(panel['places'])} each; freed by {panel['second_cut']}",
-        )
     if run.design.order.why:
         yield "order", run.design.order.why
     for film in index["films"]:

@@ -60,11 +60,8 @@ def drawn(cuts: Iterable[LaserRun], sheet: Surroundings) -> Iterator[LaserRun]:
     yield from cuts
     for run in sheet.parting:
         yield stroke_run(CUT_SHEET, run)
-    for run in sheet.marks:
+    for run in sheet.frames:
         yield stroke_run(REFERENCE, run)
-    if sheet.frame is not None:
-        x, y = sheet.frame
-        yield stroke_run(REFERENCE, ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)))
 
 
 def stroke_run(layer: str, run: Sequence[Point]) -> LaserRun:
@@ -188,7 +185,7 @@ class _Waste:
         pins: Sequence[KeepOff],
     ) -> None:
         self._region = Region(tuple(contours))
-        strokes = [*sheet.engraved, *sheet.parting, *sheet.marks]
+        strokes = *sheet.engraved, *sheet.parting
         others = [edge for run in strokes for edge in stroke_run(ENGRAVE, run).edges]
         self._others = EdgeIndex(others) if others else None
         self._clearance, self._frame, self._pins = clearance, sheet.frame, pins

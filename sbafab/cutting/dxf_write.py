@@ -38,7 +38,14 @@ class Surroundings(NamedTuple):
     engraved: Sequence[Sequence[Point]] = ()
     parting: Sequence[Sequence[Point]] = ()
     frame: Point | None = None
-    marks: Sequence[Sequence[Point]] = ()
+
+    @property
+    def frames(self) -> tuple[Sequence[Point], ...]:
+        """The frame as one closed run of points; none without a frame."""
+        if self.frame is None:
+            return ()
+        x, y = self.frame
+        return (((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)),)
 
 
 class _Entity(NamedTuple):
@@ -85,7 +92,7 @@ def dxf_text(
             *(_stroke(ENGRAVE, run) for run in sheet.engraved),
             *cuts,
             *(_stroke(CUT_SHEET, run) for run in sheet.parting),
-            *(_stroke(REFERENCE, run) for run in (*_frames(sheet), *sheet.marks)),
+            *(_stroke(REFERENCE, run) for run in sheet.frames),
         ]
         low, high = (0.0, 0.0), sheet.frame or (0.0, 0.0)
     return _document(
@@ -200,12 +207,6 @@ def _quarters(edge: Edge) -> Sequence[Edge]:
     if not isinstance(edge, Arc) or math.dist(edge.start, edge.end) <= QUARTER * edge.radius:
         return [edge]
     return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
-
-
-def _frames(sheet: Surroundings) -> Iterator[Sequence[Point]]:
-    if sheet.frame is not None:
-        x, y = sheet.frame
-        yield ((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0))
 
 
 def _stroke(layer: str, run: Sequence[Point]) -> _Entity:

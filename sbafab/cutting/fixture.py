@@ -78,8 +78,8 @@ def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]
 
 
 def _lying(laminate: Laminate, places: Sequence[Point] = ONE) -> Bounds:
-    """The box round what lies on the plate: the laminates, or their registered sheets."""
-    box = laminate.bounds if laminate.panel is None else laminate.panel.outline.bounds
+    """The box round the laminates on the plate."""
+    box = laminate.bounds
     xs, ys = [x for x, _ in places], [y for _, y in places]
     return min(xs) + box[0], min(ys) + box[1], max(xs) + box[2], max(ys) + box[3]
 

@@ -18,7 +18,7 @@ def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Re
     Raises DesignError where the kerf leaves none.
     """
     return {
-        pattern: _compensated(layers[0], laminate.first_cut(layers[0]), settings)
+        pattern: _compensated(layers[0], laminate.as_cut(layers[0]), settings)
         for pattern, layers in laminate.patterns.items()
     }
 

@@ -17,9 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
 from sbafab.cutting.beam_check import BeamRun
-from sbafab.cutting.beam_paths import LaserRun, contour_runs, drawn
-from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.order import cutting_order
+from sbafab.cutting.beam_paths import LaserRun
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
@@ -28,18 +26,14 @@ from sbafab.cutting.properties import (
     REFERENCE,
     CutSettings,
     Recipes,
-    file_properties,
-    kerf_suffix,
 )
-from sbafab.cutting.second_cut import PATH, laser_path, marks, properties_of
 from sbafab.cutting.verify import TOLERANCE
 from sbafab.design.recipes import Recipe
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, Copies
 from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
-from sbafab.geometry.region import Region, coord
+from sbafab.geometry.region import coord
 from sbafab.laminate.films import Material
-from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.markup import quoteattr
 
 if TYPE_CHECKING:
@@ -153,30 +147,16 @@ def parts_of(edge: Edge) -> Sequence[Edge]:
     return [edge.part(*stops[k : k + 2]) for k in range(count)]
 
 
-def project_text(
-    contours: Sequence[Contour],
-    sheet: Surroundings,
-    properties: Mapping[str, str],
-    advice: str = ADVICE,
-    recipes: Recipes = NO_RECIPES,
-) -> str:
-    """The project of a film sheet; ``properties`` are those of its cut file, for its notes.
-
-    Contours are cut in the order given, holes before outlines. Lower left corner at the origin,
-    y upwards, mm.
-    """
-    shapes = list(drawn(contour_runs(contours), sheet))
-    layers = sheet_layers({shape.layer for shape in shapes}, recipes)
-    return runs_text(layers, shapes, properties, advice)
-
-
 def runs_text(
     layers: Sequence[LaserLayer],
     shapes: Sequence[LaserRun],
     properties: Mapping[str, str],
     advice: str,
 ) -> str:
-    """The project of runs on layers, both in the order of cutting; ``advice`` heads its notes."""
+    """The project of runs on layers, both in the order of cutting; ``advice`` heads its notes.
+
+    Lower left corner at the origin, y upwards, mm.
+    """
     outlines = _Outlines()
     indices = {layer.layer: layer.cut_index for layer in layers}
     prefs = {**ORDER, **{f"Optimize_{name}": 0 for name in NOT_OPTIMIZED}}
@@ -469,24 +449,13 @@ SURE = 0.99
 """Share of the tolerance: what is found within it for all shapes at once needs no other look."""
 
 
-def verify_project(
-    path: Path,
-    contours: Sequence[Contour],
-    sheet: Surroundings,
-    recipes: Recipes = NO_RECIPES,
-) -> None:
-    """Reads the project at ``path`` and compares it with the sheet that was meant.
-
-    Every shape is on its layer, in its order, and within TOLERANCE of its contour; layers are in
-    order, the frame is not cut and no power is set but that of a recipe. Raises OutputError with
-    what is not, and where.
-    """
-    expected = list(drawn(contour_runs(contours), sheet))
-    verify_runs(path, sheet_layers({run.layer for run in expected}, recipes), expected)
-
-
 def verify_runs(path: Path, layers: Sequence[LaserLayer], expected: Sequence[LaserRun]) -> None:
-    """Reads the project at ``path`` and compares it with layers and runs, likewise."""
+    """Reads the project at ``path`` and compares it with layers and runs.
+
+    Every shape is on its layer, in its order, and within TOLERANCE of its run; layers are in order,
+    the frame is not cut and no power is set but that of a recipe. Raises OutputError with what is
+    not, and where.
+    """
     project = read_project(path)
     indices = {layer.layer: layer.cut_index for layer in layers}
     try:
@@ -669,75 +638,3 @@ def _offs(curve: Bezier, part: Edge) -> Iterator[tuple[float, Point]]:
             yield distance_to(part, p), p
         else:
             yield abs(math.dist(p, part.centre) - part.radius), p
-
-
-# The first and second cut of registered sheets as LightBurn projects.
-#
-# One project a pattern, for layers that share it have equal files. Each sheet's lower left corner
-# lies at (0, 0), in the first cut as in the second, so that both stand alike on the laser's bed.
-
-
-FOLDER = "sheets"
-PANEL_POWERS = "Powers are 0: set power and speed of each layer for this film"
-PANEL_ADVICE = (
-    "Leave kerf offset 0 and "
-    "REFERENCE without output. The sheet's cut corner must be at the upper {side}"
-)
-
-
-def projects(laminate: Laminate, settings: CutSettings) -> Iterator[str]:
-    """Paths of all projects; none where films are not cut as registered sheets."""
-    if laminate.panel is not None:
-        for layers in laminate.patterns.values():
-            yield _file_path(layers[0], settings)
-        yield Path(PATH).with_suffix(ENDING).as_posix()
-
-
-def write_projects(
-    laminate: Laminate, paths: Mapping[str, Region], folder: Path, settings: CutSettings
-) -> None:
-    """Writes and reads back ``sheets/<pattern>_<material>.lbrn2`` and ``second_cut.lbrn2``.
-
-    ``paths`` holds the beam's path of every pattern's sheet. Raises OutputError, OSError.
-    """
-    panel = laminate.panel
-    if panel is None:
-        return
-    x0, y0, x1, _ = panel.outline.bounds
-    for pattern, layers in laminate.patterns.items():
-        first = layers[0]
-        # Mask sheets are drawn turned over.
-        left_edge, side = (-x1, "left") if first.is_mask else (x0, "right")
-        properties = file_properties(settings, first.film.material, pattern)
-        target = folder / _file_path(first, settings)
-        recipes = settings.recipes.get(first.film.material, NO_RECIPES)
-        advice = advice_of(settings, first.film.material) if recipes else PANEL_POWERS
-        advice = f"{advice}. {PANEL_ADVICE.format(side=side)}"
-        path = paths[pattern].moved(-left_edge, -y0)
-        _write(target, path, Surroundings(), properties, advice, recipes)
-    drawn = marks(panel)
-    moved = tuple(tuple((x - x0, y - y0) for x, y in run) for run in drawn.marks)
-    path = laser_path(laminate, settings).moved(-x0, -y0)
-    target = (folder / PATH).with_suffix(ENDING)
-    advice = f"{PANEL_POWERS}. {PANEL_ADVICE.format(side='right')}"
-    _write(target, path, Surroundings(marks=moved), properties_of(laminate, settings), advice)
-
-
-def _file_path(layer: Layer, settings: CutSettings) -> str:
-    suffix = kerf_suffix(settings.kerf_width(layer.film.material))
-    return f"{FOLDER}/{layer.pattern}_{layer.film.material}{suffix}{ENDING}"
-
-
-def _write(
-    target: Path,
-    path: Region,
-    around: Surroundings,
-    properties: Mapping[str, str],
-    advice: str,
-    recipes: Recipes = NO_RECIPES,
-) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    contours = cutting_order(path)
-    text = project_text(contours, around, properties, advice, recipes)
-    target.write_bytes(text.encode())
-    verify_project(target, contours, around, recipes)

@@ -92,18 +92,6 @@ def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict
     return {**properties, "HOLES": " / ".join(notes)} if notes else properties
 
 
-def second_cut_properties(
-    settings: CutSettings,
-    films: Sequence[Material],
-    masks: Sequence[Material],
-    kerf: Kerf | None,
-) -> dict[str, str]:
-    """Custom properties of the second cut of registered sheets, through ``films`` and ``masks``."""
-    properties = _properties(settings, ", ".join(films), "second cut", kerf)
-    warnings = dict.fromkeys(settings.warnings.get(material) for material in (*films, *masks))
-    return {**properties, **warning_property(" ".join(words for words in warnings if words))}
-
-
 def coupon_properties(generator: str) -> dict[str, str]:
     """Custom properties of the calibration piece: never compensated, for it measures the kerf."""
     return {

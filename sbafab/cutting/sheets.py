@@ -416,13 +416,12 @@ def sheet_svg(
 
     The page's lower left corner is the origin; true arcs, coordinates without transforms.
     """
-    frame = [] if sheet.frame is None else _rectangle(*sheet.frame)
     drawn = {
         ENGRAVE: [_run(run, height) for run in sheet.engraved],
         CUT_INNER: [_closed(c, height) for c in contours if c.is_hole],
         CUT_OUTER: [_closed(c, height) for c in contours if not c.is_hole],
         CUT_SHEET: [_run(run, height) for run in sheet.parting],
-        REFERENCE: [_run(frame, height)] if frame else [],
+        REFERENCE: [_run(run, height) for run in sheet.frames],
     }
     return "\n".join(
         (
@@ -444,10 +443,6 @@ def _groups(drawn: dict[str, list[str]]) -> Iterator[str]:
             )
             yield from shapes
             yield "</g>"
-
-
-def _rectangle(x: float, y: float) -> list[Point]:
-    return [(0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)]
 
 
 def _closed(contour: Contour, height: float) -> str:

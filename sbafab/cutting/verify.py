@@ -51,17 +51,10 @@ def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
 
     Raises OutputError with the layer and place of what differs, or of engraving inside a part.
     """
-    frame = [expected.frame] if expected.frame is not None else []
     for layer, runs in (
         (ENGRAVE, expected.engraved),
         (CUT_SHEET, expected.parting),
-        (
-            REFERENCE,
-            [
-                *(((0.0, 0.0), (x, 0.0), (x, y), (0.0, y), (0.0, 0.0)) for x, y in frame),
-                *expected.marks,
-            ],
-        ),
+        (REFERENCE, expected.frames),
     ):
         drawn = [edges for name, edges in read.strokes if name == layer]
         if len(drawn) != len(runs):

@@ -29,6 +29,16 @@ PATTERNS = {
     DATE_PATTERN: "must be a date such as 2026-03-31",
 }
 """What texts may be that must match a pattern."""
+_SHEETS = (
+    "belongs to registered sheets, which were removed; delete it, and register the films by "
+    'registration.method = "ears" or "channel-pin"'
+)
+REMOVED: Mapping[str, str] = {
+    "panel": _SHEETS,
+    "registration.experimental": _SHEETS,
+    'registration.method = "sheet"': _SHEETS,
+}
+"""Tables, keys and values of earlier design files, each with what was removed and what to do."""
 
 
 def listed(values: Iterable[object]) -> str:
@@ -63,6 +73,9 @@ def sentence(
     # Alternatives of a union put their own name in the location; a key is what the file holds.
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = (prefix + ".".join(where)).rstrip(".")
+    for name in (field, where[0] if where else "", f'{field} = "{first["input"]}"'):
+        if name in REMOVED:
+            return f"{name} {REMOVED[name]}"
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
     if first["type"] == "extra_forbidden":

@@ -28,7 +28,6 @@ from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE, Film
 LATER: Mapping[str, Sequence[str]] = {
     "order": ("success_rate", "certainty", "shift_hours"),
     "laser": ("hold_tpe", "hold_ptfe"),
-    "panel": ("carrier_adhesive", "carrier_limit_c"),
     "acceptance": ("safety_factor",),
 }
 """Keys that came after the first hashes, which have none of them."""
@@ -71,8 +70,7 @@ def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
 
 
 def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
-    """Remove later keys that have their defaults, and keys that only permit a method."""
-    table["registration"].pop("experimental")
+    """Remove later keys that have their defaults."""
     has_usual_spares = all(
         getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
     )
@@ -110,7 +108,6 @@ def actuator_sha256(design: Design) -> str:
         *(getattr(design.registration, key) for key in PINNED if method != "channel-pin"),
         *(("middle-first",) if design.registration.is_middle_first else ()),
     ]
-    table["panel"] = [getattr(design.panel, key) for key in BRIDGED if method == "sheet"]
     table["press"] = [getattr(design.press, key) for key in BONDED]
     return _sha256(table)
 
@@ -124,9 +121,6 @@ NO_ACTUATOR = (
 
 
 PINNED = ("pin_diameter", "pin_clearance", "full_bond_pins")
-
-
-BRIDGED = ("bridge_width", "stub", "tack_minutes")
 
 
 BONDED = (

@@ -68,7 +68,6 @@ SECTIONS = (
 """Sections of a design that a kit fills in."""
 OF_A_DESIGN = (
     "registration.method",
-    "registration.experimental",
     "acceptance.working_pressure_kpa",
     "rules.waive",
     "rules.target_yield",

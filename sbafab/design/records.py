@@ -54,7 +54,6 @@ from sbafab.design.sections import (
     Mask,
     Models,
     Order,
-    PanelSection,
     Press,
     Registration,
     Rules,
@@ -86,7 +85,7 @@ REGISTRATIONS = {
     "method": ("channel-pin", "ears"),
     "sequence": ("bottom-first", "middle-first"),
 }
-"""Ways of registration that a search may choose between, by key; sheets are experimental."""
+"""Ways of registration that a search may choose between, by key."""
 
 
 class Design(Section):
@@ -116,7 +115,6 @@ class Design(Section):
     registration: Registration = Registration.model_construct()
     seam_tools: SeamTools | None = None
     """Tools that make seams beside their machine's head; by default each is in its place."""
-    panel: PanelSection = PanelSection.model_construct()
     press: Press = Press.model_construct()
     acceptance: Acceptance = Acceptance.model_construct()
     laser: Laser = Laser.model_construct()
@@ -279,7 +277,6 @@ class Design(Section):
             *(
                 Free.of_words(f"registration.{key}", words, asked="yield")
                 for key, words in REGISTRATIONS.items()
-                if self.registration.method in REGISTRATIONS["method"]
             ),
         )
 

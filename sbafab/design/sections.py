@@ -182,8 +182,6 @@ RuleName = Literal[
     "piece-count",
     "pin-holes",
     "pin-fit",
-    "bridges",
-    "scrap",
     "film-limits",
     "press-fit",
     "pressure-rating",
@@ -279,15 +277,11 @@ class Inlet(Section):
 class Registration(Section):
     """What keeps the layers in register, and how far off they may lie."""
 
-    method: Literal["channel-pin", "ears", "sheet"] = "channel-pin"
+    method: Literal["channel-pin", "ears"] = "channel-pin"
     """"channel-pin": dowel pins in the channel bores, and in the lumen if there is one (the
-    paper's). "ears": tooling holes outside the outline, pinned in every press step. "sheet": films
-    stay whole sheets on corner pins, hold all copies of a batch and are cut free last; a proposal,
-    which registration.experimental allows."""
-    experimental: bool = Field(default=False, validate_default=True)
-    """Whether a proposal that no bench has tried may be made, as --experimental says."""
+    paper's). "ears": tooling holes outside the outline, pinned in every press step."""
     pin_diameter: Length = 1.5
-    """Dowel pins of the ears, and of the corners of registered sheets."""
+    """Dowel pins of the ears."""
     full_bond_pins: Literal["out", "in"] = "out"
     """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
     bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
@@ -325,16 +319,6 @@ class Registration(Section):
     seam_error: Annotated[float, Millimetres(0, 5)] | None = None
     """The most by which a seam lies off its path, whatever its tool; by default cutting_error for a
     laser, which the same machine moves, and 0.3 for other tools: ours, nobody measured it."""
-
-    @field_validator("experimental")
-    @classmethod
-    def _allows_the_method(cls, experimental: bool, info: ValidationInfo) -> bool:
-        if info.data.get("method") == "sheet" and not experimental:
-            raise ValueError(
-                'does not allow registration.method = "sheet", a proposal that no bench has tried; '
-                'add --experimental, or set it to true, to have it all the same, or use "ears"'
-            )
-        return experimental
 
     @property
     def is_middle_first(self) -> bool:
@@ -375,33 +359,6 @@ class SeamTools(Section):
         """The offsets other than none, by the tools' names in seams."""
         rows = {name.replace("_", "-"): getattr(self, name) for name in SeamTools.model_fields}
         return {tool: row.offset for tool, row in rows.items() if row and any(row.offset)}
-
-
-class PanelSection(Section):
-    """Registered sheets (``registration.method = "sheet"``); all ours, no bench has tried any."""
-
-    bridge_width: Length = 1.0
-    """Width of the bridges that hold a film's part in its sheet until the second cut."""
-    stub: LengthOrZero = 0.25
-    """How far past the outline the second cut goes through a bridge."""
-    margin: Annotated[float, Millimetres(10, 100)] = 12.0
-    """Sheet round all copies, for pins and fiducials."""
-    web: Annotated[float, Millimetres(1, 100)] = 4.0
-    """Sheet between two copies."""
-    carrier: str = Field(default="transfer film of low tack", max_length=80)
-    """What holds the masks in register until they are tacked to their film."""
-    carrier_adhesive: str = Field(default="", max_length=80)
-    """Its adhesive; none is known that was tried with PTFE in a press, so the traveller leaves a
-    blank."""
-    carrier_limit_c: float | None = Field(default=None, gt=0, le=500)
-    """C, what carrier and adhesive stand by their maker. The press must stay below; not known by
-    default, and the traveller leaves a blank."""
-    tack_minutes: float = Field(default=1.0, gt=0, le=60)
-    """How long the press tacks the masks of one sheet to their film, once the plate is hot."""
-    sheet_error: LengthOrZero = 0.05
-    """The most by which film or mask lies off its place in its sheet: stretch, sag, transfer."""
-    second_cut_error: LengthOrZero = 0.2
-    """The most by which the second cut lies off the first."""
 
 
 NOT_MEASURED: Literal["not measured"] = "not measured"

@@ -30,7 +30,7 @@ DESIGN = "design.toml"
 OF_A_RUN = ("must not be built; failed:", "waived:", "limits lowered:")
 """Notes that a run adds by its findings, and adds again."""
 NO_GLUE = "not stated"
-OF_FAMILIES = frozenset({"chamber", "stack", "panel"})
+OF_FAMILIES = frozenset({"chamber", "stack"})
 """Sections that families extend, or that drawn layers do not have."""
 
 
@@ -149,11 +149,6 @@ def _drawn(
     shapes = {pattern.lower(): {"file": FILE, "layer": pattern} for pattern in laminate.patterns}
     design = dict(tables)
     registration = dict(design.pop("registration", {}))
-    if laminate.panel is not None:
-        remarks.append(
-            "panel: registered sheets are not carried over, the parts are, without their sheets"
-        )
-        registration["method"] = "channel-pin"
     design["layers"] = list(_layer_rows(laminate, stock, design.get("layup", {})))
     design["chambers"] = list(_chamber_rows(laminate, remarks))
     if not laminate.outline.is_empty:

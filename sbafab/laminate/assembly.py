@@ -54,8 +54,7 @@ def assembly(laminate: Laminate) -> tuple[AssemblyStep, ...]:
     without any: base and cap have no bore for one, and a lumen pin, though it would pass, stays
     out as in the paper. ``laminate.middle_first`` tacks all layers between base and cap in one
     step, and presses no balloon by itself. With ears base and cap are tacked on the pins by a flash
-    bond, and the full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``. In
-    registered sheets the pins, which stand in the frame, are in every time.
+    bond, and the full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``.
     """
     return stored(laminate, "_steps", _steps)
 
@@ -116,13 +115,6 @@ def _plans(laminate: Laminate, indices: Sequence[int]) -> Iterator[_Plan]:
 
 
 def _all_plans(laminate: Laminate, indices: tuple[int, ...]) -> tuple[_Plan, ...]:
-    if laminate.panel is not None:
-        # Corner pins hold the base as well: nothing has to be pressed by itself first.
-        below, cap = indices[:-1], indices[-1:]
-        return (
-            _Plan("flash_middle", "flash", (below,), below),
-            _Plan("bond_all", "full", (below, cap), cap),
-        )
     films = [layer for layer in map(laminate.layer, indices) if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     wall = next((layer.index for layer in films if layer.index > base), base)
@@ -168,10 +160,8 @@ def _tacked(plan: _Plan) -> tuple[_Plan, ...]:
 
 def _step(number: int, plan: _Plan, laminate: Laminate) -> AssemblyStep:
     layers = [index for stack in plan.stacks for index in stack]
-    pinned = (
-        plan.bond == "flash"
-        or laminate.registration == "sheet"
-        or (laminate.registration == "ears" and laminate.pins_in_full_bonds)
+    pinned = plan.bond == "flash" or (
+        laminate.registration == "ears" and laminate.pins_in_full_bonds
     )
     pins = _pins_in(laminate, layers) if pinned else ()
     stacks = tuple(stack for stack in plan.stacks if stack)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 from sbafab.errors import DesignError
@@ -21,89 +20,6 @@ from sbafab.laminate.folding import flat_part, fold_roots, unfolded
 from sbafab.laminate.joints import PRESS, FaceBond, Fold, GapJoints, Net, Port, Seam, chamber_gaps
 from sbafab.markup import escape
 from sbafab.notebook import table_html
-
-# Registered sheets: whole films on corner pins that hold several copies until a second cut.
-#
-# Of every layer the first cut leaves one sheet. Films hold their parts by bridges, mask sheets
-# hold theirs by the transfer film they lie on. All stacked and pressed, the second cut takes a
-# slot out of every bridge and so frees the actuators. Lengths mm, in the frame of the first copy.
-
-
-@dataclass(frozen=True)
-class SheetPanel:
-    """The registered sheets of a laminate, pressed together as a batch.
-
-    ``places`` are the axes of the copies, the first at the origin; ``sheets`` each layer after the
-    first cut, bottom to top and seen from above; ``second`` all slots of the second cut; ``window``
-    the room that every film sheet leaves round one copy; ``batches`` the number of such panels that
-    make all copies.
-    """
-
-    outline: Region
-    places: tuple[Point, ...]
-    sheets: tuple[Region, ...]
-    second: Region
-    fiducials: tuple[Point, ...]
-    fiducial_diameter: float
-    window: Region
-    batches: int
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Width and length of a sheet."""
-        low_x, low_y, high_x, high_y = self.outline.bounds
-        return high_x - low_x, high_y - low_y
-
-    def holds(self, p: Point, place: Point) -> bool:
-        """Return True if a point of a sheet lies in the window of the copy at ``place``."""
-        return self.window.contains((p[0] - place[0], p[1] - place[1]))
-
-
-@dataclass(frozen=True)
-class Freed:
-    """A sheet after the second cut: ``parts`` of each copy in its own frame, frame and crumbs.
-
-    A part that is not cut free is part of the ``frame``, and missing.
-    """
-
-    frame: Region
-    parts: tuple[Region, ...]
-    crumbs: tuple[Region, ...] = field(default=())
-
-
-def freed(panel: SheetPanel, layer: Layer) -> Freed:
-    """Return the pieces into which the sheet of a layer falls.
-
-    Mask sheets fall apart in the first cut; the second cut takes nothing of a mask's parts.
-    """
-    cut = Region() if layer.is_mask else panel.second
-    return _freed(panel.sheets[layer.index - 1], cut, panel)
-
-
-@lru_cache(maxsize=64)
-def _freed(sheet: Region, cut: Region, panel: SheetPanel) -> Freed:
-    places = panel.places
-    pieces = (sheet - cut).pieces if not cut.is_empty else sheet.pieces
-    if not pieces:
-        return Freed(Region(), tuple(Region() for _ in places))
-    frame = max(pieces, key=lambda piece: Region(piece.outers).area)
-    pieces_of_copies: list[list[Region]] = [[] for _ in places]
-    crumbs = []
-    for piece in pieces:
-        if piece is frame:
-            continue
-        p = piece.outers[0].edges[0].at(0.5)
-        home = next((i for i, place in enumerate(places) if panel.holds(p, place)), None)
-        if home is None:
-            crumbs.append(piece)
-        else:
-            x, y = places[home]
-            pieces_of_copies[home].append(piece.moved(-x, -y))
-    parts = tuple(
-        Region(tuple(c for piece in copy for c in piece.contours)) for copy in pieces_of_copies
-    )
-    return Freed(frame, parts, tuple(crumbs))
-
 
 Role = Literal["base", "wall", "cap", "sheet", "chamber-mask", "separator-mask"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -243,11 +159,11 @@ class Laminate:
     ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty where
     only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
     ``middle_first``: all layers between base and cap are tacked on the pins before any other bond.
-    ``panel``: the registered sheets that it is made in, if any. ``tube``: outer diameter in mm of
-    the tube that its sheet is wrapped round, if any; ``lumen`` that of the channel through all
-    layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join halves of one film, and
-    ``nets`` say which ``ports`` are meant to be joined. ``bonds`` say which faces bond, and by
-    what; without any all structural faces bond in the press, but where seams bond them.
+    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if any; ``lumen``
+    that of the channel through all layers, mm. ``seams`` are bonds of a moving tool, ``folds`` join
+    halves of one film, and ``nets`` say which ``ports`` are meant to be joined. ``bonds`` say which
+    faces bond, and by what; without any all structural faces bond in the press, but where seams
+    bond them.
     """
 
     name: str
@@ -264,7 +180,6 @@ class Laminate:
     outline: Region = NOTHING
     pins_in_full_bonds: bool = False
     middle_first: bool = False
-    panel: SheetPanel | None = None
     tube: float | None = None
     seams: tuple[Seam, ...] = ()
     folds: tuple[Fold, ...] = ()
@@ -392,23 +307,19 @@ class Laminate:
             raise DesignError(f"there is no layer {index}; give 1 to {len(self.layers)}")
         return self.layers[index - 1]
 
-    def first_cut(self, layer: Layer) -> Region:
-        """Return the region in a layer's cut file: its profile, or its registered sheet.
+    def as_cut(self, layer: Layer) -> Region:
+        """Return the region in a layer's cut file.
 
-        A mask sheet is laid face down, so it is cut turned over. Layers of a folded film are cut
-        as one flat part, that of the lowest of them. All films are cut upper face up, so that what
-        is turned as it is laid is drawn turned over, too.
+        Layers of a folded film are cut as one flat part, that of the lowest of them. All films are
+        cut upper face up, so that what is turned as it is laid is drawn turned over.
         """
-        if self.panel is None:
-            flat, lowest = layer.profile, layer
-            if self.folds:
-                root = self.cut_with(layer)
-                lowest = self.layer(root)
-                if any(fold.lower == root for fold in self.folds):
-                    flat = flat_part(root, self.folds, [layer.profile for layer in self.layers])
-            return flat.mirrored() if lowest.turned else flat
-        sheet = self.panel.sheets[layer.index - 1]
-        return sheet.mirrored() if layer.is_mask else sheet
+        flat, lowest = layer.profile, layer
+        if self.folds:
+            root = self.cut_with(layer)
+            lowest = self.layer(root)
+            if any(fold.lower == root for fold in self.folds):
+                flat = flat_part(root, self.folds, [layer.profile for layer in self.layers])
+        return flat.mirrored() if lowest.turned else flat
 
     def cut_with(self, layer: Layer) -> int:
         """Return the index of the layer whose cut file holds this one: its own, unless folded."""
@@ -423,9 +334,7 @@ class Laminate:
         return self.pins_in(layer.profile)
 
     def pins_in(self, part: Region) -> tuple[Pin, ...]:
-        """The pins on which this part of a layer, or its registered sheet, has a hole that fits."""
-        if self.panel is not None:
-            return self.pins
+        """The pins on which this part of a layer has a hole that fits."""
         circles = [hole.circle for hole in part.holes if hole.circle is not None]
         return tuple(
             pin

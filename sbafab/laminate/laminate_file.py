@@ -24,7 +24,6 @@ from sbafab.laminate.laminate import (
     Laminate,
     Layer,
     Pin,
-    SheetPanel,
 )
 from sbafab.laminate.laminate_validator import FIELDS, SCHEMA, completed, faults
 
@@ -96,18 +95,7 @@ def _document(laminate: Laminate) -> dict[str, Any]:
         }
         for layer in laminate.layers
     ]
-    panel = laminate.panel
     outline = shape(laminate.outline)
-    sheets = panel and {
-        "outline": shape(panel.outline),
-        "places": panel.places,
-        "sheets": [shape(sheet) for sheet in panel.sheets],
-        "second": shape(panel.second),
-        "fiducials": panel.fiducials,
-        "fiducial_diameter": panel.fiducial_diameter,
-        "window": shape(panel.window),
-        "batches": panel.batches,
-    }
     return {
         "schema": SCHEMA,
         "name": laminate.name,
@@ -134,7 +122,6 @@ def _document(laminate: Laminate) -> dict[str, Any]:
         "nets": [asdict(net) for net in laminate.nets],
         "bonds": [asdict(bond) for bond in laminate.bonds],
         "outline": outline,
-        "panel": sheets,
         "shapes": shapes.values,
     }
 
@@ -174,7 +161,6 @@ def _laminate(document: dict[str, Any]) -> Laminate:
     for row in rows["layers"]:
         film, profile = films[row.pop("film")], shapes[row.pop("shape")]
         layers.append(Layer(film=film, profile=profile, **row))
-    panel = document["panel"]
     return Laminate(
         name=document["name"],
         family=document["family"],
@@ -193,7 +179,6 @@ def _laminate(document: dict[str, Any]) -> Laminate:
         outline=shapes[document["outline"]],
         pins_in_full_bonds=document["pins_in_full_bonds"],
         middle_first=document["middle_first"],
-        panel=None if panel is None else _panel(panel, shapes),
         tube=document["tube"],
         seams=tuple(
             Seam(**{**row, "path": tuple(tuple(map(_edge, chain)) for chain in row["path"])})
@@ -209,19 +194,6 @@ def _laminate(document: dict[str, Any]) -> Laminate:
             FaceBond(**{**row, "faces": (row["faces"][0], row["faces"][1])})
             for row in rows["bonds"]
         ),
-    )
-
-
-def _panel(row: dict[str, Any], shapes: list[Region]) -> SheetPanel:
-    return SheetPanel(
-        outline=shapes[row["outline"]],
-        places=tuple(map(_point, row["places"])),
-        sheets=tuple(shapes[place] for place in row["sheets"]),
-        second=shapes[row["second"]],
-        fiducials=tuple(map(_point, row["fiducials"])),
-        fiducial_diameter=row["fiducial_diameter"],
-        window=shapes[row["window"]],
-        batches=row["batches"],
     )
 
 

@@ -117,16 +117,6 @@ HEAD: Mapping[str, str] = {
     "notes": _TEXTS,
     "outline": _INDEX,
 }
-PANEL: Mapping[str, str] = {
-    "outline": _INDEX,
-    "places": _POINTS,
-    "sheets": "indices",
-    "second": _INDEX,
-    "fiducials": _POINTS,
-    "fiducial_diameter": _NUMBER,
-    "window": _INDEX,
-    "batches": _COUNT,
-}
 
 
 def completed(document: dict[str, Any]) -> dict[str, Any]:
@@ -167,10 +157,6 @@ def _forms(document: dict[str, Any]) -> Iterator[str]:
             continue
         for place, row in enumerate(rows):
             yield from _record(f"{key}[{place}]", row, fields)
-    if "panel" not in document:
-        yield "panel: is missing"
-    elif document["panel"] is not None:
-        yield from _record("panel", document["panel"], PANEL)
     yield from _edges(document.get("shapes"))
 
 
@@ -232,7 +218,6 @@ _KINDS: Mapping[str, Callable[[Any], bool]] = {
     _POINT: lambda value: _is_list_of(value, _NUMBER) and len(value) == 2,
     _POINTS: lambda value: _is_list_of(value, _POINT),
     _TEXTS: lambda value: _is_list_of(value, _TEXT),
-    "indices": lambda value: _is_list_of(value, _INDEX),
     _COUNTS: lambda value: _is_list_of(value, _COUNT),
     _PAIR: lambda value: _is_list_of(value, _TEXT) and len(value) == 2,
     _PATH: lambda value: (
@@ -378,14 +363,8 @@ def _references(document: dict[str, Any]) -> Iterator[str]:
         for i, row in enumerate(document[key]):
             if row["chamber"] not in names:
                 yield f"{key}[{i}].chamber: there is no chamber {json.dumps(row['chamber'])}"
-    panel, layers = document["panel"], document["layers"]
     used = {"outline": document["outline"]}
-    used |= {f"layers[{i}].shape": layer["shape"] for i, layer in enumerate(layers)}
-    if panel is not None:
-        used |= {f"panel.{key}": panel[key] for key in ("outline", "second", "window")}
-        used |= {f"panel.sheets[{i}]": shape for i, shape in enumerate(panel["sheets"])}
-        if len(panel["sheets"]) != len(layers):
-            yield f"panel.sheets: {len(panel['sheets'])} sheets of {len(layers)} layers"
+    used |= {f"layers[{i}].shape": row["shape"] for i, row in enumerate(document["layers"])}
     for where, shape in used.items():
         if shape >= len(document["shapes"]):
             yield f"{where}: there is no shape {shape}"

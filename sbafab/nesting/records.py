@@ -143,11 +143,8 @@ def parts_of(
 
     ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` returns
     how many more of a pattern are cut than the ``copies`` need. Pieces of one pattern that differ
-    only in their place are one part, named after the first of them. None where the layers are
-    registered sheets: these are not nested.
+    only in their place are one part, named after the first of them.
     """
-    if laminate.panel is not None:
-        return ()
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
         if laminate.cut_with(layers[0]) != layers[0].index:

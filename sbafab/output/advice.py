@@ -36,7 +36,6 @@ TARGET = "rules.target_yield"
 OTHERWISE = {
     "channel-pin": 'registration.method = "ears" pins every film',
     "ears": "smaller registration.hand_turn and registration.hand_placement do",
-    "sheet": "a smaller panel.sheet_error does",
 }
 """What reaches a yield that bond and overhang do not, by registration method."""
 
@@ -246,7 +245,7 @@ def _ways(design: Design, fixed: Collection[str]) -> Iterator[tuple[dict[str, st
     """Yield words for keys, and by how many steps bond and overhang may grow with them."""
     registration = design.registration
     orders: list[dict[str, str]] = [{}]
-    if registration.method != "sheet" and not {SEQUENCE} & set(fixed):
+    if SEQUENCE not in fixed:
         orders += [{SEQUENCE: word} for word in REGISTRATIONS["sequence"][1:]]
     plates: list[dict[str, str]] = [{}]
     if registration.pin_error is None and not {PLATE, PIN_ERROR} & set(fixed):

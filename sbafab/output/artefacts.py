@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,17 +17,14 @@ from typing import TYPE_CHECKING, Any, Literal
 from sbafab.cutting.fixture import PATH as FIXTURE
 from sbafab.cutting.fixture import write_fixture
 from sbafab.cutting.layer_files import write_layer_files
-from sbafab.cutting.lightburn import write_projects
 from sbafab.cutting.properties import CutSettings
 from sbafab.cutting.seam_files import write_seam_files
-from sbafab.cutting.second_cut import write_second_cut
 from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
 from sbafab.design.identity import design_sha256, kit_of
 from sbafab.design.kits import FILE as KIT_FILE
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
 from sbafab.laminate.laminate_file import FILE as LAMINATE_FILE
 from sbafab.laminate.laminate_file import laminate_json
@@ -172,7 +169,7 @@ def write_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-# Cutting: layer files, base plate, panel, film sheets.
+# Cutting: layer files, base plate, film sheets.
 
 
 def _write_layers(folder: DesignFolder) -> None:
@@ -185,22 +182,15 @@ def write_cut_files(plan: DesignPlan, folder: Path, progress: Progress) -> None:
     """Write the layer files, the paths of seams and the base plate of a design."""
     laminate = plan.checked.laminate
     write_layer_files(laminate, plan.paths, folder, plan.settings, partial(progress, "cut files"))
-    write_plates(plan.checked, plan.paths, folder, plan.settings)
+    write_plates(plan.checked, folder, plan.settings)
 
 
-def write_plates(
-    checked: Checked, paths: Mapping[str, Region], folder: Path, settings: CutSettings
-) -> None:
-    """Write the base plate and the paths of seams; of registered sheets the second cut and
-    LightBurn's projects.
-    """
+def write_plates(checked: Checked, folder: Path, settings: CutSettings) -> None:
+    """Write the base plate and the paths of seams."""
     design, laminate = checked.design, checked.laminate
     write_seam_files(laminate, folder, settings)
     places = design_runs(design, laminate).places
     write_fixture(laminate, folder, settings, places, hole_notes(design, laminate))
-    if laminate.panel is not None:
-        write_second_cut(laminate, folder, settings)
-        write_projects(laminate, paths, folder, settings)
 
 
 def write_nested_sheets(

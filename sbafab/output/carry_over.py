@@ -138,7 +138,7 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
         index["layers"] = layers
         index["fixture"] = plate if plate in carried else None
         # How the layers that stay were cut stays with them.
-        index.update({name: old[name] for name in ("panel", "curves", "seams") if name in old})
+        index.update({name: old[name] for name in ("curves", "seams") if name in old})
         if _are_files(old.get("sheets"), carried):
             index["sheets"], index["films"] = old["sheets"], old.get("films")
     if isinstance(meshes, list):

@@ -132,8 +132,6 @@ def limits(design: Design) -> Limits:
             lone_pin=on_one if on_one < on_pins else None,
             placement=design.registration.hand_placement,
             turn=design.registration.hand_turn,
-            sheet=design.panel.sheet_error,
-            second_cut=design.panel.second_cut_error,
             seam=design.registration.seam_error,
         ),
         unknown_kerf=design.laser.unknown_kerf,
@@ -203,10 +201,8 @@ def press_settings(design: Design) -> PressSettings:
         pin_standard=design.registration.pin_standard,
         pin_lengths=design.registration.pin_lengths,
         plate_made_by=design.registration.plate_made_by,
-        tack=design.panel.tack_minutes,
         minutes_for=tuple(map(named_film, press.minutes_for)),
         time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
-        carrier_limit=design.panel.carrier_limit_c,
         is_timed=not design.form.is_drawn,
     )
 
@@ -323,11 +319,6 @@ def plan_design(
     planned = DesignPlan(checked, frozenset(wanted), settings, pressing)
     if "cut" not in wanted:
         return planned
-    if laminate.panel is not None and curves.in_chords:
-        raise DesignError(
-            'registered sheets (registration.method = "sheet") are not drawn in chords; write '
-            "bulges or arcs"
-        )
     paths = compensated_paths(laminate, settings)
     parts = parts_of(laminate, paths, design.order.quantity, design.order.spare_parts)
     return replace(planned, paths=paths, parts=parts)

@@ -122,13 +122,6 @@ def of_assembly(assembled: Assembled, designs: Sequence[Checked]) -> CheckedJob:
 
 def refuse_other_film(designs: Sequence[Design]) -> None:
     """Raises DesignError where two designs are not cut from the same film by one machine."""
-    for design in designs:
-        if design.registration.method == "sheet":
-            raise DesignError(
-                f"{design.name} is made in registered sheets, which hold no parts of other "
-                "designs; make it by itself with sbafab generate, or use "
-                'registration.method = "ears"'
-            )
     first, *rest = designs
     for design in rest:
         for section in SHARED:

@@ -16,10 +16,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from sbafab.cutting.fixture import PATH as FIXTURE
-from sbafab.cutting.lightburn import projects
 from sbafab.cutting.properties import CutSettings, layer_path, said_of
 from sbafab.cutting.seam_files import seam_path
-from sbafab.cutting.second_cut import PATH as SECOND_CUT
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.records import Design
@@ -27,7 +25,7 @@ from sbafab.geometry.offset import Kerf
 from sbafab.laminate.assembly import laying
 from sbafab.laminate.films import Film, Material
 from sbafab.laminate.joints import SeamKind, SeamTool
-from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role, SheetPanel
+from sbafab.laminate.laminate import Interface, InterfaceKind, Laminate, Layer, Role
 from sbafab.meshing.mesh_files import MeshFile
 from sbafab.models.formulas import sizes
 from sbafab.output.checked import DesignPlan, kerf_widths, warnings
@@ -220,26 +218,6 @@ class KitClaim(_Claim):
     departures: tuple[str, ...]
 
 
-class FiducialClaim(PlaceClaim):
-    diameter: float
-
-
-class PanelClaim(_Claim):
-    """Registered sheets, in the frame of the first copy; lengths in mm.
-
-    ``turned_over`` are the materials whose sheets are drawn as seen from below; ``projects`` the
-    first and second cut for LightBurn.
-    """
-
-    size: tuple[float, float]
-    places: tuple[PlaceClaim, ...]
-    batches: int
-    second_cut: str
-    fiducials: tuple[FiducialClaim, ...]
-    turned_over: str
-    projects: tuple[str, ...] = ()
-
-
 class Manifest(_Claim):
     """``manifest.json`` of one design's folder."""
 
@@ -267,7 +245,6 @@ class Manifest(_Claim):
     inlets: tuple[InletClaim, ...]
     lumen: float | None
     fixture: str | None = None
-    panel: PanelClaim | None = None
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
     meshes: tuple[MeshClaim, ...] = ()
     mesh_statistics: dict[str, Any] = Field(default_factory=dict)
@@ -330,8 +307,6 @@ def manifest(
     runs = design_runs(design, laminate)
     if runs.copies > 1:
         optional["batch"] = _batch(runs)
-    if is_cut and laminate.panel is not None:
-        optional["panel"] = _panel(laminate, laminate.panel, plan.settings)
     if laminate.seams:
         optional["seams"] = _seams(laminate, is_cut)
     if plan.conforming is not None:
@@ -431,23 +406,6 @@ def _batch(runs: Runs) -> BatchClaim:
     """Return press cycles and places of several copies."""
     places = tuple(PlaceClaim(**_place(place)) for place in runs.places)
     return BatchClaim(at_once=runs.together, cycles=runs.cycles, places=places)
-
-
-def _panel(laminate: Laminate, panel: SheetPanel, settings: CutSettings) -> PanelClaim:
-    masks = dict.fromkeys(layer.film.material for layer in laminate.layers if layer.is_mask)
-    width, length = (round(side, 6) for side in panel.size)
-    return PanelClaim(
-        size=(width, length),
-        places=tuple(PlaceClaim(**_place(place)) for place in panel.places),
-        batches=panel.batches,
-        second_cut=SECOND_CUT,
-        fiducials=tuple(
-            FiducialClaim(**_place(place), diameter=panel.fiducial_diameter)
-            for place in panel.fiducials
-        ),
-        turned_over=", ".join(masks),
-        projects=tuple(projects(laminate, settings)),
-    )
 
 
 def _place(point: tuple[float, float]) -> dict[str, float]:

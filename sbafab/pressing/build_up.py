@@ -104,8 +104,7 @@ def gent_modulus(shore_a: float) -> float:
 
 
 def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> StackShape:
-    """Return the footprint of a stack of layers, given by index, or of the registered sheets that
-    they are part of.
+    """Return the footprint of a stack of layers, given by index.
 
     ``together`` such stacks lie below the pad side by side, far enough apart to be pressed equally.
     """
@@ -113,8 +112,6 @@ def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> S
     widest = max(
         (layer.profile for layer in distinct_layers(laminate, layers)), key=lambda part: part.area
     )
-    if laminate.panel is not None:
-        widest = laminate.panel.outline
     masks = {
         role: sum(layer.film.thickness for layer in films if layer.role == role)
         for role in ("chamber-mask", "separator-mask")

@@ -115,9 +115,7 @@ def press_runs(
 def runs_of(
     laminate: Laminate, copies: int, platen: tuple[float, float], most: int | None = None
 ) -> Runs:
-    """Return a laminate's press runs on one base plate; registered sheets are one piece."""
-    if laminate.panel is not None:
-        return Runs(1, ((0.0, 0.0),))
+    """Return a laminate's press runs on one base plate."""
     margin = PLATE_MARGIN if laminate.pins else 0.0
     return press_runs(copies, laminate.bounds, platen, margin, most)
 
@@ -197,7 +195,7 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
     pressed = plan.total_press_minutes
     return BatchTimes(
         None if pressed is None else runs.count * pressed,
-        runs.copies * plan.hands_minutes if plan.is_timed else None,
+        runs.copies * HANDLING_MINUTES if plan.is_timed else None,
     )
 
 
@@ -212,7 +210,7 @@ def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
     copies = 0
     while True:
         cycles = math.ceil((copies + 1) / together)
-        if (copies + 1) * plan.hands_minutes + cycles * plan.total_press_minutes > minutes:
+        if (copies + 1) * HANDLING_MINUTES + cycles * plan.total_press_minutes > minutes:
             return copies
         copies += 1
 

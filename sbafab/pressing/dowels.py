@@ -293,27 +293,6 @@ def _best(choices: Sequence[_Choice], plate: float) -> _Choice:
     return min(fitting, key=lambda choice: (choice.out, choice.depth))
 
 
-def shortest_in(
-    setting: PinSetting, top: float, standard: Standard, stock: Sequence[float] = ()
-) -> PinSetting:
-    """Return the shortest pin that stands over a lower stack in the hole of a setting.
-
-    ``top`` is the height of that stack over the plate, mm, no more than the setting's own stands.
-    """
-    depth, least = setting.seat_mm, top + chamfer(setting.diameter_mm)
-    length = next(
-        length
-        for length in (*lengths_sold(setting.diameter_mm, standard, stock), setting.length_mm)
-        if length - length_tolerance(length) - depth - depth_tolerance(depth) >= least - ROUNDING
-    )
-    return replace(
-        setting,
-        length_mm=length,
-        stands_mm=round(length - depth, 3),
-        tolerance_mm=round(length_tolerance(length) + depth_tolerance(depth), 3),
-    )
-
-
 def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
     """Return the plate's hole of every pin that some step uses, by the pin's name."""
     used: dict[str, list[PinSetting]] = {}

@@ -1,6 +1,4 @@
-"""How a base plate warms in the press and cools beside it: the time-temperature line of a step, and
-the tacking of registered sheets.
-"""
+"""How a base plate warms in the press and cools beside it: the time-temperature line of a step."""
 
 from __future__ import annotations
 
@@ -8,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.dowels import PinSetting
 
 # Warming of a cold plate between hot platens: a time-temperature line, first order.
 #
@@ -114,7 +111,7 @@ def heating(laminate: Laminate, platen_c: float, time_constant_minutes: float | 
     )
 
 
-# Tacking of masks to their films.
+# A steel plate between dry platens, and in still air: first order.
 
 
 TOUCH = 40.0
@@ -124,31 +121,6 @@ STEEL = 3.8e6
 CONTACT, AIR = 500.0, 10.0
 """W/(m2 K): from a platen into a plate that lies dry on it, and from each face of a plate into
 still air. Handbook orders, ours: neither was measured in a press."""
-
-
-@dataclass(frozen=True)
-class Tacking:
-    """Tacking of masks to their films: so many sheets, each by itself, on a plate that goes in
-    cold and is cooled again. Minutes are those of one sheet; ``pins`` are the corner pins' then.
-    """
-
-    sheets: int
-    warm_minutes: float
-    press_minutes: float
-    cool_minutes: float
-    stack_mm: float
-    pins: tuple[PinSetting, ...]
-    basis: str
-
-    @property
-    def each_minutes(self) -> float:
-        """Minutes of one sheet, from cold to cold."""
-        return self.warm_minutes + self.press_minutes + self.cool_minutes
-
-    @property
-    def total_minutes(self) -> float:
-        """Minutes of all sheets, one after the other on one plate."""
-        return self.sheets * self.each_minutes
 
 
 def warm_minutes(plate: float, platen_c: float) -> float:
@@ -163,32 +135,3 @@ def cool_minutes(plate: float, platen_c: float) -> float:
     """Return the estimated minutes in which a plate, hot as the platen, can be touched again."""
     heat = STEEL * plate / 1000
     return round(heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60, 1)
-
-
-def tack_stack(laminate: Laminate) -> float:
-    """Return the largest height in mm of a film with its mask, the transfer film left out."""
-    masks = [layer.film.thickness for layer in laminate.layers if layer.is_mask]
-    films = [layer.film.thickness for layer in laminate.layers if not layer.is_mask]
-    return round(max(films) + max(masks), 6)
-
-
-def tacking_of(
-    laminate: Laminate, minutes: float, platen_c: float, plate: float, pins: tuple[PinSetting, ...]
-) -> Tacking:
-    """Return the tacking of the masks of registered sheets, on a base plate ``plate`` mm thick.
-
-    First order: a plate that heat reaches through one face, and leaves through both.
-    """
-    return Tacking(
-        sheets=sum(layer.is_mask for layer in laminate.layers),
-        warm_minutes=warm_minutes(plate, platen_c),
-        press_minutes=minutes,
-        cool_minutes=cool_minutes(plate, platen_c),
-        stack_mm=tack_stack(laminate),
-        pins=pins,
-        basis=(
-            f"first-order estimate: a steel plate of {plate:g} mm from {ROOM:g} C to "
-            f"{CLOCK_SHORTFALL:g} C short of the platen with {CONTACT:g} W/(m2 K), and in still "
-            f"air down to {TOUCH:g} C with {AIR:g} W/(m2 K) from each face; not measured"
-        ),
-    )

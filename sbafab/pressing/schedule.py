@@ -46,16 +46,8 @@ from sbafab.pressing.dowels import (
     pin_holes,
     plate_thickness,
     settings_by_step,
-    shortest_in,
 )
-from sbafab.pressing.plate_heating import (
-    Heating,
-    HeatPoint,
-    Tacking,
-    heating,
-    tack_stack,
-    tacking_of,
-)
+from sbafab.pressing.plate_heating import Heating, HeatPoint, heating
 
 
 def joined_words(words: Sequence[str]) -> str:
@@ -201,12 +193,10 @@ class PressSettings:
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
     plate_made_by: PlateMachine = "jig-borer"
-    tack: float = 1.0
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
     """Products and thicknesses (mm) of the films that the minutes were stated for."""
     time_constant: float | None = None
     """Minutes in which the edge of the cold plate makes 63 % of its way; None: not measured."""
-    carrier_limit: float | None = None
     is_timed: bool = True
     """Whether the paper's minutes by hand are taken for this laminate; not for drawn layers."""
 
@@ -322,8 +312,7 @@ class Schedule:
     waived rules and lowered limits.
 
     The two totals are None where the minutes of a step are; warming up is not in them.
-    ``hands_minutes`` are the estimate's minutes beside those in the press; plans of a batch take
-    them, even where the laminate ``is_timed`` by nobody and no total is stated.
+    Nobody timed the work by hand of a laminate that is not ``is_timed``, so no total is stated.
     """
 
     steps: tuple[Step, ...]
@@ -332,9 +321,7 @@ class Schedule:
     estimate_basis: str
     cautions: tuple[Caution, ...]
     heating: Heating
-    hands_minutes: float
     is_timed: bool = True
-    tacking: Tacking | None = None
     seams: tuple[SeamStep, ...] = ()
     folds: tuple[FoldStep, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -385,11 +372,6 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         for part, stack, step_pins in zip(parts, under, pins, strict=True)
     )
     total = sum(step.minutes or 0.0 for step in steps) if has_minutes else None
-    tacking = None
-    if laminate.panel is not None:
-        low = tack_pins(laminate, press)
-        tacking = tacking_of(laminate, press.tack, press.temperature_c, plate, low)
-    hands = HANDLING_MINUTES + (0.0 if tacking is None else tacking.total_minutes)
     pressed = "no minutes stated for this film" if total is None else f"{total:g} min"
     by_hand = (
         f"{HANDLING_MINUTES:g} min to cut, lay up, pin and fit the tubing; the latter is assumed "
@@ -401,13 +383,11 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     return Schedule(
         steps,
         total,
-        (total or 0.0) + hands if has_total else None,
-        f"{pressed} in the press{_tacked(tacking)} and {by_hand}",
+        (total or 0.0) + HANDLING_MINUTES if has_total else None,
+        f"{pressed} in the press and {by_hand}",
         tuple(_cautions(laminate, press, parts, steps)),
         warming,
-        hands,
         press.is_timed,
-        tacking,
         tuple(seam_steps(laminate)),
         tuple(fold_steps(laminate)),
     )
@@ -417,9 +397,6 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
     """Return the pins of every press step. Raises DesignError where pins or plate do not do."""
     parts = assembly(laminate)
     heights = [build_up.footprint(laminate, part.layers).height for part in parts]
-    if laminate.panel is not None:
-        # Registered sheets stay on their pins from step to step, so these are set once.
-        heights = [max(heights)] * len(heights)
     return settings_by_step(
         [
             (
@@ -434,33 +411,14 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
     )
 
 
-def tack_pins(laminate: Laminate, press: PressSettings) -> tuple[PinSetting, ...]:
-    """Return the corner pins for tacks of registered sheets: shorter ones in the same holes."""
-    top = tack_stack(laminate) + press.release_thickness
-    return tuple(
-        shortest_in(setting, top, press.pin_standard, press.pin_lengths)
-        for setting in pins_by_step(laminate, press)[0]
-    )
-
-
 def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
-    """Return the base plate's hole of every pin that some step or tack uses, by the pin's name."""
-    tacks = [] if laminate.panel is None else [tack_pins(laminate, press)]
-    return pin_holes([*pins_by_step(laminate, press), *tacks])
+    """Return the base plate's hole of every pin that some step uses, by the pin's name."""
+    return pin_holes(pins_by_step(laminate, press))
 
 
 def _underlay(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
     """Return the thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
-
-
-def _tacked(tacking: Tacking | None) -> str:
-    if tacking is None:
-        return ""
-    return (
-        f", {tacking.total_minutes:.0f} min to tack the masks of {tacking.sheets} sheets to their "
-        f"films ({tacking.basis})"
-    )
 
 
 class _Setting(NamedTuple):
@@ -490,8 +448,6 @@ def _step(
     words = _instructions(part, count) + after
     if part.name == "flash_middle" and laminate.middle_first:
         title = "All layers between base and cap"
-    if laminate.panel is not None:
-        title, words = title_of_sheets(part), instructions(part)
     if part.joining is not None and len(part.layers) < len(laminate.layers):
         title = f"Press of {layers_in_words(part.layers)}"
     return Step(
@@ -523,12 +479,8 @@ def _step(
 
 
 def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
-    """Return the extent along x and y, mm, of the films of a step: of all its stacks, tabs and ears
-    included, or of the registered sheets that they are part of.
-    """
+    """Return the extent along x and y, mm, of the films of a step, tabs and ears included."""
     profiles = [layer.profile for layer in distinct_layers(laminate, part.layers)]
-    if laminate.panel is not None:
-        profiles = [laminate.panel.outline]
     low_x, low_y, high_x, high_y = zip(*(profile.bounds for profile in profiles), strict=True)
     return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
@@ -684,12 +636,6 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
                 f"press.temperature_c = {press.temperature_c:g} reaches the limit of "
                 f"{film.material}, {film.limit:g} C for {film.product}; lower it"
             )
-    limit = press.carrier_limit
-    if laminate.panel is not None and limit is not None and press.temperature_c >= limit:
-        raise DesignError(
-            f"press.temperature_c = {press.temperature_c:g} reaches panel.carrier_limit_c = "
-            f"{limit:g}, what the transfer film stands that is pressed with the masks; take another"
-        )
     _refuse_bonds(laminate, press, parts)
     for interface in laminate.interfaces:
         below, above = interface.below, interface.above
@@ -740,14 +686,6 @@ def _cautions(
     parts: Sequence[AssemblyStep],
     steps: Sequence[Step],
 ) -> Iterator[Caution]:
-    if laminate.panel is not None:
-        yield Caution(UNTRIED)
-        if press.carrier_limit is None:
-            yield Caution(
-                "nobody stated what temperature the transfer film of the masks stands; it is "
-                f"pressed at {press.temperature_c:g} C",
-                "set panel.carrier_limit_c",
-            )
     yield from _unknown_films(laminate, press)
     yield from _other_temperatures(laminate, press, parts)
     low, high = PRESSURES_TRIED
@@ -771,7 +709,7 @@ def _cautions(
         )
     if laminate.registration == "ears" and laminate.pins:
         yield Caution(PINS_IN if laminate.pins_in_full_bonds else PINS_OUT)
-    if laminate.middle_first and laminate.panel is None and parts[0].name == "flash_middle":
+    if laminate.middle_first and parts[0].name == "flash_middle":
         yield Caution(MIDDLE_FIRST)
     pads = (
         item.thickness_mm for step in steps for item in step.build_up if item.part == build_up.PAD
@@ -841,35 +779,3 @@ def _unpinned(laminate: Laminate, part: AssemblyStep) -> list[int]:
 def _by_role(laminate: Laminate, layers: Sequence[int]) -> str:
     counts = Counter(laminate.layer(index).role for index in layers)
     return joined_words([f"the {count} {role}s" for role, count in counts.items()])
-
-
-# Registered sheets and their tacking; no bench has tried it.
-
-
-UNTRIED = (
-    "no bench has tried registered sheets; the times are the paper's for single parts, so try one "
-    "copy of two balloons first"
-)
-CUT_FREE = (
-    "Draw the pins. Lay the second cut by the fiducials and cut the bridges: the actuators come "
-    "out, and the sheets round them come off."
-)
-
-
-def title_of_sheets(part: AssemblyStep) -> str:
-    """Return the title of a step in which whole sheets are pressed."""
-    return "All sheets but the cap's" if part.bond == "flash" else "The whole stack of sheets"
-
-
-def instructions(part: AssemblyStep) -> str:
-    """Return the instructions for the sheets in a step."""
-    if part.bond == "full":
-        return (
-            f"Lay the sheet of layer {part.adds[-1]} on its pins over the stack. Press to the full "
-            f"bond and let the stack cool flat. {CUT_FREE}"
-        )
-    return (
-        f"Stack the sheets of layers {part.layers[0]} to {part.layers[-1]} on the corner pins, "
-        "lowest first, every film with its masks tacked on. Press to the flash bond; the stack "
-        "stays on its pins."
-    )

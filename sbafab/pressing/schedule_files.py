@@ -8,7 +8,7 @@ from typing import Any
 
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.plate_heating import HeatPoint
-from sbafab.pressing.schedule import Schedule, Step, layers_in_words
+from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, Step, layers_in_words
 from sbafab.spreadsheet import csv_text
 
 PRESS_SCHEMA = "sbafab/press@1"
@@ -51,8 +51,7 @@ def press_json(plan: Schedule) -> dict[str, Any]:
         "estimate_basis": plan.estimate_basis,
         "warnings": list(plan.warnings),
         "heating": asdict(plan.heating),
-        "hands_minutes": plan.hands_minutes if plan.is_timed else None,
-        "tacking": None if plan.tacking is None else _plain(asdict(plan.tacking)),
+        "hands_minutes": HANDLING_MINUTES if plan.is_timed else None,
         **{key: steps for key, steps in joints.items() if steps},
     }
 

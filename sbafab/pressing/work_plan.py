@@ -33,7 +33,7 @@ from sbafab.pressing.cycles import (
     serial,
 )
 from sbafab.pressing.plate_heating import START, cool_minutes, warm_minutes
-from sbafab.pressing.schedule import Schedule
+from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule
 from sbafab.spreadsheet import csv_text
 
 TaskName = Literal["cut", "sort", "lay", "press", "open", "cool", "unpin", "tubes", "cure", "test"]
@@ -119,7 +119,7 @@ def plan_times(design: Design, laminate: Laminate, schedule: Schedule) -> Times:
     tubes = laminate.tube_count
     held = (2 * acceptance.leak_seconds + acceptance.proof_seconds) / 60
     return Times(
-        hands=schedule.hands_minutes,
+        hands=HANDLING_MINUTES,
         warm=warm_minutes(plate, press.temperature_c) if measured is None else measured,
         cool=press.cool_minutes or cool_minutes(plate, press.temperature_c),
         cure=60 * (cure_hours(design) or CURE_HOURS) if tubes else 0.0,

@@ -272,9 +272,6 @@ def pattern_card(
             max(high_y, r),
         )
     pins = tuple(pin for pin in laminate.pins if all(pin in holding[x.index] for x in layers))
-    if laminate.panel is not None:
-        # Corner pins stand in the sheet round the part.
-        pins = ()
     joined = {layer.index for layer in layers}
     return Card(
         layers,

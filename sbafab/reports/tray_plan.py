@@ -47,12 +47,8 @@ class TraySheet:
     headings: tuple[tuple[Point, str], ...]
 
 
-def tray_pdf(
-    laminate: Laminate, runs: Runs, design_sha256: str, batch: str | None = None
-) -> bytes | None:
-    """Return the pages of all places of a cycle; None for registered sheets, which lie in one."""
-    if laminate.panel is not None:
-        return None
+def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | None = None) -> bytes:
+    """Return the pages of all places of a cycle."""
     sheets = tray_sheets(laminate)
     drawn = [_drawn(sheet) for sheet in sheets]
     pages = []
@@ -87,7 +83,7 @@ def _laid(laminate: Laminate) -> Iterator[tuple[str, list[tuple[Layer, Region]]]
             root = laminate.layer(laminate.cut_with(laminate.layer(index)))
             if root.index not in taken:
                 taken.add(root.index)
-                parts.append((root, laminate.first_cut(root)))
+                parts.append((root, laminate.as_cut(root)))
         if parts:
             yield f"Step {step.number}: {layers_in_words(step.adds)}", parts
 

@@ -70,7 +70,7 @@ RULE = Rule(
 def _finest(laminate: Laminate) -> _Feature | None:
     """The narrowest web or slot of all layers; wider ones than the holes known are skipped."""
     layers = [
-        (layers_of_pattern[0], laminate.first_cut(layers_of_pattern[0]))
+        (layers_of_pattern[0], laminate.as_cut(layers_of_pattern[0]))
         for layers_of_pattern in laminate.patterns.values()
     ]
     round_holes = (hole.circle for _, cut in layers for hole in cut.holes if hole.circle)
@@ -98,10 +98,10 @@ def _lost_to_kerf(laminate: Laminate, limits: Limits) -> Finding | None:
             continue
         place, fault = Place(None, (layer.index,)), "loses or joins a hole or piece"
         try:
-            lost = beam_path(laminate.first_cut(layer), kerf).lost
+            lost = beam_path(laminate.as_cut(layer), kerf).lost
             if lost is None:
                 continue
-            spot = place_of(laminate.first_cut(layer), lost, kerf)
+            spot = place_of(laminate.as_cut(layer), lost, kerf)
             place = Place(None, (layer.index,), *spot)
             kind = "hole" if lost.contour.is_hole else "outline"
             fault = f"has a {kind} that {lost.fate} at {at(spot)}"

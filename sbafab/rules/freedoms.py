@@ -16,7 +16,7 @@ from sbafab.geometry.contour import nanometres
 from sbafab.geometry.edges import Point, distance_to
 from sbafab.geometry.nearby import boxes_meet, widened
 from sbafab.geometry.region import Region, centroid
-from sbafab.laminate.assembly import AssemblyStep, assembly, laying
+from sbafab.laminate.assembly import AssemblyStep, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.boundary import beside
@@ -42,8 +42,7 @@ class Freedom(NamedTuple):
     ``centre`` is given, turned about it by up to ``most`` radians.
 
     The body reaches from layer ``lowest`` to ``highest``; ``body`` tells it from others in the
-    same ``step``. ``pins`` are those that hold it. ``in_sheet``: it is what a registered sheet
-    stretches, or what moves while it is transferred. ``seam``: the name of the seam that it is the
+    same ``step``. ``pins`` are those that hold it. ``seam``: the name of the seam that it is the
     path of.
     """
 
@@ -54,7 +53,6 @@ class Freedom(NamedTuple):
     pins: int
     most: float
     centre: Point | None = None
-    in_sheet: bool = False
     seam: str = ""
 
     @property
@@ -64,7 +62,7 @@ class Freedom(NamedTuple):
         """
         if self.seam:
             return False
-        return self.centre is not None or self.pins == 0 or self.in_sheet
+        return self.centre is not None or self.pins == 0
 
     def lever(self, p: Point, normal: Point) -> float:
         """Return the body's displacement along ``normal`` at ``p`` per radian of its turn, mm."""
@@ -75,7 +73,7 @@ class Freedom(NamedTuple):
     def like(self) -> tuple[object, ...]:
         """Equal for freedoms that differ in step and body only."""
         centre = self.centre and (nanometres(self.centre[0]), nanometres(self.centre[1]))
-        return self.most, centre, self.pins, self.in_sheet, bool(self.seam)
+        return self.most, centre, self.pins, bool(self.seam)
 
 
 class Freedoms(dict[Part, tuple[Freedom, ...]]):
@@ -117,9 +115,7 @@ class Laid(NamedTuple):
 
 
 def lay_up(laminate: Laminate) -> list[Laid]:
-    """Return all bodies in the order they are laid, for any tolerances; none for sheets."""
-    if laminate.panel is not None:
-        return []
+    """Return all bodies in the order they are laid, for any tolerances."""
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     laid: list[Laid] = []
@@ -146,8 +142,6 @@ def freedoms(
     Two pieces lie off each other by the freedoms that they do not share. ``laid`` is the result of
     ``lay_up``, if available.
     """
-    if laminate.panel is not None:
-        return _in_sheets(laminate, tolerances)
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     by_part: dict[Part, tuple[Freedom, ...]] = {
         Part(layer.index, piece): ()
@@ -187,28 +181,6 @@ def _of_seam(
     off = Freedom(step, layer, seam.below, seam.above, 0, most, seam=seam.name)
     ways = (*by_part[Part(seam.above, under)], *((off,) if most > 0 else ()))
     return {seam_part(seam, piece): ways for piece in range(len(seam.region.pieces))}
-
-
-def _in_sheets(laminate: Laminate, tolerances: Tolerances) -> Freedoms:
-    """Freedoms in registered sheets: all parts of a sheet move as one, masks with the film below.
-
-    A mask is tacked to that film before the sheets are stacked.
-    """
-    by_part: dict[Part, tuple[Freedom, ...]] = {}
-    under: tuple[Freedom, ...] = ()
-    added = {index: step.number for step in assembly(laminate) for index in step.adds}
-    for layer in laminate.layers:
-        number, step, pins = layer.index, added[layer.index], len(laminate.pins)
-        on_pins = Freedom(step, number, number, number, pins, tolerances.pin)
-        both = on_pins, on_pins._replace(body=-number, most=tolerances.sheet, in_sheet=True)
-        ways = tuple(way for way in both if way.most > 0)
-        if layer.is_mask:
-            ways = (*under, *ways)
-        else:
-            under = ways
-        for piece in range(len(layer.profile.pieces)):
-            by_part[Part(layer.index, piece)] = ways
-    return Freedoms(by_part)
 
 
 def _body_freedoms(

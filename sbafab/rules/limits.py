@@ -26,7 +26,6 @@ class Tolerances:
     ``cutting``: mm, any cut edge along its normal; ``pin``: mm, a layer on its pins; ``placement``
     mm and ``turn`` degrees: a layer laid by hand. The first two are the paper's (Sec. 2); the hand
     is calibrated on its success rate (``docs/scripts/hand.py``).
-    ``sheet``: mm, a part in its registered sheet; ``second_cut``: mm, the second cut of these.
     ``lone_pin``: mm, a layer on the plate's only pin, whose own place does not count (None: as on
     several). ``seam``: mm, a seam off its path (None: as cut edges for a laser, ``GUIDED_TOOL``
     for other tools).
@@ -36,8 +35,6 @@ class Tolerances:
     pin: float = 0.004
     placement: float = 0.08
     turn: float = 0.4
-    sheet: float = 0.05
-    second_cut: float = 0.2
     lone_pin: float | None = None
     seam: float | None = None
 
@@ -153,11 +150,9 @@ KEYS = (
         lambda lim: lim.tolerances.of_seam("hot-tip"),
         "default",
     ),
-    _Key("sheet_error", WORST, lambda lim: lim.tolerances.sheet, "default"),
     _Key("opening_pressure_kpa", ("nets",), lambda lim: lim.opening_pressure, "default", True),
     _Key("dead_end", ("nets",), lambda lim: lim.dead_end, "default", True),
     _Key("safety_factor", ("pressure-rating",), lambda lim: lim.safety_factor, "default"),
-    _Key("second_cut_error", ("bridges",), lambda lim: lim.tolerances.second_cut, "default"),
 )
 """Smaller tolerances assume a better shop than is usual, so they weaken the rules as well."""
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
 from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.bridges import sheeted
 from sbafab.rules.channel_clear import channels
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, at
@@ -21,9 +20,6 @@ NAME = "pin-holes"
 ALIKE = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
 """Roles whose layers hang on the same pins where ears register them."""
 
-LOCATING = 2
-"""Corner pins that a registered sheet fits on, one in a hole and one in a slot."""
-
 
 class _Miss(NamedTuple):
     fault: str
@@ -34,10 +30,7 @@ class _Miss(NamedTuple):
 def check(measures: Measures) -> list[Finding]:
     """Return the number of pins that miss a hole, meet film, or leave a layer loose."""
     laminate = measures.laminate
-    if laminate.panel is not None:
-        misses = [*_sheets_off(laminate)]
-    else:
-        misses = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
+    misses = [*_unholed(laminate), *_loose(laminate), *_blocked(laminate), *_idle(laminate)]
     if misses:
         first = misses[0]
         message = f"{first.fault}; draw pins and holes from the same outline"
@@ -60,21 +53,6 @@ RULE = Rule(
     ),
     at_most=True,
 )
-
-
-def _sheets_off(laminate: Laminate) -> Iterator[_Miss]:
-    """Registered sheets that do not go on the corner pins, or hang loose on the first two."""
-    for layer in (*sheeted(laminate), *sheeted(laminate, masks=True)):
-        sheet = laminate.panel.sheets[layer.index - 1] if laminate.panel else layer.profile
-        for number, pin in enumerate(laminate.pins):
-            radius = pin.diameter / 2
-            free = 0.0 if sheet.contains(pin.centre) else sheet.distance_to_edge(pin.centre)
-            subject = f"layer {layer.index} ({layer.name})"
-            where = f"the pin {pin.name} at {at(pin.centre)}"
-            if free < radius - TOLERANCE:
-                yield _Miss(f"{subject} has no hole for {where}", pin.centre, (layer.index,))
-            elif number < LOCATING and free > radius + TOLERANCE:
-                yield _Miss(f"{subject} hangs loose on {where}", pin.centre, (layer.index,))
 
 
 def _idle(laminate: Laminate) -> Iterator[_Miss]:

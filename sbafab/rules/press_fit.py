@@ -20,15 +20,13 @@ NAME = "press-fit"
 def check(measures: Measures) -> list[Finding]:
     """Return the laminate's size against the platen, either way round, and the warnings."""
     laminate, limits = measures.laminate, measures.limits
-    panel = laminate.panel
-    low_x, low_y, high_x, high_y = laminate.bounds if panel is None else panel.outline.bounds
+    low_x, low_y, high_x, high_y = laminate.bounds
     short, long = sorted((high_x - low_x, high_y - low_y))
     narrow, wide = sorted((limits.heated_width, limits.heated_length))
     # The side with less room to spare decides.
     measured, limit = min(((short, narrow), (long, wide)), key=lambda side: side[1] - side[0])
     good = measured <= limit + TOLERANCE
-    subject = "laminate" if panel is None else "registered sheet"
-    size = f"the {subject} measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
+    size = f"the laminate measures {high_x - low_x:.3f} x {high_y - low_y:.3f} mm"
     platen = f"{limits.heated_width:g} x {limits.heated_length:g} mm"
     message = f"{size} and lies within the heated area of {platen}"
     place = Place()

@@ -264,8 +264,6 @@ def _source(freedom: Freedom) -> str:
     layers = _moved(freedom)
     if freedom.seam:
         return f"place of seam {freedom.seam}"
-    if freedom.in_sheet:
-        return f"stretch or transfer of {layers} in its sheet"
     cause = {0: "hand placement", 1: "turn about the only pin"}.get(
         freedom.pins, "play on the pins"
     )

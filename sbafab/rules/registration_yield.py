@@ -595,7 +595,7 @@ def finding_of(outcome: Yield, laminate: Laminate, limits: Limits) -> Finding:
     message = (
         f"{outcome.whole.value:.2%} of {outcome.whole.builds} random builds keep every limit "
         f"(95 % interval {low:.2%} to {high:.2%}){_by_interface(outcome)}; errors are assumed "
-        f"spread evenly, up to {_by_hand(laminate, limits)}"
+        f"spread evenly, up to {_by_hand(limits.tolerances)}"
     )
     if target is None:
         message += "; no least share is asked for (rules.target_yield)"
@@ -632,11 +632,8 @@ def _remedy(laminate: Laminate) -> str:
     return wider
 
 
-def _by_hand(laminate: Laminate, limits: Limits) -> str:
+def _by_hand(errors: Tolerances) -> str:
     """The design's assumed placement errors in words."""
-    errors = limits.tolerances
-    if laminate.panel is not None:
-        return f"{errors.sheet:g} mm in a registered sheet"
     return (
         f"{errors.placement:g} mm and {errors.turn:g} degree where a hand places"
         f"{_calibrated(errors)}"

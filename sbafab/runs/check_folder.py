@@ -220,7 +220,7 @@ def _regenerate(
     if parts is not None:
         nests = find_nests(parts, design, folder, ignore_progress)
         sheets = write_nested_sheets(nests, design, fresh, settings, ignore_progress)
-    write_plates(checked, paths, fresh, settings)
+    write_plates(checked, fresh, settings)
     pressing = schedule_of(checked) if "press" in parts_of_run else None
     plan = DesignPlan(checked, frozenset(parts_of_run), settings, pressing)
     return write_design(DesignFolder(plan, sheets, fresh, ignore_progress, parts is not None))

@@ -26,15 +26,7 @@ FEW = ("stack.balloons=2", "rules.yield_builds=100")
 DESIGNS = (
     ("1dof-5mm", ()),
     ("3dof-15mm", ("laser.kerf_tpe=0.12",)),
-    (
-        "1dof-5mm",
-        (
-            "name=panel",
-            'registration.method="sheet"',
-            "registration.experimental=true",
-            "registration.pin_diameter=1.5",
-        ),
-    ),
+    ("1dof-5mm", ("name=eared", 'registration.method="ears"')),
 )
 OPENED = (
     *(".lbrn", ".lbrn2", ".svg", ".dwg", ".dxf", ".DXF", ".pdf", ".ai", ".eps", ".ps", ".cdr"),
@@ -183,7 +175,7 @@ def test_a_foreign_file_of_a_job_is_named(folders: list[Path], tmp_path: Path) -
     designs = [load_design(name, FEW) for name in ("1dof-5mm", "3dof-15mm")]
     folder = generate(RunRequest(designs, tmp_path, name="batch")).folder
     assert not failing(folder)
-    donor = folders[2] / "sheets" / "second_cut.dxf"
+    donor = folders[2] / "sheets" / "fixture.dxf"
     put(folder, "sheets/TPE_9.dxf", donor)
     put(folder / "1dof-5mm", "layers/012_TPE_wall.dxf", donor)
     own = folder / "1dof-5mm" / "manifest.json"

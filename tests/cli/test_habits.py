@@ -224,7 +224,7 @@ def test_shells_complete_templates_keys_and_rules() -> None:
     assert completed(["generate", "1dof-5mm", "--waive"], "bond") == ["bond-width"]
     assert "chamber.diameter=" in completed(["check", "1dof-5mm", "--set"], "chamber.")
     methods = completed(["check", "1dof-5mm", "--set"], "registration.method=")
-    assert methods == [f"registration.method={name}" for name in ("channel-pin", "ears", "sheet")]
+    assert methods == [f"registration.method={name}" for name in ("channel-pin", "ears")]
 
 
 def test_a_shell_gets_its_script() -> None:

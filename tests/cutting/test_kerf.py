@@ -9,10 +9,8 @@ import pytest
 import shapely
 from shapely.affinity import scale
 
-from sbafab.actuators import build, load_design
 from sbafab.cutting.kerf import compensate, in_chords
-from sbafab.cutting.properties import CutSettings, kerf_of, kerf_properties, kerf_suffix
-from sbafab.cutting.second_cut import laser_path
+from sbafab.cutting.properties import kerf_of, kerf_properties, kerf_suffix
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Line
 from sbafab.geometry.offset import Kerf
@@ -41,22 +39,6 @@ def test_chords_leave_a_mask_no_more_but_at_the_corners_of_its_part() -> None:
 def test_stadium_grows_by_the_closed_formula() -> None:
     grown = compensate(stadium((0.0, 0.0), 11.5, 20.0), 0.2)
     assert grown.area == pytest.approx(11.7 * 8.5 + math.pi * 5.85**2, abs=1e-9)
-
-
-@pytest.mark.parametrize("kerf", [None, 0.2, (0.2, 0.1)])
-def test_slots_of_the_second_cut_are_cut_inside_their_edges(kerf: Kerf | None) -> None:
-    """Half a kerf along each axis on every side, and as drawn where nobody measured it."""
-    keys = ('registration.method="sheet"', "registration.experimental=true", "stack.balloons=2")
-    laminate = build(load_design("1dof-5mm", [*keys, "order.copies=1"]))
-    assert laminate.panel is not None
-    path = laser_path(laminate, CutSettings("demo", "0" * 64, {"TPE": kerf}))
-    x, y = (0.0, 0.0) if kerf is None else kerf if isinstance(kerf, tuple) else (kerf, kerf)
-    # One slot is parallel to the axes.
-    [drawn] = [c for c in laminate.panel.second.contours if len({e.start[0] for e in c.edges}) == 2]
-    [cut] = [c for c in path.contours if len({round(e.start[0], 9) for e in c.edges}) == 2]
-    left, low, right, high = drawn.bounds
-    inside = (left + x / 2, low + y / 2, right - x / 2, high - y / 2)
-    assert cut.bounds == pytest.approx(inside, abs=1e-9)
 
 
 def test_plate_keeps_its_contours_and_grows_by_its_perimeter(plate: Region) -> None:

@@ -10,8 +10,16 @@ from xml.etree import ElementTree
 
 import pytest
 
+from sbafab.cutting.beam_paths import LaserRun, contour_runs, drawn
 from sbafab.cutting.dxf_write import Surroundings
-from sbafab.cutting.lightburn import project_text, read_project, verify_project
+from sbafab.cutting.lightburn import (
+    ADVICE,
+    LaserLayer,
+    read_project,
+    runs_text,
+    sheet_layers,
+    verify_runs,
+)
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc
@@ -24,6 +32,12 @@ AROUND = Surroundings(
 PROPERTIES = {"DESIGN": 'arm "2" & co', "WARNING": "hot"}
 
 
+def of_sheet(region: Region, around: Surroundings) -> tuple[list[LaserLayer], list[LaserRun]]:
+    """Return the layers and runs of a sheet without recipes."""
+    runs = list(drawn(contour_runs(cutting_order(region)), around))
+    return sheet_layers({run.layer for run in runs}, {}), runs
+
+
 @pytest.fixture
 def parts(plate: Region) -> Region:
     """The plate and a large ring, on a sheet."""
@@ -34,12 +48,12 @@ def parts(plate: Region) -> Region:
 @pytest.fixture
 def project(parts: Region, tmp_path: Path) -> Path:
     path = tmp_path / "TPE_1.lbrn2"
-    path.write_text(project_text(cutting_order(parts), AROUND, PROPERTIES))
+    path.write_text(runs_text(*of_sheet(parts, AROUND), PROPERTIES, ADVICE))
     return path
 
 
 def test_what_is_written_reads_back(project: Path, parts: Region) -> None:
-    verify_project(project, cutting_order(parts), AROUND)
+    verify_runs(project, *of_sheet(parts, AROUND))
     found = read_project(project)
     assert [shape.index for shape in found.shapes] == [0, *[1] * 5, *[2] * 2, 7, 8]
     outputs = {index: told["doOutput"] for index, told in found.settings.items()}
@@ -51,7 +65,7 @@ def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path)
     region = disc((0.0, 0.0), 400.0)
     half = region - Region((disc((0.0, 0.0), 400.0).contours[0],)).moved(0.0, 300.0)
     path = tmp_path / "large.lbrn2"
-    path.write_text(project_text(cutting_order(half), Surroundings(), {}))
+    path.write_text(runs_text(*of_sheet(half, Surroundings()), {}, ADVICE))
     [shape] = read_project(path).shapes
     offs = []
     for curve in shape.curves:
@@ -61,7 +75,7 @@ def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path)
     assert 1e-4 < max(offs) < 4.3e-6 * 400
     path.write_text(path.read_text().replace("B1 2", "L1 2"))
     with pytest.raises(OutputError, match="mm off at x"):
-        verify_project(path, cutting_order(half), Surroundings())
+        verify_runs(path, *of_sheet(half, Surroundings()))
 
 
 def test_no_power_and_no_order_is_left_to_the_reader(project: Path) -> None:
@@ -159,4 +173,4 @@ def test_what_is_not_the_sheet_is_told(name: str, project: Path, parts: Region) 
     change, says = SPOILT[name]
     project.write_text(change(project.read_text()))
     with pytest.raises(OutputError, match=says):
-        verify_project(project, cutting_order(parts), AROUND)
+        verify_runs(project, *of_sheet(parts, AROUND))

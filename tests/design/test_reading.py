@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -143,6 +144,20 @@ def test_a_mistyped_file_or_folder_meets_the_one_beside_it(tmp_path: Path) -> No
     for typed, meant in (("tpi.toml", "tip.toml"), ("tip", "tip.toml"), ("out/amr", "out/arm")):
         with pytest.raises(DesignError, match=re.escape(f"did you mean {tmp_path / meant}?")):
             load_design(tmp_path / typed)
+
+
+@pytest.mark.parametrize("template", ["1dof-5mm", "radial-15mm", "pouch"])
+@pytest.mark.parametrize(
+    ("change", "names"),
+    [
+        ({"panel": {"web": 4.0, "margin": 12.0}}, "panel"),
+        ("registration.experimental=true", "registration.experimental"),
+        ("registration.method=sheet", 'registration.method = "sheet"'),
+    ],
+)
+def test_what_was_removed_says_what_to_do_instead(template: str, change: Any, names: str) -> None:
+    with pytest.raises(DesignError, match=f"^{names} belongs to registered sheets.*; delete it"):
+        load_design(template, [change])
 
 
 @pytest.mark.parametrize("name", DESIGNS)

@@ -28,9 +28,9 @@ UNUSED = [
 
 def test_drawn_layers_use_no_key_that_shapes_others() -> None:
     keys = {key for family, key in UNUSED if family == "drawn"}
-    assert {"bond.width", "mask.overhang", "fillet.radius", "panel.margin"} <= keys
+    assert {"bond.width", "mask.overhang", "fillet.radius"} <= keys
     assert not {"bore.diameter", "inlet.width", "rules.bond_width"} & keys
-    assert {family for family, _ in UNUSED} == {"drawn", "radial"}
+    assert {family for family, _ in UNUSED} == {"drawn"}
 
 
 @pytest.mark.parametrize(("family", "key"), UNUSED)

@@ -15,7 +15,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.errors import DesignError
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
-from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, panels, sheets
+from tests.faults import beside, chords, claims, files, holes, joints, layers, masks, sheets
 from tests.faults.record import PAPER, Fault, Kind
 from tests.faults.specimen import Specimen, failing, unabridged
 
@@ -30,7 +30,6 @@ KINDS: tuple[Kind, ...] = (
     files.KIND,
     claims.KIND,
     sheets.KIND,
-    panels.KIND,
     beside.KIND,
     joints.KIND,
 )

@@ -140,7 +140,7 @@ def test_a_laminate_alone_comes_back_exactly(name: str, tmp_path: Path) -> None:
 def comes_back(draft: Draft) -> None:
     with TemporaryDirectory() as name:
         laminate = build(load_design(draft.write(Path(name))))
-        read_back(replace(laminate, panel=None), Path(name))
+        read_back(laminate, Path(name))
 
 
 @pytest.mark.long
@@ -154,18 +154,6 @@ def test_100_random_laminates_come_back_exactly(draft: Draft) -> None:
 @given(valid())
 def test_a_random_laminate_comes_back_exactly(draft: Draft) -> None:
     comes_back(draft)
-
-
-def test_registered_sheets_are_named_and_their_parts_carried(tmp_path: Path) -> None:
-    laminate = build(load_design(GALLERY / "panel-of-4.toml"))
-    assert laminate.panel is not None
-    path = tmp_path / FILE
-    path.write_text(laminate_json(laminate), encoding="utf-8")
-    read = import_laminate(path)
-    assert any(remark.startswith("panel: registered sheets are not") for remark in read.remarks)
-    again = write_imported(read, tmp_path / "again.toml", FILE).laminate
-    assert again.panel is None
-    assert [layer.profile for layer in again.layers] == [layer.profile for layer in laminate.layers]
 
 
 def test_a_kit_comes_along(tmp_path: Path) -> None:

@@ -19,10 +19,9 @@ def main() -> int:
     asked.add_argument("--jobs", type=int, default=1, help="processes [1]")
     asked.add_argument("--lean", action="store_true", help="cut and press in place of generate")
     asked.add_argument("--no-check", action="store_true", help="without sbafab check FOLDER")
-    asked.add_argument("--in-sheets", action="store_true", help="as registered sheets")
     asked.add_argument("--keep", type=Path, help="where designs and folders that disagree stay")
     given = asked.parse_args()
-    ways = Ways(given.lean, not given.no_check, 5, given.keep, given.in_sheets)
+    ways = Ways(given.lean, not given.no_check, 5, given.keep)
     began = time.perf_counter()
     cases = []
     stopped = False

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import FrameType
 
 from tests.judge.deck import judged
-from tests.judge.drafts import Draft, beside, draft, in_sheets
+from tests.judge.drafts import Draft, beside, draft
 from tests.judge.folder import Disagreement, open_folder
 from tests.judge.reading import UnreadableError
 from tests.judge.sheets import judge_sheets
@@ -57,16 +57,12 @@ class Ways:
     check: bool = True
     most_balloons: int = 4
     keep: Path | None = None
-    in_sheets: bool = False
-    """All of them as registered sheets, each by itself."""
 
 
 def run_case(seed: int, number: int, ways: Ways = Ways()) -> Case:
     """One design made and judged, or every ``TOGETHER``-th time two that are cut together."""
     made = [draft(seed, number, ways.most_balloons)]
-    if ways.in_sheets:
-        made = [in_sheets(made[0])]
-    elif number % TOGETHER == TOGETHER - 1:
+    if number % TOGETHER == TOGETHER - 1:
         made.append(beside(made[0], draft(seed, ANOTHER + number, ways.most_balloons)))
     families = " and ".join(str(one.tables["family"]) for one in made)
     case = Case(made[0].name, families)

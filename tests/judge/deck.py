@@ -11,7 +11,6 @@ from tests.judge.claims import judge_claims
 from tests.judge.facing import judge_facing
 from tests.judge.folder import Disagreement, Folder
 from tests.judge.overhangs import judge_overhangs
-from tests.judge.panels import judge_panel
 from tests.judge.pins import judge_pins
 from tests.judge.pockets import judge_pockets
 from tests.judge.pressing import judge_press
@@ -35,8 +34,6 @@ JUDGES: tuple[Judge, ...] = (
 
 def judged(folder: Folder, drawn: Sequence[Polygon] | None = None) -> list[Disagreement]:
     """What all judges say of one design's folder, its sheets included if it has its own."""
-    if folder.manifest.get("panel"):
-        return _heard(lambda: judge_panel(folder))
     found = [said for judge in JUDGES for said in _heard(lambda judge=judge: judge(folder))]
     if folder.manifest.get("sheets"):
         found += _heard(lambda: judge_sheets([folder], folder.path, folder.manifest["sheets"]))

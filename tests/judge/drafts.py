@@ -79,16 +79,6 @@ def beside(first: Draft, second: Draft) -> Draft:
     return Draft(tables, drawn, first.dxf_profile, first.chord_error, second.pockets)
 
 
-def in_sheets(made: Draft) -> Draft:
-    """The draft as registered sheets: balloons all alike, true arcs. Radial ones are refused."""
-    tables = {**made.tables, "registration": {"method": "sheet", "experimental": True}}
-    pockets = (made.pockets[0],) * len(made.pockets)
-    sizes = tables["chamber"].get("diameter")
-    if isinstance(sizes, list):
-        tables["chamber"] = {**tables["chamber"], "diameter": sizes[0]}
-    return Draft(tables, made.drawing, "bulges", 0.0, pockets)
-
-
 def _mm(rng: Random, low: float, high: float, digits: int = 3) -> float:
     return round(rng.uniform(low, high), digits)
 

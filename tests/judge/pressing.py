@@ -59,8 +59,6 @@ def _is_stated(folder: Folder) -> bool:
 
 def _size(folder: Folder, step: dict[str, Any]) -> Iterator[Disagreement]:
     """The laminate of a step is as large as its layers are cut."""
-    if folder.method == "sheet":
-        return
     boxes = [layer.profile.bounds for layer in folder.layers if layer.index in step["layers"]]
     low_x, low_y, high_x, high_y = zip(*boxes, strict=True)
     cut = (max(high_x) - min(low_x), max(high_y) - min(low_y))

@@ -57,12 +57,12 @@ def test_a_folded_pouch_is_tight_at_its_fold_and_two_films_are_not(tmp_path: Pat
 def test_the_flat_part_is_both_halves_side_by_side(tmp_path: Path) -> None:
     laminate = drawn(tmp_path, folded())
     lower, _, upper = laminate.layers
-    flat = laminate.first_cut(lower)
+    flat = laminate.as_cut(lower)
     tab = 4 * (24 - 16)
     assert flat.area == pytest.approx(2 * (41 * 32 + tab))
     assert len(flat.pieces) == 1
     assert flat.bounds == pytest.approx((-61, -16, 21, 24))
-    assert laminate.first_cut(upper) == flat
+    assert laminate.as_cut(upper) == flat
     assert (lower.turned, upper.turned) == (False, True)
     assert laminate.cut_with(upper) == 1
 

@@ -24,7 +24,7 @@ from sbafab.laminate import laminate_validator
 from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam
 from sbafab.laminate.laminate import ROLES, Laminate
 from sbafab.laminate.laminate_file import laminate_json, read_laminate
-from sbafab.laminate.laminate_validator import FIELDS, HEAD, PANEL, faults
+from sbafab.laminate.laminate_validator import FIELDS, HEAD, faults
 from sbafab.laminate.laminate_validator import ROLES as ROLES_OF_THE_FORMAT
 from tests.judge.welded_drafts import welded_draft
 from tests.properties.designs import Draft, valid
@@ -33,13 +33,10 @@ from tests.quick import few
 from tests.site.formats import hold
 
 TEMPLATES = ("1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm", "pouch")
-PANEL_OF_4 = Path(__file__).parents[2] / "docs" / "gallery" / "panel-of-4.toml"
 
 
 def regions(laminate: Laminate) -> list[Region]:
-    panel = laminate.panel
-    sheets = () if panel is None else (panel.outline, *panel.sheets, panel.second, panel.window)
-    return [laminate.outline, *(layer.profile for layer in laminate.layers), *sheets]
+    return [laminate.outline, *(layer.profile for layer in laminate.layers)]
 
 
 def assert_read_back(laminate: Laminate, folder: Path) -> None:
@@ -57,10 +54,9 @@ def assert_draft_read_back(draft: Draft) -> None:
         assert_read_back(build(load_design(draft.write(Path(name)))), Path(name))
 
 
-@pytest.mark.parametrize("name", [*TEMPLATES, str(PANEL_OF_4)])
+@pytest.mark.parametrize("name", TEMPLATES)
 def test_a_template_is_read_back_exactly(name: str, tmp_path: Path) -> None:
     laminate = build(load_design(name))
-    assert (laminate.panel is not None) == (name == str(PANEL_OF_4))
     assert_read_back(laminate, tmp_path)
     hold("laminate", json.loads(laminate_json(laminate)))
 
@@ -82,8 +78,7 @@ def test_the_validator_knows_every_key_of_the_schema() -> None:
     properties = schema_of("laminate")["properties"]
     for name, fields in FIELDS.items():
         assert set(properties[name]["items"]["properties"]) == set(fields), name
-    assert set(properties["panel"]["properties"]) == set(PANEL)
-    assert set(properties) == {*HEAD, *FIELDS, "schema", "panel", "shapes"}
+    assert set(properties) == {*HEAD, *FIELDS, "schema", "shapes"}
     assert ROLES_OF_THE_FORMAT == ROLES
 
 
@@ -136,8 +131,6 @@ FAULTS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "name": (lambda d: d.pop("name"), "name: is missing"),
     "lumen": (lambda d: d.update(lumen=-1.0), "lumen: "),
     "list": (lambda d: d.update(pins={}), "pins: "),
-    "panel": (lambda d: d.pop("panel"), "panel: "),
-    "panel's keys": (lambda d: d.update(panel={}), "panel.outline: "),
     "outline": (lambda d: d.update(outline=999), "outline: there is no shape 999"),
     "no layers": (lambda d: d.update(layers=[]), "layers: "),
     "order": (lambda d: d["layers"].reverse(), "layers[0].index: "),

@@ -181,15 +181,10 @@ def test_the_middle_layers_are_as_large_as_they_are_cut(
         assert 2 * (size[0] - 0.5 - 4.25 / 2 - 3.75) == pytest.approx(15.00, abs=1e-4)
 
 
-METHODS = ("channel-pin", "ears", "sheet")
-TEMPLATES = [(name, way) for name in ("1dof-5mm", "1dof-10mm", "3dof-15mm") for way in METHODS]
-TEMPLATES += [("radial-15mm", way) for way in METHODS[:2]]
-
-
-@pytest.mark.parametrize(("template", "method"), TEMPLATES)
+@pytest.mark.parametrize("method", ["channel-pin", "ears"])
+@pytest.mark.parametrize("template", ["1dof-5mm", "1dof-10mm", "3dof-15mm", "radial-15mm"])
 def test_every_step_says_how_large_its_laminate_is(template: str, method: str) -> None:
-    settings = (f"registration.method={method}", "registration.experimental=true")
-    design = load_design(template, settings)
+    design = load_design(template, [f"registration.method={method}"])
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
     for step in plan.steps:

@@ -118,12 +118,6 @@ def test_all_laminates_of_a_cycle_share_the_force() -> None:
     assert twelve.steps[-1].film_kpa < one.steps[-1].film_kpa
 
 
-def test_registered_sheets_are_one_piece_to_the_press() -> None:
-    whole = ("registration.method=sheet", "registration.experimental=true")
-    sheets = laminate(*whole, "order.copies=4", "stack.balloons=2")
-    assert runs_of(sheets, 4, (152.4, 152.4)) == Runs(1, ((0.0, 0.0),))
-
-
 def test_patterns_are_counted_a_cycle() -> None:
     # 45 min in the press and 60 by hand a copy: three fit in 225 min, and four do not.
     design = load_design(

@@ -1,17 +1,20 @@
 """A web between two corners of which no edge faces the other was taken for 0.750 mm wide.
 
-The bridges of registered sheets cross the hollow between two drawn pockets and enclose a gap there;
-between the gap and the outside the web is narrowest along the bridge's side.
+Strips of film cross the hollow between two drawn pockets and enclose a gap there; between the gap
+and the outside the web is narrowest along a strip's side.
 """
 
 from __future__ import annotations
 
 import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from sbafab.actuators import build, load_design
+from sbafab.geometry.edges import unit
+from sbafab.geometry.region import strip, union
 from sbafab.output.checked import limits
 from sbafab.rules import bond_width
 from sbafab.rules.measures import Measures
@@ -38,22 +41,16 @@ DESIGN = """
     [inlet]
     tab_length = 10.214
     width = 3.572
-    [registration]
-    method = "sheet"
-    experimental = true
     [lumen]
     diameter = 4.194
     [chamber]
     outline = "pocket.svg"
     count = 3
     axis_radius = 9.384
-    [sheets.tpe]
-    width = 300
-    length = 300
-    [sheets.ptfe]
-    width = 300
-    length = 300
 """
+STRIPS = union(
+    strip((0.0, 0.0), (9.5703 * x, 9.5703 * y), 1.0) for x, y in map(unit, (60, 180, 300))
+)
 
 
 def test_the_web_is_as_wide_as_shapely_finds_it(tmp_path: Path) -> None:
@@ -63,6 +60,11 @@ def test_the_web_is_as_wide_as_shapely_finds_it(tmp_path: Path) -> None:
     (tmp_path / "web.toml").write_text(textwrap.dedent(DESIGN))
     design = load_design(str(tmp_path / "web.toml"))
     laminate = build(design)
+    layers = [
+        layer if layer.is_mask else replace(layer, profile=layer.profile | STRIPS)
+        for layer in laminate.layers
+    ]
+    laminate = replace(laminate, layers=tuple(layers))
     (bond,) = laminate.interfaces[0].bond.shapely().geoms
     web = min(bond.exterior.distance(hole) for hole in bond.interiors)
     (finding,) = bond_width.check(Measures(laminate, limits(design)))

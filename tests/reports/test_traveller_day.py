@@ -85,7 +85,6 @@ def keys_of(section: type[BaseModel], before: str = "") -> Iterator[str]:
             ("3dof-15mm",),
             ("1dof-5mm", "films.tpe.product=TPU", "films.tpe.thickness=0.05", EARS),
             ("1dof-5mm", "order.copies=5"),
-            ("1dof-5mm", 'registration.method="sheet"', "registration.experimental=true"),
             ("1dof-5mm", "bore.pin_diameter=0.7", "press.temperature_c=155"),
             ("folded",),
             ("gripper",),

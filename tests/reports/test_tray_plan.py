@@ -115,11 +115,3 @@ def test_the_page_for_the_phone_counts_patterns_by_cycle() -> None:
         counts = [int(b.text) for b in card.xpath(".//label/b")]
         assert counts == [5 * patterns[name], 4 * patterns[name]]
         assert card.xpath(".//span[@class='each']")[0].text.startswith(f"{patterns[name]} each")
-
-
-def test_registered_sheets_have_no_tray() -> None:
-    design = load_design(
-        "1dof-5mm", ["registration.method=sheet", "registration.experimental=true"]
-    )
-    laminate = build(design)
-    assert tray_pdf(laminate, design_runs(design, laminate), SHA) is None

@@ -52,8 +52,6 @@ TESTED_APART = {
     "press-fit",
     "pressure-rating",
     "pin-fit",
-    "bridges",
-    "scrap",
     "registration-worst-case",
     "registration-yield",
     "nets",

@@ -36,7 +36,7 @@ def test_the_page_of_keys_has_every_key() -> None:
 
 def test_every_rule_has_its_picture() -> None:
     assert OTHERS.keys() == TESTED_APART
-    for rule in ("film-limits", "bridges"):
+    for rule in ("film-limits", "press-fit"):
         drawn = pair(rule)
         assert drawn.right != drawn.wrong
         assert drawn.wrong.count("<circle") == 1

@@ -192,7 +192,7 @@ def test_templates_and_forms_are_whole(client: Client) -> None:
     lobed = {field["key"]: field for field in start["families"]["lobed"]}
     assert lobed["chamber.diameter"]["unit"] == "mm"
     assert lobed["press.temperature_c"]["unit"] == "\u00b0C"
-    assert lobed["registration.method"]["choices"] == ["channel-pin", "ears", "sheet"]
+    assert lobed["registration.method"]["choices"] == ["channel-pin", "ears"]
     assert all(field["meaning"] for field in lobed.values())
     text = client.get("/api/template/brace", headers=HEADERS).json()["text"]
     assert text == api.template("brace")

@@ -29,7 +29,7 @@ def values(work: Work) -> dict[str, Any]:
     mechanism = design.form.mechanism
     return {
         "is_eared": laminate.registration == "ears",
-        "each": _each_copy(work),
+        "serials": _serials(work),
         "inlets": _boxes([inlet.chamber for inlet in laminate.inlets]),
         "holes": _boxes([port.name for port in laminate.tube_holes]),
         "tube": tube_name(design),
@@ -108,27 +108,12 @@ def _depth(work: Work) -> str:
     )
 
 
-class EachCopy(NamedTuple):
-    """What is done for each copy: words that follow the task, and a name for each box."""
-
-    words: str
-    ticks: tuple[str, ...]
-
-
-def _each_copy(work: Work) -> EachCopy | None:
-    """Return a box for each copy of a batch; None for one copy."""
-    count, panel = work.job.copies, work.laminate.panel
-    if panel is not None:
-        if len(panel.places) == 1:
-            return None
-        numbers = tuple(str(number) for number in range(1, len(panel.places) + 1))
-        words = "one actuator after the other, numbered by its place in the sheet, row by row:"
-        return EachCopy(words, numbers)
-    if count == 1:
-        return None
-    copies = range(1, count + 1) if count <= MOST_COPIES else ()
-    numbers = tuple(serial(work.runs, copy, work.design.order.batch) for copy in copies)
-    return EachCopy(f"of all {count} copies, one after the other, as follows.", numbers)
+def _serials(work: Work) -> tuple[str, ...]:
+    """Return the serial of each copy of a batch, a box for each; none for one copy, or for many."""
+    count = work.job.copies
+    if not 1 < count <= MOST_COPIES:
+        return ()
+    return tuple(serial(work.runs, n, work.design.order.batch) for n in range(1, count + 1))
 
 
 def _boxes(names: Sequence[str]) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import Runs
-from sbafab.pressing.schedule import joined_words
+from sbafab.pressing.schedule import HANDLING_MINUTES, joined_words
 from sbafab.pressing.work_plan import plan_times
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import bench, bill, process, units
@@ -301,7 +301,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
     for design in job.works:
         plan, runs = design.work.schedule, design.runs
         pressed = units.product(runs.count, plan.total_press_minutes)
-        handled = runs.copies * plan.hands_minutes
+        handled = runs.copies * HANDLING_MINUTES
         whole = None if pressed is None else pressed + handled
         total = None if total is None or whole is None else total + whole
         made_of = (

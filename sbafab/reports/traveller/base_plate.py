@@ -104,8 +104,7 @@ def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
 
 
 def _pin_holes(plan: Schedule) -> dict[str, PinHole]:
-    tacks = [] if plan.tacking is None else [plan.tacking.pins]
-    return pin_holes([*(step.pin_settings for step in plan.steps), *tacks])
+    return pin_holes([step.pin_settings for step in plan.steps])
 
 
 def has_underlay(step: Step) -> bool:
@@ -129,18 +128,14 @@ def trays(work: Work) -> int:
 
 def release_films(work: Work) -> int:
     """Return the release films that all cycles need: two new ones each time the press closes on a
-    step, one for films that are turned over, and two that serve all tacks of a batch of registered
-    sheets.
+    step, and one for films that are turned over.
     """
-    panel, steps = work.laminate.panel, len(work.schedule.steps)
-    if panel is not None:
-        return 2 * panel.batches * (steps + 1)
-    return 2 * work.runs.count * steps + turns_over(work)
+    return 2 * work.runs.count * len(work.schedule.steps) + turns_over(work)
 
 
 def turns_over(work: Work) -> bool:
     """Return True if films are turned over, so that their pins can be pushed out."""
-    return work.laminate.panel is None and any(s.pin_settings for s in work.schedule.steps)
+    return any(step.pin_settings for step in work.schedule.steps)
 
 
 RELEASE_FILM = "Release film"

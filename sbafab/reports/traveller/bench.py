@@ -55,25 +55,6 @@ HOLDING: Mapping[HoldDown, str] = {
 }
 """What holds a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
 SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
-RIM = 10.0
-"""mm of film round a registered sheet, by which it is held down."""
-
-
-def before_first_cut() -> list[Action]:
-    """Return the actions before registered sheets are cut: bridges or the transfer film hold their
-    parts.
-    """
-    return [
-        Action(WIPE),
-        Action(
-            f"Each registered sheet is cut whole, edge and all, out of film that reaches {RIM:g} "
-            "mm past it all round. Lay the film flat on smooth card, without stretching it, and "
-            "hold it down all along that rim with tape or magnets; a mask sheet is held by the rim "
-            "of its transfer film. Parts of the films hang on their bridges. (Our proposal, not "
-            "tried.)"
-        ),
-        Action(AIR),
-    ]
 
 
 def before_cutting(works: Sequence[Work]) -> list[Action]:
@@ -96,9 +77,7 @@ def hold_down(work: Work, film: Film) -> HoldDown:
 
 
 def _holding(works: Sequence[Work], film: Film) -> Action:
-    """Return the holding of one film on sheets of which each part comes free, as nothing bridges
-    it.
-    """
+    """Return the holding of one film on sheets of which each part comes free."""
     count, lightest = 0, math.inf
     for work in works:
         for layers in work.laminate.patterns.values():
@@ -106,7 +85,7 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
             cut = [layer for layer in layers if work.laminate.cut_with(layer) == layer.index]
             if cut and cut[0].film == film:
                 is_folded = bool(work.laminate.folds)
-                shape = work.laminate.first_cut(cut[0]) if is_folded else cut[0].profile
+                shape = work.laminate.as_cut(cut[0]) if is_folded else cut[0].profile
                 pieces = shape.pieces
                 needed = len(cut) * work.job.copies
                 count += len(pieces) * (needed + work.design.order.spare_parts(needed))
@@ -441,11 +420,7 @@ def tools(works: Sequence[Work]) -> list[Tool]:
         Tool("Lint-free cloths, isopropanol, clean gloves", "clean films and parts before bonding"),
     ]
     masks = [layer for laminate in laminates for layer in laminate.layers if layer.is_mask]
-    holds = {
-        "border" if work.laminate.panel is not None else hold_down(work, layer.film)
-        for work in works
-        for layer in work.laminate.layers
-    }
+    holds = {hold_down(work, layer.film) for work in works for layer in work.laminate.layers}
     rows += [tool for hold, tool in HOLDERS.items() if hold in holds]
     if any(len(layer.profile.pieces) > 1 for layer in masks):
         rows.append(Tool("Antistatic tweezers, earthed mat, dish with a lid", "loose mask pieces"))

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 from sbafab.design.identity import cure_hours, tube_name
 from sbafab.laminate.laminate import Layer
 from sbafab.pressing.cycles import batch_times
-from sbafab.pressing.schedule import joined_words
+from sbafab.pressing.schedule import HANDLING_MINUTES, joined_words
 from sbafab.pressing.work_plan import plan_times, shop_of, work_plan
 from sbafab.reports.drawing import TIMES, layer_numbers
 from sbafab.reports.traveller import acceptance, base_plate, units
@@ -181,7 +181,7 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
         layer for layer in work.laminate.layers if work.laminate.cut_with(layer) == first.index
     ]
     is_flat = len(folded) > 1 or first.turned
-    profile = work.laminate.first_cut(first) if is_flat else first.profile
+    profile = work.laminate.as_cut(first) if is_flat else first.profile
     shape = flat_shape(first.pattern) if is_flat else first.pattern
     layers = (*layers, *(layer for layer in folded if layer is not first))
     name = work.design.name
@@ -210,7 +210,7 @@ def _cut_length(work: Work, layer: Layer) -> float:
     Equal pieces are one part of a nest, cut as many times more.
     """
     laminate = work.laminate
-    profile = laminate.first_cut(layer) if laminate.folds else layer.profile
+    profile = laminate.as_cut(layer) if laminate.folds else layer.profile
     parts = {
         part.piece: part
         for sheet in work.sheets
@@ -331,7 +331,7 @@ def times(work: Work) -> list[Time]:
         basis = f"{laser_basis(work)}; all sheets, {copies}"
         took = units.minutes(laser_minutes(work))
         rows.append(Time("Laser (within handling)", took, basis))
-    handling = plan.hands_minutes if plan.is_timed else None
+    handling = HANDLING_MINUTES if plan.is_timed else None
     rows.append(Time("Handling", units.minutes(handling), _handling_basis(work)))
     if plan.steps:
         steps = " + ".join(units.plain(step.minutes) for step in plan.steps)

@@ -149,11 +149,6 @@ def _remedies(places: Measures) -> Iterator[str]:
             'registration.method = "ears" pins every film and separator in every step; the ears '
             "are snipped off afterwards."
         )
-        yield (
-            'registration.method = "sheet", for round and lobed actuators, keeps films and masks '
-            "whole on corner pins until all copies are pressed; no bench has tried it, so it takes "
-            "--experimental."
-        )
     yield (
         "Measure your own builds and set registration.hand_placement and registration.hand_turn "
         "accordingly."

@@ -24,7 +24,7 @@ from sbafab.pressing.schedule import Schedule, joined_words, layers_in_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.html_templates import environment
-from sbafab.reports.traveller import acceptance, base_plate, bench, bill, panel, process, units
+from sbafab.reports.traveller import acceptance, base_plate, bench, bill, process, units
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bill import kerf_states
 from sbafab.reports.traveller.job import HERE, Job, Work, frame
@@ -102,7 +102,6 @@ def context(work: Work) -> dict[str, Any]:
         **process.every_step(work),
         "step_pages": process.step_pages(work),
         "joint_pages": joint_pages(work),
-        "cut_free": (),
         **acceptance.values(work),
         "times": bill.times(work),
         "total_time": bill.total_time(work),
@@ -111,7 +110,6 @@ def context(work: Work) -> dict[str, Any]:
         "again": False,
         "record_fields": HISTORY_FIELDS,
         "record_tables": record_tables(work.design, laminate, work.schedule),
-        **panel.chapter(work),
     }
 
 

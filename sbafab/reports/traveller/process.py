@@ -158,7 +158,7 @@ def _press_row(work: Work, part: AssemblyStep, step: Step) -> StepRow:
         units.temperature(step.temperature_c),
         f"{step.force_n:.0f} N",
         units.minutes(step.minutes),
-        _pins_in_and_out(work, step),
+        _pins_in_and_out(step),
         product,
     )
 
@@ -168,7 +168,7 @@ def _laid(bed: Bed) -> str:
     return words if bed.made_in is None else f"{words} from step {bed.made_in}"
 
 
-def _pins_in_and_out(work: Work, step: Step) -> str:
+def _pins_in_and_out(step: Step) -> str:
     """Return the pins of a step by size, and when they come out."""
     sizes: dict[tuple[float, float], list[str]] = {}
     for pin in step.pin_settings:
@@ -179,8 +179,7 @@ def _pins_in_and_out(work: Work, step: Step) -> str:
         f"{joined_words(names)} ⌀{diameter:g} {draw.TIMES} {length:g} mm"
         for (diameter, length), names in sizes.items()
     )
-    stay = work.laminate.panel is not None and step is not work.schedule.steps[-1]
-    return f"{pins}: in, and {'they stay' if stay else 'out after it'}"
+    return f"{pins}: in, and out after it"
 
 
 def _seam_row(seam: SeamStep) -> StepRow:

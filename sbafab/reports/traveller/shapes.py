@@ -47,7 +47,7 @@ def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
         yield pattern_id(pattern), layers[0].profile
         is_folded = any(fold.lower == layers[0].index for fold in laminate.folds)
         if is_folded or layers[0].turned:
-            yield pattern_id(flat_shape(pattern)), laminate.first_cut(layers[0])
+            yield pattern_id(flat_shape(pattern)), laminate.as_cut(layers[0])
 
 
 def flat_shape(pattern: str) -> str:

@@ -36,11 +36,9 @@ class PatternCard:
     counts: tuple[tuple[str, int], ...]
 
 
-def tray_html(work: Work) -> str | None:
-    """Return the page; None for registered sheets, of which no part comes free."""
+def tray_html(work: Work) -> str:
+    """Return the page."""
     laminate, runs = work.laminate, work.runs
-    if laminate.panel is not None:
-        return None
     sizes = [(f"Cycle {cycle_name(n)}", size) for n, size in enumerate(runs.cycles, 1)]
     if len(sizes) > MOST_CYCLES:
         sizes = [(cycles_of(runs, size), size) for size in dict.fromkeys(runs.cycles)]
@@ -49,7 +47,7 @@ def tray_html(work: Work) -> str | None:
         first = layers[0]
         if laminate.cut_with(first) != first.index:
             continue
-        region = laminate.first_cut(first)
+        region = laminate.as_cut(first)
         is_flat = first.turned or any(fold.lower == first.index for fold in laminate.folds)
         shape = flat_shape(pattern) if is_flat else pattern
         cards.append(
