@@ -13,6 +13,7 @@ from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.rules.deck import RULES, run_rule
 from sbafab.rules.finding import Finding
 from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_yield import simulate
 from tests.rules.conftest import built, spoiled
 from tests.rules.routed import cut_through, laminate_of, straight
@@ -47,7 +48,7 @@ def pair(rule: str) -> Pair:
 
 def _found(rule: str, laminate: Laminate, limits: Limits = EXACT) -> Finding:
     (one,) = (own for own in RULES if own.name == rule)
-    findings = run_rule(one, laminate, limits)
+    findings = run_rule(one, Measures(laminate, limits))
     return next((f for f in findings if f.verdict in ("fail", "warn")), findings[0])
 
 

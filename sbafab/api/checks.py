@@ -50,8 +50,7 @@ def checking(
     design = load(source)
     measures = Measures(laminate or build(design), limits(design), pause or (lambda: None))
     for rule in RULES:
-        findings = run_rule(rule, measures.laminate, measures.limits, measures)
-        yield rule.name, Findings(findings)
+        yield rule.name, Findings(run_rule(rule, measures))
 
 
 def nets_of(source: Source, *changes: Change, **tables: Any) -> NetMap:

@@ -64,10 +64,11 @@ from sbafab.output.checked import Checked
 from sbafab.output.checked import limits as limits_of
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.rules import film_limits, nets
-from sbafab.rules.deck import RULES, Rule, run_deck, run_rule
+from sbafab.rules.deck import RULES, run_deck, run_rule
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, Limits, lowered
 from sbafab.rules.measures import Measures
+from sbafab.rules.rule import Rule
 
 AS_DESIGNED = "all that lies here is what design.toml makes"
 
@@ -424,7 +425,7 @@ UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
 def findings_as_built(rule: Rule, measures: Measures) -> list[Finding]:
     """Return the findings of a rule; a shape that the rule cannot measure fails it."""
     try:
-        return run_rule(rule, measures.laminate, measures.limits, measures)
+        return run_rule(rule, measures)
     except UNMEASURED as error:
         message = f"cannot be measured on these files ({error}); regenerate them"
         return [Finding(rule.name, "fail", None, None, "", Place(), message)]

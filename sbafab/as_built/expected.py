@@ -220,7 +220,7 @@ def _first_failure(laminate: Laminate, limits: Limits) -> Finding | None:
             finding
             for rule in RULES
             if rule.name != registration_yield.NAME
-            for finding in run_rule(rule, laminate, limits, measures)
+            for finding in run_rule(rule, measures)
             if finding.verdict == "fail"
         ),
         None,

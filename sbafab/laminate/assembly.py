@@ -7,7 +7,7 @@ the full bonds too: a flash bond on the pins comes first, and the full bond afte
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
@@ -185,6 +185,17 @@ def pressed_layers(laminate: Laminate) -> list[Layer]:
     return [layer for layer in laminate.layers if layer.index in pressed]
 
 
+def films_without_minutes(
+    laminate: Laminate, stated: Iterable[tuple[str, float]]
+) -> tuple[Film, ...]:
+    """Return the structural films in the press, each once, that are none of the products and
+    thicknesses (mm) for which press minutes are stated.
+    """
+    pairs = tuple(stated)
+    films = dict.fromkeys(layer.film for layer in pressed_layers(laminate) if not layer.is_mask)
+    return tuple(film for film in films if not any(film.is_a(*pair) for pair in pairs))
+
+
 @dataclass(frozen=True)
 class FoldedHeight:
     """Height of a flat laminate after the press: ``solid`` mm of masks, of films that do not melt
@@ -214,7 +225,7 @@ class FoldedHeight:
         return f"{' and '.join(names)} as bought: no press factor is known" if names else ""
 
 
-def folded_height(laminate: Laminate, factor: float, product: str = "") -> FoldedHeight:
+def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeight:
     """Return the folded height of a laminate: the only one, of all commands, pages and files.
 
     ``factor`` is what the press leaves of the thickness of films that melt in it, of one

@@ -103,16 +103,6 @@ def film_name(product: str, thickness: float) -> str:
     return f"{product}, {thickness:g} mm"
 
 
-def unstated(films: Iterable[Film], products: Iterable[tuple[str, float]]) -> list[Film]:
-    """The structural films, each once, that are none of the products of given thickness (mm)."""
-    pairs = tuple(products)
-    return [
-        film
-        for film in dict.fromkeys(films)
-        if not film.is_mask and not any(film.is_a(*pair) for pair in pairs)
-    ]
-
-
 def in_order(materials: Iterable[Material]) -> list[Material]:
     """Every material once: TPE, PTFE, then the others by name."""
     rank = {material: place for place, material in enumerate(FIRST)}

@@ -126,7 +126,7 @@ class Net:
 
 
 def chamber_gaps(
-    roles: Sequence[str], seams: Collection[tuple[int, int]] = ()
+    roles: Sequence[str], seams: Collection[tuple[int, int]]
 ) -> dict[tuple[int, int], bool]:
     """Return the gaps between structural layers, by their layers' indices: True if a chamber.
 

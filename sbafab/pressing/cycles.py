@@ -8,14 +8,9 @@ from dataclasses import dataclass
 from sbafab.design.records import Design
 from sbafab.design.sections import named_film
 from sbafab.geometry.edges import Bounds, Point
-from sbafab.laminate.assembly import PLATE_MARGIN, assembly
+from sbafab.laminate.assembly import PLATE_MARGIN, assembly, films_without_minutes
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import (
-    HANDLING_MINUTES,
-    PressSettings,
-    Schedule,
-    films_without_minutes,
-)
+from sbafab.pressing.schedule import HANDLING_MINUTES, PressSettings, Schedule
 
 APART = 5.0
 """Gap in mm between two copies in the press, ours: films flow, and hands need room."""
@@ -146,7 +141,7 @@ def _copies_a_shift(design: Design, laminate: Laminate) -> int:
         minutes_for=tuple(map(named_film, press.minutes_for)),
     )
     pressing = 0.0
-    if not films_without_minutes(laminate, settings):
+    if not films_without_minutes(laminate, settings.minutes_for):
         pressing = sum(settings.minutes(part.name) for part in assembly(laminate))
     handling = 60 * design.order.shift_hours - pressing
     return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))

@@ -170,8 +170,8 @@ def least_seat(diameter: float) -> float:
 def settings_by_step(
     steps: Sequence[tuple[float, Sequence[Pin]]],
     standard: Standard,
-    stock: Sequence[float] = (),
-    plate: float | None = None,
+    stock: Sequence[float],
+    plate: float | None,
 ) -> list[tuple[PinSetting, ...]]:
     """Return the pins of every step, given the height of its stack's top over the plate in mm, all
     that lies under the stack included, and the pins that are in.
@@ -272,12 +272,9 @@ def _needed_length(seat: float, need: float) -> float:
 
 def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | None) -> float:
     """Return the plate's thickness in mm: as set, or the thinnest that takes every seat."""
-    least = max((every[0].depth for every in choices.values()), default=0.0) + FLOOR
-    if not choices:
-        least = 0.0
+    least = max((every[0].depth + FLOOR for every in choices.values()), default=0.0)
     if thickness is None:
-        sold = (plate for plate in PLATES if plate >= least - ROUNDING)
-        return next(sold, float(math.ceil(least)))
+        return _plate_sold(least)
     if thickness < least - ROUNDING:
         raise DesignError(
             f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's "
@@ -342,5 +339,9 @@ def plate_thickness(thickness: float | None, settings: Sequence[Sequence[PinSett
     """Return the base plate's thickness in mm: as set, or the thinnest under every seat."""
     if thickness is not None:
         return thickness
-    deepest = max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0)
-    return next((p for p in PLATES if p >= deepest - ROUNDING), float(math.ceil(deepest)))
+    return _plate_sold(max((pin.seat_mm + FLOOR for step in settings for pin in step), default=0.0))
+
+
+def _plate_sold(least: float) -> float:
+    """Return the thinnest plate sold that is ``least`` mm thick; a whole millimetre past these."""
+    return next((plate for plate in PLATES if plate >= least - ROUNDING), float(math.ceil(least)))

@@ -18,13 +18,14 @@ from sbafab.laminate.assembly import (
     StepName,
     assembly,
     distinct_layers,
+    films_without_minutes,
     is_laid_by_hand,
     laying,
     pressed_layers,
     stack_count,
 )
 from sbafab.laminate.base_plate import PlateMachine
-from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
+from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film
 from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing import build_up
@@ -91,7 +92,7 @@ class Caution(NamedTuple):
         return f"{self.words}; {self.remedy}" if self.remedy else self.words
 
 
-def _unstated_minutes(films: list[Film], press: PressSettings) -> Caution:
+def _unstated_minutes(films: Sequence[Film], press: PressSettings) -> Caution:
     """Return the warning that no minutes are stated for these films."""
     names = [f'"{film.said}"' for film in films]
     stated = joined_words(
@@ -134,11 +135,6 @@ def _is_the_papers(laminate: Laminate) -> bool:
     """Return True if a film is the paper's, so that what it tried in the press bears on it."""
     films = {layer.film for layer in pressed_layers(laminate)}
     return any(film.is_a(PAPER_PRODUCT, PAPER_THICKNESS) for film in films)
-
-
-def films_without_minutes(laminate: Laminate, press: PressSettings) -> list[Film]:
-    """Return the structural films of a laminate for which no minutes are stated."""
-    return unstated((layer.film for layer in pressed_layers(laminate)), press.minutes_for)
 
 
 # The steps: layers pressed together, in their order (paper Sec. 2).
@@ -352,7 +348,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     pins = pins_by_step(laminate, press)
     plate = plate_thickness(press.plate_thickness, pins)
     warming = heating(laminate, press.temperature_c, press.time_constant)
-    has_minutes = not films_without_minutes(laminate, press)
+    has_minutes = not films_without_minutes(laminate, press.minutes_for)
     steps = tuple(
         _step(
             laminate,
@@ -739,7 +735,7 @@ def _cautions(
 
 def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[Caution]:
     """Yield warnings of films without stated minutes or melting point."""
-    if films := films_without_minutes(laminate, press):
+    if films := films_without_minutes(laminate, press.minutes_for):
         yield _unstated_minutes(films, press)
     for film in dict.fromkeys(layer.film for layer in pressed_layers(laminate)):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:
@@ -754,7 +750,7 @@ def _other_temperatures(
     laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
 ) -> Iterator[Caution]:
     """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
-    if not films_without_minutes(laminate, press):
+    if not films_without_minutes(laminate, press.minutes_for):
         yield from _minutes_of_another_temperature(laminate, press, parts)
     if press.temperature_c > HOTTEST_TRIED and _is_the_papers(laminate):
         yield Caution(

@@ -48,20 +48,15 @@ def run_deck(
     for number, rule in enumerate(RULES):
         if progress is not None:
             progress(rule.name, number, len(RULES))
-        findings += run_rule(rule, laminate, limits, measures)
+        findings += run_rule(rule, measures)
     return tuple(findings)
 
 
-def run_rule(
-    rule: Rule, laminate: Laminate, limits: Limits, measures: Measures | None = None
-) -> list[Finding]:
-    """Return the findings of a rule; failures the user waived and lowered limits are marked.
-
-    ``measures`` are those of the same laminate and limits, for rules that share them.
-    """
-    weak = lowered(limits, rule.name)
-    findings = [_against(weak, f) for f in rule.check(measures or Measures(laminate, limits))]
-    if rule.name not in limits.waive:
+def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
+    """Return the findings of a rule; failures the user waived and lowered limits are marked."""
+    weak = lowered(measures.limits, rule.name)
+    findings = [_against(weak, finding) for finding in rule.check(measures)]
+    if rule.name not in measures.limits.waive:
         return findings
     return [_waived(finding) if finding.verdict == "fail" else finding for finding in findings]
 
@@ -85,6 +80,3 @@ def _against(weak: Sequence[str], finding: Finding) -> Finding:
 def _waived(finding: Finding) -> Finding:
     message = f"waived by the design: {finding.message}"
     return replace(finding, verdict="waived", by_user=True, message=message)
-
-
-__all__ = ["AT_MOST", "RULES", "Limits", "Rule", "has_failed", "rule_names", "run_deck", "run_rule"]

@@ -134,13 +134,11 @@ def lay_up(laminate: Laminate) -> list[Laid]:
     return laid
 
 
-def freedoms(
-    laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid] | None = None
-) -> Freedoms:
+def freedoms(laminate: Laminate, tolerances: Tolerances, laid: Sequence[Laid]) -> Freedoms:
     """Return the freedoms of each piece of each layer, from every step that it goes through.
 
     Two pieces lie off each other by the freedoms that they do not share. ``laid`` is the result of
-    ``lay_up``, if available.
+    ``lay_up``.
     """
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     by_part: dict[Part, tuple[Freedom, ...]] = {
@@ -148,7 +146,7 @@ def freedoms(
         for layer in laminate.layers
         for piece in range(counts[layer.pattern])
     }
-    for number, item in enumerate(lay_up(laminate) if laid is None else laid, 1):
+    for number, item in enumerate(laid, 1):
         ways = (
             ()
             if item.stays

@@ -93,11 +93,10 @@ class Margin(NamedTuple):
 
 
 class Push(NamedTuple):
-    """A freedom's greatest effect on a margin, in mm, and whether it acts at its end or start."""
+    """A freedom's greatest effect on a margin, in mm."""
 
     freedom: Freedom
     cost: float
-    at_end: bool
 
 
 @dataclass(frozen=True)
@@ -166,7 +165,6 @@ def pushes(margin: Margin, interface: Interface, moves: Freedoms) -> list[Push]:
             freedom,
             freedom.most
             * abs(freedom.lever(margin.end if at_end else margin.start, margin.normal)),
-            at_end,
         )
         for freedom, at_end in relative_freedoms(margin.owners, seated(interface), moves)
     ]
@@ -693,14 +691,14 @@ class Rays(NamedTuple):
 
 
 def first_met(
-    rays: Rays, table: EdgeTable, within: float | Floats, parts: Sequence[tuple[int, int]] = ()
+    rays: Rays, table: EdgeTable, within: float | Floats, parts: Sequence[tuple[int, int]]
 ) -> tuple[Indices, Floats, Floats]:
     """Return the first edge that each ray meets: number of the ray, distance (mm) and point.
 
     Edges farther off than ``within`` may be left out. ``parts``: numbers of rays and edges of
     blocks; rays of a block meet its edges only.
     """
-    counts, edge_counts = zip(*parts or [(len(rays.edge), len(table.radius))], strict=True)
+    counts, edge_counts = zip(*parts, strict=True)
     boxes = boxes_round(rays.start, rays.start + within * rays.outward, END_ROOM)
     ray, number = touching_in_parts(boxes, counts, table.box, edge_counts)
     start, outward = rays.start.take(ray, axis=1), rays.outward.take(ray, axis=1)

@@ -6,8 +6,7 @@ film.
 
 from __future__ import annotations
 
-from sbafab.laminate.assembly import pressed_layers
-from sbafab.laminate.films import unstated
+from sbafab.laminate.assembly import films_without_minutes
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE
@@ -81,7 +80,7 @@ RULE = Rule(
 
 def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list[Finding]:
     """A warning for films without stated press minutes."""
-    films = unstated((layer.film for layer in pressed_layers(laminate)), stated)
+    films = films_without_minutes(laminate, stated)
     if not films:
         return []
     names = " and ".join(film.said for film in films)

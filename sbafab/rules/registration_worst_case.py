@@ -43,8 +43,6 @@ STEADIER = (
 SAME = 1e-8
 """mm: of values that differ by less, the first is the worst if they are equal when rounded."""
 
-Cost = tuple[Freedom, float]
-
 
 class Remaining(NamedTuple):
     """Width that remains at the worst margin of an interface, mm; it may be negative.
@@ -73,12 +71,9 @@ class Remaining(NamedTuple):
         return DistinctInterface(self.interfaces[0], len(self.interfaces))
 
 
-def least_remaining(
-    laminate: Laminate, limits: Limits, measures: Measures | None = None
-) -> list[Remaining]:
+def least_remaining(measures: Measures) -> list[Remaining]:
     """Return the worst place of every group of equal interfaces, for bond and overhang."""
-    measures = measures or Measures(laminate, limits)
-    forms = measures.forms
+    forms, limits = measures.forms, measures.limits
     begins = forms.begins[:-1]
     drawn = forms.by_quantity(
         {"bond": least_passing(limits.bond_width), "overhang": least_passing(limits.mask_overhang)}
@@ -114,10 +109,9 @@ def least_remaining(
 
 def check(measures: Measures) -> list[Finding]:
     """The least remaining bond and overhang, each with its place and largest contribution."""
-    laminate, limits = measures.laminate, measures.limits
-    remaining = least_remaining(laminate, limits, measures)
-    bond = _finding("bond", limits.worst_bond_width, remaining, measures, limits)
-    overhang = _finding("overhang", limits.worst_mask_overhang, remaining, measures, limits)
+    limits, remaining = measures.limits, least_remaining(measures)
+    bond = _finding("bond", limits.worst_bond_width, remaining, measures)
+    overhang = _finding("overhang", limits.worst_mask_overhang, remaining, measures)
     # bond-width reports seams that are too narrow as drawn.
     edges = [
         edge
@@ -150,11 +144,7 @@ RULE = Rule(
 
 
 def _finding(
-    quantity: Quantity,
-    limit: float,
-    remaining: Iterable[Remaining],
-    measures: Measures,
-    limits: Limits,
+    quantity: Quantity, limit: float, remaining: Iterable[Remaining], measures: Measures
 ) -> Finding:
     places = [place for place in remaining if place.quantity == quantity]
     if not places:
@@ -169,7 +159,7 @@ def _finding(
     interface = worst.interfaces[0]
     margin = worst.margin
     dearest = costs(pushes(margin, worst.group.first, measures.moves))
-    message = _message(worst, margin, dearest, limits.tolerances)
+    message = _message(worst, margin, dearest, measures.limits.tolerances)
     remedy = ""
     if verdict == "fail":
         by_seams = any(freedom.seam for freedom, _ in dearest)
@@ -186,7 +176,7 @@ def _finding(
             f"interface{'s' if short > 1 else ''}, {_why(least_pinned.pinned)}"
         )
     if quantity == "bond":
-        message += _plate(verdict == "fail", measures.laminate, limits)
+        message += _plate(verdict == "fail", measures.laminate, measures.limits)
     place = Place(interface.index, interface.layer_indices, *margin.middle)
     value = max(0.0, worst.worst)
     return Finding(NAME, verdict, limit, value, "mm", place, message, remedy=remedy)
@@ -204,7 +194,7 @@ def _plate(failed: bool, laminate: Laminate, limits: Limits) -> str:
 
 
 def _message(
-    worst: Remaining, margin: Margin, dearest: Sequence[Cost], tolerances: Tolerances
+    worst: Remaining, margin: Margin, dearest: Sequence[Push], tolerances: Tolerances
 ) -> str:
     """The value, its place and the largest contribution there."""
     where = f"{interface_name(worst.interfaces[0])}{worst.distinct.suffix}"
@@ -241,14 +231,14 @@ def _at_edge(bond: EdgeBond, limits: Limits) -> Finding:
     return Finding(NAME, "fail", limit, bond.width, "mm", place, message)
 
 
-def costs(acting: Iterable[Push]) -> list[Cost]:
+def costs(acting: Iterable[Push]) -> list[Push]:
     """Return the cost of each body, shift and turn together, the largest first."""
-    total: dict[tuple[int, int], tuple[Freedom, float]] = {}
+    total: dict[tuple[int, int], Push] = {}
     for push in acting:
         key = push.freedom.step, push.freedom.body
-        freedom, cost = total.get(key, (push.freedom, 0.0))
-        total[key] = freedom, cost + push.cost
-    return sorted(total.values(), key=lambda entry: -round(entry[1], 9))
+        first = total.get(key, Push(push.freedom, 0.0))
+        total[key] = Push(first.freedom, first.cost + push.cost)
+    return sorted(total.values(), key=lambda push: -round(push.cost, 9))
 
 
 def _moved(freedom: Freedom) -> str:
@@ -276,7 +266,7 @@ def _why(pinned: float) -> str:
     return f"though pins and cutting alone leave {_mm(pinned)}"
 
 
-def _remedy(quantity: Quantity, dearest: Iterable[Cost], laminate: Laminate) -> str:
+def _remedy(quantity: Quantity, dearest: Iterable[Push], laminate: Laminate) -> str:
     """Remedy for the hand's errors."""
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:

@@ -17,6 +17,7 @@ from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.facing_films import RULE as FACING
 from sbafab.rules.finding import Finding
+from sbafab.rules.measures import Measures
 
 Bonds = dict[tuple[str, str], str]
 
@@ -91,7 +92,7 @@ def facing(bonds: Bonds) -> Finding:
     if not tables["seams"]:
         del tables["seams"]
     design = validated(tables, records(), Path())
-    return run_rule(FACING, build(design), limits(design))[0]
+    return run_rule(FACING, Measures(build(design), limits(design)))[0]
 
 
 @pytest.mark.parametrize(

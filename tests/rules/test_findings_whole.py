@@ -197,7 +197,8 @@ def test_a_laminate_without_twins_has_nothing_to_register(good: Good) -> None:
 def test_a_failure_that_the_user_waives_is_marked_as_the_users() -> None:
     failure = Finding("sealing", "fail", 0.0, 2.0, "voids", Place(3, (5, 6, 7)), "two pockets leak")
     rule = Rule("sealing", lambda _: [failure], Explanation("", "", ""))
-    assert run_rule(rule, None, Limits(waive=frozenset({"sealing"}))) == [  # type: ignore[arg-type]
+    waived = Limits(waive=frozenset({"sealing"}))
+    assert run_rule(rule, Measures(None, waived)) == [  # type: ignore[arg-type]
         replace(
             failure,
             verdict="waived",

@@ -213,7 +213,7 @@ def test_turns_are_alike_about_one_centre_only() -> None:
 
 def test_shift_and_turn_of_a_body_count_together() -> None:
     shift, turn, other = freedom(1, 1, 0.1), freedom(1, 1, 0.2), freedom(2, 1, 0.15)
-    pushes = [Push(shift, 0.1, True), Push(other, 0.15, False), Push(turn, 0.2, True)]
+    pushes = [Push(shift, 0.1), Push(other, 0.15), Push(turn, 0.2)]
     assert costs(pushes) == [(shift, pytest.approx(0.3)), (other, 0.15)]
 
 

@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.output.checked import limits
 from sbafab.rules.deck import run_deck
 from sbafab.rules.finding import Finding
-from sbafab.rules.freedoms import Part, freedoms
+from sbafab.rules.freedoms import Part
 from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import check, least_remaining
@@ -44,7 +44,7 @@ def left(laminate: Laminate, interface: int, quantity: str, tolerances: Toleranc
     """What is left at an interface (or at one like it)."""
     return next(
         place.worst
-        for place in least_remaining(laminate, Limits(tolerances=tolerances))
+        for place in least_remaining(Measures(laminate, Limits(tolerances=tolerances)))
         if place.margin.quantity == quantity and interface in {i.index for i in place.interfaces}
     )
 
@@ -246,7 +246,7 @@ def test_a_place_is_where_the_worst_is(good: Good) -> None:
 
 
 def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:
-    moves = freedoms(good(*LOBED), Tolerances())
+    moves = Measures(good(*LOBED), Limits()).moves
     turns = [
         next(f for f in moves[Part(2, piece)] if f.step == 1 and f.centre is not None)
         for piece in range(3)
@@ -258,7 +258,7 @@ def test_pieces_of_a_layer_move_by_themselves(good: Good) -> None:
 
 
 def test_more_balloons_cost_no_more_patterns(good: Good) -> None:
-    few = least_remaining(good("1dof-5mm", "stack.balloons=6"), Limits())
-    many = least_remaining(good("1dof-5mm", "stack.balloons=60"), Limits())
+    few = least_remaining(Measures(good("1dof-5mm", "stack.balloons=6"), Limits()))
+    many = least_remaining(Measures(good("1dof-5mm", "stack.balloons=60"), Limits()))
     assert [place.worst for place in many] == pytest.approx([place.worst for place in few])
     assert sum(len(p.interfaces) for p in many if p.margin.quantity == "bond") == 119

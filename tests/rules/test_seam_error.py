@@ -19,6 +19,7 @@ from sbafab.design.records import validated
 from sbafab.output.checked import limits
 from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding
+from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import RULE as WORST_CASE
 from sbafab.rules.registration_yield import RULE as YIELD
 from sbafab.rules.rule import Rule
@@ -31,7 +32,7 @@ STEADY = {"registration.hand_placement": 0, "registration.hand_turn": 0}
 def findings(rule: object, **settings: object) -> list[Finding]:
     named = {key.replace("__", "."): value for key, value in settings.items()}
     design = load_design("folded").with_({**STEADY, **named})
-    return run_rule(rule, build(design), limits(design))  # type: ignore[arg-type]
+    return run_rule(rule, Measures(build(design), limits(design)))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("error", [0.0, 0.5, 1.2])
@@ -106,7 +107,7 @@ def worst(
         "registration": {"hand_placement": 0, "hand_turn": 0, "seam_error": error},
     }
     design = validated(tables, records(), Path())
-    return run_rule(rule, build(design), limits(design))[0]
+    return run_rule(rule, Measures(build(design), limits(design)))[0]
 
 
 def end_on_end(overlap: float) -> dict[str, Points]:

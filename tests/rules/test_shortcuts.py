@@ -157,7 +157,7 @@ def test_places_left_out_are_neither_the_worst_nor_short(
     laminate = good(*design)
 
     def told() -> tuple[object, ...]:
-        found = least_remaining(laminate, limits)
+        found = least_remaining(Measures(laminate, limits))
         return (
             [(round(one.worst, 9), round(one.pinned, 9), one.interfaces) for one in found],
             simulate(laminate, limits),
