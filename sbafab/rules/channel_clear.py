@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Edge, Point, distance_to
-from sbafab.laminate.laminate import Laminate, Layer
+from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import at, holds
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
-# Channels: chamber bores and the lumen, and the layers each runs through.
+# Channels: chamber bores and the lumen, and the layers each runs through; pins that stand in none.
 
 
 class Channel(NamedTuple):
@@ -59,6 +59,18 @@ def channels(laminate: Laminate) -> list[Channel]:
         layers = _distinct(laminate.layers)
         passages.append(Channel("lumen", (0.0, 0.0), laminate.lumen, layers))
     return passages
+
+
+ON_ONE_PIN = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
+"""Roles whose layers have the same tooling holes."""
+
+
+def tooling_pins(laminate: Laminate) -> list[Pin]:
+    """Return the pins that stand in no bore and not in the lumen."""
+    axes = [channel.centre for channel in channels(laminate)]
+    return [
+        pin for pin in laminate.pins if all(math.dist(pin.centre, axis) > LOOSE for axis in axes)
+    ]
 
 
 def _distinct(layers: Iterable[Layer]) -> tuple[Layer, ...]:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import AssemblyStep, assembly, distinct_layers
-from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.channel_clear import channels
+from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.rules.channel_clear import ON_ONE_PIN, tooling_pins
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import TOLERANCE, at
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
 NAME = "pin-holes"
-
-ALIKE = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
-"""Roles whose layers hang on the same pins where ears register them."""
 
 
 class _Miss(NamedTuple):
@@ -67,8 +63,8 @@ def _idle(laminate: Laminate) -> Iterator[_Miss]:
 
 def _unholed(laminate: Laminate) -> Iterator[_Miss]:
     """Layers that lack a hole at a tooling pin where others of their kind have one."""
-    for pin in _tooling_pins(laminate):
-        for roles in ALIKE:
+    for pin in tooling_pins(laminate):
+        for roles in ON_ONE_PIN:
             holed: dict[bool, list[Layer]] = {True: [], False: []}
             for layers in laminate.patterns.values():
                 if layers[0].role in roles:
@@ -110,7 +106,7 @@ def _blocked(laminate: Laminate) -> Iterator[_Miss]:
     """
     for step in assembly(laminate):
         added = distinct_layers(laminate, step.adds)
-        for pin in _tooling_pins(laminate):
+        for pin in tooling_pins(laminate):
             laid = next((layer for layer in added if pin in laminate.pins_holding(layer)), None)
             if laid is not None or pin in step.pins:
                 yield from _in_the_way(pin, laid, step, laminate)
@@ -131,14 +127,6 @@ def _in_the_way(
                 f"{at(pin.centre)}{whose} in step {step.number}"
             )
             yield _Miss(fault, pin.centre, (layer.index,))
-
-
-def _tooling_pins(laminate: Laminate) -> list[Pin]:
-    """The pins that stand in no bore and not in the lumen."""
-    axes = [channel.centre for channel in channels(laminate)]
-    return [
-        pin for pin in laminate.pins if all(math.dist(pin.centre, axis) > LOOSE for axis in axes)
-    ]
 
 
 def _listed(pins: list[Pin]) -> str:

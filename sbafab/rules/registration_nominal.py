@@ -9,17 +9,14 @@ from typing import NamedTuple
 from sbafab.geometry.cache import cached
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate import LOOSE, Laminate, Layer, Pin
-from sbafab.rules.channel_clear import Channel, channels
+from sbafab.laminate.laminate import Laminate, Layer, Pin
+from sbafab.rules.channel_clear import ON_ONE_PIN, Channel, channels, tooling_pins
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import at
 from sbafab.rules.measures import Measures, distinct_interfaces
 from sbafab.rules.rule import Explanation, Rule
 
 NAME = "registration-nominal"
-
-ON_ONE_PIN = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
-"""Roles whose layers have the same tooling holes."""
 
 
 class _Departure(NamedTuple):
@@ -86,10 +83,7 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
 
 def _off_pins(laminate: Laminate) -> Iterator[_Departure]:
     """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
-    axes = [channel.centre for channel in channels(laminate)]
-    for pin in laminate.pins:
-        if any(math.dist(pin.centre, axis) < LOOSE for axis in axes):
-            continue
+    for pin in tooling_pins(laminate):
         off = {name: _off_pin(layers[0], pin) for name, layers in laminate.patterns.items()}
         for roles in ON_ONE_PIN:
             siblings = [layer for layer in laminate.layers if layer.role in roles]

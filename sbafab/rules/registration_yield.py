@@ -90,17 +90,13 @@ class DrawnBuilds(NamedTuple):
     @property
     def numbers(self) -> Floats:
         """Numbers from 0 to 1, a row each, from the ``first`` of the seed's stream on."""
-        return numbers(*self)
-
-
-def numbers(seed: int, first: int, rows: int, builds: int) -> Floats:
-    """Numbers from 0 to 1, a row of ``builds`` each, from the ``first`` of the seed's stream on."""
-    last = first + rows * builds
-    if last <= STREAM_LENGTH:
-        return _stream(seed).until(last)[first:last].reshape(rows, builds)
-    ahead = np.random.PCG64(seed)
-    ahead.advance(first)
-    return np.random.Generator(ahead).random((rows, builds))
+        last = self.first + self.rows * self.builds
+        if last <= STREAM_LENGTH:
+            some = _stream(self.seed).until(last)[self.first : last]
+            return some.reshape(self.rows, self.builds)
+        ahead = np.random.PCG64(self.seed)
+        ahead.advance(self.first)
+        return np.random.Generator(ahead).random((self.rows, self.builds))
 
 
 # Rows: the width left at margins beyond their limit, as its room and a sum over the errors drawn.

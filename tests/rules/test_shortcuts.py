@@ -30,7 +30,6 @@ from sbafab.rules.registration_yield import (
     RandomBuilds,
     RowKind,
     RowsQuery,
-    numbers,
     rows_by_error,
     rows_of,
     simulate,
@@ -111,7 +110,7 @@ def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(registration_yield, "STREAM_LENGTH", 30)
     registration_yield._stream.cache_clear()
     for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
-        found = numbers(7, first, rows, builds)
+        found = DrawnBuilds(7, first, rows, builds).numbers
         assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
     registration_yield._stream.cache_clear()
 
