@@ -307,21 +307,14 @@ def _warnings(row: LabRow) -> list[str]:
     ]
 
 
-TABLES = {
-    "success": (
-        "Success: leak test passed at the first attempt, with 95 % Wilson interval; promised by "
-        "registration-yield",
-        ("by", "name", "passed", "tested", "share", "low", "high", "promised", "passed_later"),
-    ),
-    "measured": (
-        "Measured mean with 95 % interval, against predicted",
-        (
-            *("design", "quantity", "count", "mean", "low", "high"),
-            *("predicted", "ratio", "verdict"),
-        ),
-    ),
+TITLES = {
+    "success": "Success: leak test passed at the first attempt, with 95 % Wilson interval; "
+    "promised by registration-yield",
+    "measured": "Measured mean with 95 % interval, against predicted",
 }
-"""Lists of the report: title and the keys that are printed."""
+"""Lists of the report."""
+NOT_PRINTED = ("unit", "model")
+"""Keys of them that are in JSON alone."""
 FITTED = ("stroke_mm", "force_n", "height_mm")
 """Quantities that ``sbafab calibrate`` fits the models to."""
 
@@ -332,18 +325,21 @@ def print_report(report: Report, as_json: bool) -> None:
     if as_json:
         print_json({"schema": REPORT_SCHEMA, **document})
         return
-    for name, (title, keys) in TABLES.items():
-        names = [key.removeprefix("passed_") for key in keys]
-        print_table(title, names, [[_shown(row[key]) for key in keys] for row in document[name]])
+    for name, title in TITLES.items():
+        rows = [{k: v for k, v in row.items() if k not in NOT_PRINTED} for row in document[name]]
+        if rows:
+            names = [key.removeprefix("passed_") for key in rows[0]]
+            print_table(title, names, [[*map(_shown, row.values())] for row in rows])
+            click.echo()
     off: dict[str, list[str]] = {}
     for compared in report.comparisons:
         if compared.verdict == "differs" and compared.quantity in FITTED:
             off.setdefault(compared.design, []).append(compared.quantity)
     for design, quantities in off.items():
-        click.echo(f"\n{design}: sbafab calibrate fits the models to its {', '.join(quantities)}")
+        click.echo(f"{design}: sbafab calibrate fits the models to its {', '.join(quantities)}")
     actuators = "1 actuator" if report.items == 1 else f"{report.items} actuators"
     records = "1 record" if report.records == 1 else f"{report.records} records"
-    print_verdict(f"\nReport on {actuators}, {records}")
+    print_verdict(f"Report on {actuators}, {records}")
 
 
 def _shown(value: str | float | None) -> str:

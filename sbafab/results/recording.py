@@ -253,20 +253,12 @@ def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) 
 def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
     """Return a table with a row each of a device's."""
     cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
-    return csv_text([CSV_COLUMNS, *([each.get(c, "") for c in CSV_COLUMNS] for each in cells)])
+    return csv_text([CSV_COLUMNS, *([each.get(c) for c in CSV_COLUMNS] for each in cells)])
 
 
 def _cells(row: LabRow, design: str) -> dict[str, Any]:
-    cells: dict[str, Any] = {
-        "row": row.number,
-        "recorded": row.recorded,
-        "design": design,
-        "design_sha256": row.design_sha256,
-        "attempt": row.attempt,
-        "corrects": "" if row.corrects is None else f"{row.SIGN}{row.corrects}",
-        "withdrawn": int(row.withdrawn),
-        **row.cells,
-    }
-    if isinstance(row, HistoryEntry):
-        cells["expired"] = int(row.is_expired)
-    return cells
+    head = {name: getattr(row, name) for name in ("recorded", "design_sha256", "attempt")}
+    corrects = None if row.corrects is None else f"{row.SIGN}{row.corrects}"
+    marks = {"row": row.number, "design": design, "corrects": corrects}
+    expired = {"expired": int(row.is_expired)} if isinstance(row, HistoryEntry) else {}
+    return {**head, **marks, "withdrawn": int(row.withdrawn), **row.cells, **expired}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import (
@@ -114,8 +115,7 @@ class LabRow(BaseModel):
     @property
     def stated(self) -> dict[str, Any]:
         """The values by column, without empty ones and those that the file adds."""
-        values = {name: getattr(self, name) for name in columns(type(self))}
-        return {name: value for name, value in values.items() if value not in ("", None, ())}
+        return {name: value for name in columns(type(self)) if (value := getattr(self, name))}
 
     @property
     def cells(self) -> dict[str, Any]:
@@ -127,9 +127,7 @@ class LabRow(BaseModel):
 
     def group(self, name: str) -> dict[str, Any]:
         """Return the stated numbers of a group."""
-        return {
-            column: self.stated[column] for column in self.GROUPS[name] if column in self.stated
-        }
+        return {column: v for column in self.GROUPS[name] if (v := getattr(self, column))}
 
     def as_dict(self) -> dict[str, Any]:
         """Return the row for JSON; units stand in the keys."""
@@ -282,10 +280,11 @@ class HistoryEntry(LabRow):
 Row = TypeVar("Row", bound=LabRow)
 
 
-def columns(kind: type[LabRow]) -> list[str]:
+@cache
+def columns(kind: type[LabRow]) -> tuple[str, ...]:
     """Return the columns of a table of rows, which are the fields that a user states."""
     added = ("id", "recorded", "design_sha256", "corrects", "withdrawn", "attempt")
-    return [name for name in kind.model_fields if name not in added]
+    return tuple(name for name in kind.model_fields if name not in added)
 
 
 def row_of(kind: type[Row], values: Mapping[str, Any], where: str = "") -> Row:

@@ -10,6 +10,7 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from statistics import fmean, stdev
 from typing import Any, Literal
 
@@ -74,7 +75,7 @@ class Success:
         (low, high), share = self.share.interval, self.share.value
         shown = {"by": self.by, "name": self.name, "passed": self.share.good}
         shown |= {"tested": self.share.builds, "share": share, "low": low, "high": high}
-        return {**shown, "passed_later": self.passed_later, "promised": self.promised}
+        return {**shown, "promised": self.promised, "passed_later": self.passed_later}
 
 
 @dataclass(frozen=True)
@@ -217,6 +218,8 @@ def interval_of(values: Sequence[float]) -> tuple[float, float] | None:
 
 RECENT = 20
 """Actuators of the moving share."""
+MOST_DRAWN = 400
+"""Points of a curve; of more actuators every second, third ... is drawn."""
 
 
 def success_svg(records: Sequence[Record], builds: Mapping[str, Build]) -> str:
@@ -228,14 +231,16 @@ def success_svg(records: Sequence[Record], builds: Mapping[str, Build]) -> str:
     passed = [item.passed for item in items(records, builds) if item.first("leak")]
     if not passed:
         raise DesignError("no leak test is recorded yet; record one, such as --leak pass")
-    so_far = [Share(sum(passed[:count]), count) for count in range(1, len(passed) + 1)]
-    x = [float(share.builds) for share in so_far]
-    last = [fmean(passed[count - RECENT : count]) for count in range(RECENT, len(passed) + 1)]
+    totals = [*accumulate(passed)]
+    counts = range(len(passed), 0, -math.ceil(len(passed) / MOST_DRAWN))[::-1]
+    so_far = [Share(totals[count - 1], count) for count in counts]
+    recent = [count for count in counts if count >= RECENT]
+    last = [fmean(passed[count - RECENT : count]) for count in recent]
     curves = [
-        ChartCurve("all so far", x, [share.value for share in so_far], dotted=True),
-        ChartCurve("95 % interval", x, [share.interval[0] for share in so_far], True),
-        ChartCurve("", x, [share.interval[1] for share in so_far], True),
-        ChartCurve(f"last {RECENT}", x[RECENT - 1 :], last),
+        ChartCurve("all so far", counts, [share.value for share in so_far], dotted=True),
+        ChartCurve("95 % interval", counts, [share.interval[0] for share in so_far], True),
+        ChartCurve("", counts, [share.interval[1] for share in so_far], True),
+        ChartCurve(f"last {RECENT}", recent, last),
     ]
     panel = Panel(
         "Leak test passed at the first attempt",

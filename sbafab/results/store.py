@@ -98,14 +98,14 @@ class Lab:
             if build is not None:
                 values = (build.sha256, build.generator, _BUILD.dump_json(build).decode())
                 file.execute("INSERT OR IGNORE INTO design VALUES (?, ?, ?)", values)
-            devices = _Devices(self._contents(file))
+            devices = _Devices(file, self._contents(file), self.clock())
             serials = dict.fromkeys(row.serial for row in rows)
             attempts = {serial: devices.attempt(sha256, serial, is_again) for serial in serials}
-            added = []
-            for row in rows:
-                more = {"design_sha256": sha256, "attempt": attempts[row.serial]}
-                added.append(self._put(file, devices, row.model_copy(update=more)))
-            return added
+            head = {"design_sha256": sha256}
+            return [
+                devices.put(row.model_copy(update={**head, "attempt": attempts[row.serial]}))
+                for row in rows
+            ]
 
     def correct(self, kind: type[Row], number: int, change: Mapping[str, Any]) -> Row:
         """Store a row that repeats row ``number`` of its kind but for what ``change`` states, by
@@ -130,19 +130,7 @@ class Lab:
             row = with_photograph(self.path, row_of(kind, {**old.stated, **change}))
             more = {name: getattr(old, name) for name in ("design_sha256", "attempt")}
             row = row.model_copy(update={**more, "corrects": number})
-            return self._put(file, _Devices(contents), row)
-
-    def _put(self, file: sqlite3.Connection, devices: _Devices, row: Row) -> Row:
-        """Add a row, unless it contradicts another one of its attempt."""
-        if not row.withdrawn:
-            devices.refuse_conflict(row)
-        row = row.model_copy(update={"recorded": self.clock().strftime("%Y-%m-%dT%H:%M:%SZ")})
-        content = row.model_dump_json(exclude={"id", "corrects"}, exclude_defaults=True)
-        statement = f"INSERT INTO {row.NOUN} (corrects, content) VALUES (?, ?)"
-        number = file.execute(statement, (row.corrects, content)).lastrowid
-        row = row.model_copy(update={"id": number})
-        devices.rows[row.serial].append(row)
-        return row
+            return _Devices(file, contents, self.clock()).put(row)
 
     def _contents(self, file: sqlite3.Connection) -> Contents:
         designs = file.execute("SELECT content FROM design ORDER BY rowid")
@@ -244,10 +232,11 @@ def _rows(file: sqlite3.Connection, kind: type[Row]) -> Iterator[Row]:
 
 
 class _Devices:
-    """The rows that stand, by serial."""
+    """The rows that stand in an open file, by serial."""
 
-    def __init__(self, contents: Contents) -> None:
-        self.builds = contents.builds
+    def __init__(self, file: sqlite3.Connection, contents: Contents, now: datetime) -> None:
+        self.file, self.builds = file, contents.builds
+        self.recorded = now.strftime("%Y-%m-%dT%H:%M:%SZ")
         self.rows: dict[str, list[LabRow]] = defaultdict(list)
         for row in (*standing(contents.records), *standing(contents.entries)):
             self.rows[row.serial].append(row)
@@ -271,12 +260,19 @@ class _Devices:
             )
         return max(attempts, default=1) + is_again
 
-    def refuse_conflict(self, row: LabRow) -> None:
-        """Raise DesignError for a row that contradicts or repeats another one."""
-        for stored in self.of(row.design_sha256, row.serial):
+    def put(self, row: Row) -> Row:
+        """Add a row. Raises DesignError for one that contradicts or repeats another one."""
+        for stored in () if row.withdrawn else self.of(row.design_sha256, row.serial):
             is_other = stored.attempt == row.attempt and stored.id != row.corrects
             if type(stored) is type(row) and is_other and (problem := row.conflict(stored)):
                 raise DesignError(problem)
+        row = row.model_copy(update={"recorded": self.recorded})
+        content = row.model_dump_json(exclude={"id", "corrects"}, exclude_defaults=True)
+        statement = f"INSERT INTO {row.NOUN} (corrects, content) VALUES (?, ?)"
+        number = self.file.execute(statement, (row.corrects, content)).lastrowid
+        row = row.model_copy(update={"id": number})
+        self.rows[row.serial].append(row)
+        return row
 
 
 # Photographs: files named by their content, in a folder beside the lab's file.
