@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,12 +27,7 @@ from sbafab.rules.rule import Explanation, Rule
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
 
-# Random numbers: a stream that begins equally for every laminate. Its beginning is cached, as the
-# next laminate reads it again.
-
-
-STREAM_LENGTH = 4_000_000
-"""Numbers of the stream's beginning that are cached: at most 32 MB, allocated as written."""
+# Random numbers: a row a build for each error, two for a shift.
 
 
 class CutContour(NamedTuple):
@@ -61,42 +55,14 @@ def rows_by_error(errors: Iterable[Error]) -> tuple[dict[Error, int], int]:
     return rows, count
 
 
-class _Stream:
-    """The beginning of the numbers of one seed."""
+def random_numbers(seed: int, first: int, rows: int, builds: int) -> Floats:
+    """Return numbers from 0 to 1, a row of ``builds`` each, from the ``first`` of a seed's stream.
 
-    def __init__(self, seed: int) -> None:
-        self.generator = np.random.default_rng(seed)
-        self.numbers = np.empty(STREAM_LENGTH)
-        self.known = 0
-
-    def until(self, last: int) -> Floats:
-        if last > self.known:
-            self.generator.random(out=self.numbers[self.known : last])
-            self.known = last
-        return self.numbers
-
-
-_stream = lru_cache(maxsize=1)(_Stream)
-
-
-class DrawnBuilds(NamedTuple):
-    """Builds drawn at a time: which numbers of the seed's stream, a row of ``builds`` an error."""
-
-    seed: int
-    first: int
-    rows: int
-    builds: int
-
-    @property
-    def numbers(self) -> Floats:
-        """Numbers from 0 to 1, a row each, from the ``first`` of the seed's stream on."""
-        last = self.first + self.rows * self.builds
-        if last <= STREAM_LENGTH:
-            some = _stream(self.seed).until(last)[self.first : last]
-            return some.reshape(self.rows, self.builds)
-        ahead = np.random.PCG64(self.seed)
-        ahead.advance(self.first)
-        return np.random.Generator(ahead).random((self.rows, self.builds))
+    The stream is the same for every laminate.
+    """
+    generator = np.random.PCG64(seed)
+    generator.advance(first)
+    return np.random.Generator(generator).random((rows, builds))
 
 
 # Rows: the width left at margins beyond their limit, as its room and a sum over the errors drawn.
@@ -212,15 +178,6 @@ def _parts(factors: Floats) -> Floats:
 
 
 # Builds that cuts and shifts bring near a limit, whatever the widths.
-#
-# Laminates with the same layers and contours draw the same errors, so the builds near a limit are
-# cached, with some room, for the next laminate.
-
-
-SLACK = 0.01
-"""mm beyond the query that is cached from the second laminate on, for those after it."""
-MOST_CACHED = 40_000
-"""Builds of all queries that are cached, a few MB; if there are more, none are."""
 
 
 class ErrorsQuery(NamedTuple):
@@ -238,21 +195,13 @@ class ErrorsQuery(NamedTuple):
     turning: Indices
     cutting: float
 
-    @property
-    def name(self) -> bytes:
-        """Equal for equal errors."""
-        return b"".join(
-            [np.float64(self.cutting).tobytes(), *(column.tobytes() for column in self[:5])]
-        )
-
 
 class LikelyBuilds(NamedTuple):
     """Builds by the number of the query, in rising order.
 
     ``cuts`` (mm) is the rest after both cuts, ``moves`` are x and y of all shifts together, with
     their signs, and the turn of each line that turns anything, -1 to 1 of its most. ``remaining``
-    is the rest after the cuts less the length of the shifts, the most that any normal loses. A
-    query has no other builds below its ``level``.
+    is the rest after the cuts less the length of the shifts, the most that any normal loses.
     """
 
     query: Indices
@@ -260,44 +209,13 @@ class LikelyBuilds(NamedTuple):
     cuts: Floats
     moves: Floats
     remaining: Floats
-    level: Floats
-
-    def covers(self, need: Floats) -> bool:
-        """Return True if no build below these levels is missing."""
-        return bool((need <= self.level).all())
 
 
-class _Latest:
-    """The latest builds of a query, if any."""
+def likely_builds(numbers: Floats, errors: ErrorsQuery, level: Floats) -> LikelyBuilds:
+    """Return the builds in which cuts and shifts leave less than the ``level`` of a query, mm.
 
-    builds: LikelyBuilds | None = None
-
-
-@lru_cache(maxsize=4)
-def _latest(batch: DrawnBuilds, name: bytes) -> _Latest:
-    del batch, name
-    return _Latest()
-
-
-def likely_builds(batch: DrawnBuilds, errors: ErrorsQuery, need: Floats) -> LikelyBuilds:
-    """All builds in which cuts and shifts leave less than a query needs, and perhaps others."""
-    latest = _latest(batch, errors.name)
-    cached = latest.builds
-    if cached is not None and cached.covers(need):
-        return cached
-    if cached is not None:
-        wide = _builds_below(batch, errors, np.maximum(need + SLACK, cached.level))
-        if len(wide.query) <= MOST_CACHED:
-            latest.builds = wide
-            return wide
-    builds = _builds_below(batch, errors, need)
-    latest.builds = builds if len(builds.query) <= MOST_CACHED else None
-    return builds
-
-
-def _builds_below(batch: DrawnBuilds, errors: ErrorsQuery, level: Floats) -> LikelyBuilds:
-    """The builds below a level: one error after the other is counted, as most decide soon."""
-    numbers = batch.numbers
+    One error after the other is counted, as most decide soon.
+    """
     drawn, count = numbers.ravel(), numbers.shape[1]
     shift = errors.shift
     query, builds, after_cuts = _cut(numbers, errors, level + shift.sum(axis=0))
@@ -328,7 +246,7 @@ def _builds_below(batch: DrawnBuilds, errors: ErrorsQuery, level: Floats) -> Lik
     moves[:2] = shifts[:, some]
     for row, line in enumerate(errors.turning.tolist(), 2):
         moves[row] = 2 * drawn.take(errors.first[2 + line].take(query) * count + builds) - 1
-    return LikelyBuilds(query, builds, after_cuts.take(some), moves, remaining.take(some), level)
+    return LikelyBuilds(query, builds, after_cuts.take(some), moves, remaining.take(some))
 
 
 def _cut(numbers: Floats, errors: ErrorsQuery, level: Floats) -> tuple[Indices, Indices, Floats]:
@@ -438,9 +356,12 @@ class RandomBuilds:
         self.factors = np.vstack([rows.normal, levers, rows.room]).T.copy()
         """Of each row, a column for each line of ``_Drawn.moves``."""
 
-    def short(self, batch: DrawnBuilds) -> tuple[Indices, Indices]:
-        """Return the numbers of queries that come short, and the builds in which they do."""
-        drawn = self._drawn(batch)
+    def short(self, numbers: Floats) -> tuple[Indices, Indices]:
+        """Return the numbers of queries that come short, and the builds in which they do.
+
+        ``numbers`` are from 0 to 1, rows of errors by builds.
+        """
+        drawn = self._drawn(numbers)
         if not len(drawn.query):
             return drawn.query, drawn.build
         least = self._least(drawn)
@@ -448,17 +369,17 @@ class RandomBuilds:
         is_short = least < -TOLERANCE
         for near in picked(abs(least + TOLERANCE) < NEAR).tolist():
             place = int(drawn.query[near]), int(drawn.build[near])
-            is_short[near] = self._is_short(batch.numbers, *place)
+            is_short[near] = self._is_short(numbers, *place)
         return drawn.query[is_short], drawn.build[is_short]
 
-    def _drawn(self, batch: DrawnBuilds) -> _Drawn:
+    def _drawn(self, numbers: Floats) -> _Drawn:
         """Builds that the bounds do not decide, sorted by kind."""
-        likely = likely_builds(batch, self.errors, self.need)
+        likely = likely_builds(numbers, self.errors, self.need)
         query, turns = likely.query, likely.moves[2:]
         low, high = self.low.take(query, axis=1), self.high.take(query, axis=1)
         remaining = likely.remaining + self.least.take(query)
         remaining += np.minimum(low * turns, high * turns).sum(axis=0)
-        chosen = picked((likely.remaining < self.need.take(query)) & (remaining < SURE))
+        chosen = picked(remaining < SURE)
         query = query.take(chosen)
         kind = self.kind.take(query)
         moves = np.vstack([likely.moves.take(chosen, axis=1), np.ones(len(chosen))])
@@ -718,8 +639,8 @@ def _counted(
     while drawn_builds < total:
         pause()
         builds = min(BATCH, total - drawn_builds)
-        drawn = DrawnBuilds(seed, drawn_builds * queries.drawn, queries.drawn, builds)
-        number, bad = of_builds.short(drawn)
+        first = drawn_builds * queries.drawn
+        number, bad = of_builds.short(random_numbers(seed, first, queries.drawn, builds))
         whole += _different(bad, builds)
         for quantity in QUANTITIES:
             quantities[quantity] += _different(bad[is_of[quantity][of_builds.kind[number]]], builds)

@@ -15,7 +15,7 @@ from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
 from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
 from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, freedoms, margins, registration_yield, tube_fit, voids
+from sbafab.rules import boundary, freedoms, margins, tube_fit, voids
 from sbafab.rules.boundary import facing_films, outward_reach
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -24,12 +24,13 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import (
     CutContour,
-    DrawnBuilds,
     ErrorsQuery,
     MarginRows,
     RandomBuilds,
     RowKind,
     RowsQuery,
+    likely_builds,
+    random_numbers,
     rows_by_error,
     rows_of,
     simulate,
@@ -74,18 +75,14 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     errors = asked.kinds[0].errors
     first, count = rows_by_error(errors)
     # Two interfaces, of which the second one's errors are drawn after the first one's.
-    batch = DrawnBuilds(5, 0, 2 * count, BUILDS)
-    drawn = batch.numbers
+    drawn = random_numbers(5, 0, 2 * count, BUILDS)
     every = [
         RowsQuery(kind, [count * interface + first[error] for error in errors])
         for kind in (0, 1)
         for interface in (0, 1)
     ]
     good = np.ones((4, BUILDS), dtype=bool)
-    good[RandomBuilds(asked, every, 0.1).short(batch)] = False
-    again = np.ones((4, BUILDS), dtype=bool)
-    again[RandomBuilds(asked, every, 0.1).short(batch)] = False
-    assert (again == good).all()
+    good[RandomBuilds(asked, every, 0.1).short(drawn)] = False
     assert good[2:].all()
     room, levers = asked.room[:number], asked.levers[2, :number]
     for interface in (0, 1):
@@ -105,14 +102,11 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
     assert 0 < good[:2].sum() < 2 * BUILDS
 
 
-def test_numbers_are_those_of_one_stream_kept_or_not(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_numbers_are_those_of_one_stream() -> None:
     plain = np.random.default_rng(7).random(60)
-    monkeypatch.setattr(registration_yield, "STREAM_LENGTH", 30)
-    registration_yield._stream.cache_clear()
     for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
-        found = DrawnBuilds(7, first, rows, builds).numbers
+        found = random_numbers(7, first, rows, builds)
         assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
-    registration_yield._stream.cache_clear()
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
@@ -135,7 +129,7 @@ def test_a_laminate_without_margins_has_neither_forms_nor_rows() -> None:
     forms = linear_forms([], freedoms.Freedoms({}))
     asked = rows_of(forms, [], Limits())
     assert (forms.loss.shape, asked.room.shape, len(asked.kinds)) == ((0,), (0,), 0)
-    number, builds = RandomBuilds(asked, [], 0.1).short(DrawnBuilds(5, 0, 0, BUILDS))
+    number, builds = RandomBuilds(asked, [], 0.1).short(np.empty((0, BUILDS)))
     assert len(number) == len(builds) == 0
 
 
@@ -188,35 +182,8 @@ def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
                 assert found == plain
 
 
-def test_builds_found_for_another_laminate_serve_this_one(
-    monkeypatch: pytest.MonkeyPatch, good: Good
-) -> None:
-    laminate = good("1dof-5mm", "stack.balloons=3")
-    hand = replace(Tolerances(), placement=0.1, turn=1.0)
-    # Each asks for more, or for less, than what is kept of the one before.
-    limits = [
-        replace(Limits(), tolerances=hand, yield_builds=600, worst_bond_width=least)
-        for least in (0.4, 0.5, 0.3, 0.51, 0.6)
-    ]
-    found = []
-    for own in limits:
-        registration_yield._latest.cache_clear()
-        found.append(simulate(laminate, own))
-    assert len({one.whole.good for one in found}) == 5
-    for most, slack in (
-        (registration_yield.MOST_CACHED, registration_yield.SLACK),
-        (0, 0.02),
-        (300, 0.5),
-    ):
-        monkeypatch.setattr(registration_yield, "MOST_CACHED", most)
-        monkeypatch.setattr(registration_yield, "SLACK", slack)
-        registration_yield._latest.cache_clear()
-        assert [simulate(laminate, own) for own in limits] == found
-
-
 @pytest.mark.parametrize("need", [-0.4, -0.1, 0.0])
 def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
-    batch = DrawnBuilds(3, 40, 8, 200)
     first = np.array([[0, 1], [1, 0], [2, 4], [4, 2], [6, 7]])
     errors = ErrorsQuery(
         first,
@@ -226,8 +193,8 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
         turning=np.array([2]),
         cutting=0.1,
     )
-    drawn = batch.numbers
-    likely = registration_yield._builds_below(batch, errors, np.full(2, need))
+    drawn = random_numbers(3, 40, 8, 200)
+    likely = likely_builds(drawn, errors, np.full(2, need))
     told = zip(likely.query.tolist(), likely.build.tolist(), strict=True)
     found = dict(zip(told, likely.remaining, strict=True))
     places = {one: place for place, one in enumerate(found)}
