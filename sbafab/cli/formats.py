@@ -29,7 +29,6 @@ from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.schedule_files import PRESS_SCHEMA
-from sbafab.pressing.work_plan import TaskName
 from sbafab.reports.assembly_prediction import (
     AssemblyFigure,
     AssemblyPrediction,
@@ -524,20 +523,6 @@ def _batch() -> dict[str, Any]:
     pattern = table(pattern=TEXT, each=COUNT, cycles=array(COUNT))
     place = {**array(number()), "minItems": 2, "maxItems": 2}
     times = ("press_minutes", "hands_minutes", "total_minutes")
-    count_or_null = {**COUNT, "type": ["integer", "null"]}
-    perhaps = {"type": ["integer", "null"], "minimum": 1}
-    entry = table(
-        day=COUNT,
-        start_minutes={**number(), "description": "after the start of the shift"},
-        minutes=number(),
-        task={"enum": [*get_args(TaskName)]},
-        cycle=perhaps,
-        step=perhaps,
-        copies={**array(COUNT), "minItems": 2, "maxItems": 2, "description": "first and last"},
-        technician={**perhaps, "description": "null where no hands are needed"},
-        press=perhaps,
-        base_plate=perhaps,
-    )
     return table(
         copies=COUNT,
         at_once=COUNT,
@@ -546,10 +531,6 @@ def _batch() -> dict[str, Any]:
         serials={**array(TEXT), "description": "of each copy: cycle and place"},
         places_mm=array(place),
         **{name: number("null") for name in times},
-        a_day_one_by_one=count_or_null,
-        a_day_in_batches=count_or_null,
-        shift_minutes=number(),
-        plan={**array(entry), "description": "empty where no minutes are stated"},
         patterns=array(pattern),
     )
 

@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
+from fnmatch import fnmatchcase
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -33,10 +34,15 @@ _SHEETS = (
     "belongs to registered sheets, which were removed; delete it, and register the films by "
     'registration.method = "ears" or "channel-pin"'
 )
+_PLAN = "was removed: batches are no longer planned by working day; delete it"
 REMOVED: Mapping[str, str] = {
     "panel": _SHEETS,
     "registration.experimental": _SHEETS,
     'registration.method = "sheet"': _SHEETS,
+    "order.shift_hours": "was removed; order.at_once says how many copies a press cycle takes",
+    "order.technicians": _PLAN,
+    "order.presses": _PLAN,
+    "order.base_plates": _PLAN,
 }
 """Tables, keys and values of earlier design files, each with what was removed and what to do."""
 
@@ -74,8 +80,9 @@ def sentence(
     where = [_plain(part) for part in first["loc"] if not _is_alternative(part)]
     field = (prefix + ".".join(where)).rstrip(".")
     for name in (field, where[0] if where else "", f'{field} = "{first["input"]}"'):
-        if name in REMOVED:
-            return f"{name} {REMOVED[name]}"
+        for key, words in REMOVED.items():
+            if fnmatchcase(name, key):
+                return f"{name} {words}"
     count = len({tuple(problem["loc"][:2]) for problem in problems}) - 1
     more = f" (and {count} more problem{'s' if count > 1 else ''} like it)" if count > 0 else ""
     if first["type"] == "extra_forbidden":

@@ -26,7 +26,7 @@ from sbafab.design.sections import (
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE, Film
 
 LATER: Mapping[str, Sequence[str]] = {
-    "order": ("success_rate", "certainty", "shift_hours"),
+    "order": ("success_rate", "certainty"),
     "laser": ("hold_tpe", "hold_ptfe"),
     "acceptance": ("safety_factor",),
 }

@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 
 class Order(Section):
-    """How many, for whom, and how long a working day is."""
+    """How many, for whom, and how many at once."""
 
     copies: int = Field(default=1, ge=1, le=MOST)
     """How many of the actuator are made; more where order.good takes more."""
@@ -51,24 +51,18 @@ class Order(Section):
     (ours). A part that is lost or torn at the press else costs a trip to the laser."""
     spares: int = Field(default=1, ge=0, le=100)
     """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
-    shift_hours: float = Field(default=8.0, ge=1, le=24)
-    """A working day of one person at one press: no press cycle takes more copies than fit in it."""
+    at_once: int | None = Field(default=None, ge=1, le=MOST)
+    """Most copies in one press cycle, as far as the heated area has room for them; by default as
+    many as one person lays up and presses in 8 hours (ours)."""
     batch: str | None = Field(default=None, max_length=12)
     """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". By default none; take
     one where a design is made again, as records know an actuator by design and serial."""
-    technicians: int | None = Field(default=None, ge=1, le=20)
-    """How many people work on the batch at once; by default 1."""
-    presses: int | None = Field(default=None, ge=1, le=20)
-    """Heat presses of the size in [press]; by default 1."""
-    base_plates: int | None = Field(default=None, ge=1, le=40)
-    """Base plates with the holes of all places; by default 1. With more, the next lay-up need not
-    wait until a plate has cooled."""
     tray: bool | None = None
     """Whether a tray plan (tray.pdf, 1:1) and a page of counts for a phone (tray.html) are written;
     by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
     """Hours in which the adhesive of the tubes cures, by its package; by default those of
-    the kit's adhesive, else the plan takes 24 (ours)."""
+    the kit's adhesive, else the traveller's times take 24 (ours)."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)
@@ -450,7 +444,7 @@ class Press(Section):
     pad, makes 63 % of its way; measured once at the bench."""
     cool_minutes: float | None = Field(default=None, gt=0, le=600)
     """Minutes in which the base plate cools beside the press until it can be touched; measured once
-    at the bench. By default the plan of a batch takes a first-order estimate."""
+    at the bench. By default the traveller's times take a first-order estimate."""
 
 
 class Acceptance(Section):

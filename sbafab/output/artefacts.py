@@ -48,9 +48,8 @@ from sbafab.output.checked import (
 )
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
-from sbafab.pressing.cycles import design_runs
+from sbafab.pressing.cycles import batch_json, design_runs
 from sbafab.pressing.schedule_files import PRESS_SCHEMA, press_csv, press_json
-from sbafab.pressing.work_plan import batch_json, plan_csv
 from sbafab.process import Progress
 from sbafab.rules.finding import Finding
 from sbafab.simulators.simulator import NAMES as SIMULATORS
@@ -223,19 +222,6 @@ def _press_json(folder: DesignFolder) -> str:
 def _press_csv(folder: DesignFolder) -> str:
     assert folder.plan.pressing is not None
     return press_csv(folder.plan.pressing)
-
-
-def _plan_csv(folder: DesignFolder) -> str | None:
-    assert folder.plan.pressing is not None
-    return plan_csv(folder.design, folder.laminate, folder.plan.pressing)
-
-
-def _plan_svg(folder: DesignFolder) -> str | None:
-    # Only a batch has a chart of its days.
-    from sbafab.reports.plan_svg import plan_svg
-
-    assert folder.plan.pressing is not None
-    return plan_svg(folder.design, folder.laminate, folder.plan.pressing)
 
 
 def _underlay(folder: DesignFolder) -> bytes | None:
@@ -499,10 +485,6 @@ ARTEFACTS: tuple[Artefact, ...] = (
         PRESS_SCHEMA,
     ),
     Artefact("press.csv", "press", "the press schedule as a table", _press_csv),
-    Artefact(
-        "plan.csv", "press", "of a batch: who does what when, with press and base plate", _plan_csv
-    ),
-    Artefact("plan.svg", "press", "of a batch: the same, drawn a day a strip", _plan_svg),
     Artefact("tray.pdf", "press", "of a batch: a place for every part, 1:1", _tray_pdf),
     Artefact("tray.html", "press", "of a batch: patterns and counts for a phone", _tray_html),
     Artefact("underlay.pdf", "press", "guides for placing parts by hand, 1:1", _underlay),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from sbafab.design.records import Design
 from sbafab.design.sections import named_film
@@ -14,6 +15,9 @@ from sbafab.pressing.schedule import HANDLING_MINUTES, PressSettings, Schedule
 
 APART = 5.0
 """Gap in mm between two copies in the press, ours: films flow, and hands need room."""
+CYCLE_HOURS = 8.0
+"""Hours of pressing and handling that a cycle takes at most, if the order does not say how many
+copies it takes: ours."""
 ROUNDING = 1e-9
 
 
@@ -42,11 +46,6 @@ class Runs:
     @property
     def count(self) -> int:
         return len(self.cycles)
-
-    def copies_in(self, cycle: int) -> tuple[int, int]:
-        """Return the first and the last copy of a cycle; all count from 1."""
-        first = (cycle - 1) * self.together + 1
-        return first, first + self.cycles[cycle - 1] - 1
 
     def position(self, copy: int) -> tuple[int, int]:
         """Return the cycle and the place in which a copy is pressed; all count from 1."""
@@ -116,19 +115,18 @@ def runs_of(
 
 
 def design_runs(design: Design, laminate: Laminate, copies: int | None = None) -> Runs:
-    """Return the runs of ``copies``, by default the order; no cycle is longer than a shift."""
-    press = design.press
+    """Return the runs of ``copies``, by default the order."""
+    press, order = design.press, design.order
     return runs_of(
         laminate,
-        design.order.quantity if copies is None else copies,
+        order.quantity if copies is None else copies,
         (press.platen_width, press.platen_length),
-        _copies_a_shift(design, laminate),
+        _copies_by_hours(design, laminate) if order.at_once is None else order.at_once,
     )
 
 
-def _copies_a_shift(design: Design, laminate: Laminate) -> int:
-    """Return the number of copies that one person makes in a cycle of one working day, at least
-    one.
+def _copies_by_hours(design: Design, laminate: Laminate) -> int:
+    """Return the number of copies that one person makes in a cycle of CYCLE_HOURS, at least one.
 
     Minutes that are not stated for the film count as none: the press may then take longer.
     """
@@ -143,7 +141,7 @@ def _copies_a_shift(design: Design, laminate: Laminate) -> int:
     pressing = 0.0
     if not films_without_minutes(laminate, settings.minutes_for):
         pressing = sum(settings.minutes(part.name) for part in assembly(laminate))
-    handling = 60 * design.order.shift_hours - pressing
+    handling = 60 * CYCLE_HOURS - pressing
     return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))
 
 
@@ -194,22 +192,33 @@ def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
     )
 
 
-def copies_a_day(plan: Schedule, together: int, minutes: float) -> int | None:
-    """Return the number of actuators that one person makes in a shift with one press, ``together``
-    at once.
-
-    None where the minutes in the press or by hand are not stated.
-    """
-    if plan.total_press_minutes is None or not plan.is_timed:
-        return None
-    copies = 0
-    while True:
-        cycles = math.ceil((copies + 1) / together)
-        if (copies + 1) * HANDLING_MINUTES + cycles * plan.total_press_minutes > minutes:
-            return copies
-        copies += 1
-
-
 def most_together(laminate: Laminate, platen: tuple[float, float]) -> int:
     """Return the largest number of copies in one cycle."""
     return runs_of(laminate, 10_000, platen).together
+
+
+def batch_json(design: Design, laminate: Laminate, schedule: Schedule) -> dict[str, Any]:
+    """Return the entry of ``press.json`` for a batch of several copies."""
+    runs = design_runs(design, laminate)
+    times = batch_times(runs, schedule)
+    return {
+        "copies": runs.copies,
+        "at_once": runs.together,
+        "at_once_at_most": most_together(
+            laminate, (design.press.platen_width, design.press.platen_length)
+        ),
+        "cycles": list(runs.cycles),
+        "serials": [serial(runs, n + 1, design.order.batch) for n in range(runs.copies)],
+        "places_mm": [list(place) for place in runs.places],
+        "press_minutes": times.press,
+        "hands_minutes": times.hands,
+        "total_minutes": times.total,
+        "patterns": [
+            {
+                "pattern": pattern,
+                "each": len(layers),
+                "cycles": [len(layers) * count for count in runs.cycles],
+            }
+            for pattern, layers in laminate.patterns.items()
+        ],
+    }

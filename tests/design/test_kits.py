@@ -20,7 +20,8 @@ from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules
 from sbafab.errors import DesignError
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.pressing.work_plan import plan_times
+from sbafab.reports.traveller.bill import waiting
+from sbafab.reports.traveller.job import Job, Work
 
 SECTIONS = {
     "films": Films(),
@@ -108,7 +109,7 @@ def test_a_design_that_names_no_kit_keeps_its_values_and_its_hash() -> None:
     del table["registration"]["plate_made_by"], table["press"]["underlay_thickness"]
     table["registration"]["pin_error"] = 0.004
     # And those that came with orders of good copies, and holding film down.
-    for key in ("success_rate", "certainty", "shift_hours", "spare_share"):
+    for key in ("success_rate", "certainty", "spare_share"):
         del table["order"][key]
     table["order"]["spares"] = 2  # the default then
     del table["laser"]["hold_tpe"], table["laser"]["hold_ptfe"]
@@ -153,7 +154,7 @@ def test_a_tube_of_another_size_does_not_keep_the_name_of_the_kits(lab: Path) ->
         assert tube_name(load_design("1dof-5mm", changes)) == name
 
 
-def test_the_plan_of_a_batch_takes_the_cure_of_the_kits_adhesive(lab: Path) -> None:
+def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
     hours = 'cure_hours = { value = 6, source = "its package" }'
     lab.write_text(lab.read_text().replace('use = "a small drop', f'{hours}\nuse = "a small drop'))
     for changes, cure in (
@@ -161,10 +162,11 @@ def test_the_plan_of_a_batch_takes_the_cure_of_the_kits_adhesive(lab: Path) -> N
         ([f"kit={lab}"], 6),
         ([f"kit={lab}", "order.cure_hours=2"], 2),
     ):
-        design = load_design("1dof-5mm", ["order.copies=4", *changes])
+        design = load_design("1dof-5mm", changes)
         laminate = build(design)
-        planned = schedule(laminate, press_settings(design), (4,))
-        assert plan_times(design, laminate, planned).cure == 60 * cure
+        planned = schedule(laminate, press_settings(design))
+        work = Work(design, laminate, planned, (), Job("0" * 64, "sbafab 1"))
+        assert waiting(work).cure == 60 * cure
 
 
 def test_another_kit_takes_the_place_of_the_first_one(lab: Path) -> None:

@@ -68,7 +68,8 @@ def test_an_order_of_good_ones_says_how_many_are_made() -> None:
         ),
         (["order.good=990"], "takes more than 1000 builds"),
         (["order.certainty=1"], "order.certainty = 1.* must be less than 1"),
-        (["order.shift_hours=0.5"], "order.shift_hours = 0.5 must be at least 1"),
+        (["order.at_once=0"], "order.at_once = 0 must be at least 1"),
+        (["order.technicians=2"], "^order.technicians was removed: .* delete it$"),
     ],
 )
 def test_orders_that_cannot_be_are_refused(changes: list[str], words: str) -> None:
@@ -107,7 +108,7 @@ def test_only_an_order_that_is_asked_for_makes_another_hash() -> None:
     others = [
         *(["order.spares=2"], ["order.spares=2", "order.spare_share=0.06"]),
         *(["order.spare_share=0.06"], ["order.good=20"], ["order.good=20", "order.certainty=0.9"]),
-        *(["laser.hold_tpe=vacuum"], ["order.shift_hours=7"]),
+        *(["laser.hold_tpe=vacuum"], ["order.at_once=7"]),
     ]
     hashes = {design_sha256(load_design("1dof-5mm", changes)) for changes in others}
     assert len(hashes | {usual}) == len(others) + 1

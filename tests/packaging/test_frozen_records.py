@@ -13,7 +13,6 @@ STATES = {
     "models/stack.py": {"Motion"},
     "models/stack_batch.py": {"BatchMotion"},
     "output/artefacts.py": {"DesignFolder"},
-    "pressing/work_plan.py": {"_Bookings"},
     "rules/voids.py": {"VoidGraph"},
     "studio/app.py": {"Studio"},
     "studio/model.py": {"AnswerShapes"},

@@ -11,13 +11,13 @@ from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     Runs,
     are_apart,
+    batch_json,
     batch_times,
-    copies_a_day,
+    design_runs,
     press_runs,
     runs_of,
 )
 from sbafab.pressing.schedule import PressSettings, schedule
-from sbafab.pressing.work_plan import batch_json
 
 INCH = 25.4
 
@@ -67,10 +67,6 @@ def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
     assert plan.total_press_minutes == 45
     times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
     assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
-    # 480 min: 4 x 105 fit and 5 x 105 do not; 45 + 7 x 60 = 465 fits and 45 + 8 x 60 does not.
-    assert (copies_a_day(plan, 1, 480), copies_a_day(plan, 12, 480)) == (4, 7)
-    # Two cycles of 4: 90 + 60 n.
-    assert copies_a_day(plan, 4, 480) == 6
 
 
 def test_one_plate_has_every_hole_of_every_place() -> None:
@@ -118,11 +114,20 @@ def test_all_laminates_of_a_cycle_share_the_force() -> None:
     assert twelve.steps[-1].film_kpa < one.steps[-1].film_kpa
 
 
+def test_a_cycle_takes_what_one_person_makes_in_eight_hours_or_what_is_ordered() -> None:
+    # 45 + 7 x 60 = 465 min fit in 480, and 45 + 8 x 60 do not; ten have room on the plate.
+    for most, cycles in (
+        ("", (7, 7, 6)),
+        ("order.at_once=10", (10, 10)),
+        ("order.at_once=3", (3,) * 6 + (2,)),
+    ):
+        changes = [*filter(None, [most]), "stack.balloons=2", "order.copies=20"]
+        design = load_design("1dof-5mm", changes)
+        assert design_runs(design, build(design)).cycles == cycles
+
+
 def test_patterns_are_counted_a_cycle() -> None:
-    # 45 min in the press and 60 by hand a copy: three fit in 225 min, and four do not.
-    design = load_design(
-        "1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.shift_hours=3.75"]
-    )
+    design = load_design("1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.at_once=3"])
     column = build(design)
     said = batch_json(design, column, schedule(column, PressSettings()))
     assert said["cycles"] == [3, 2]

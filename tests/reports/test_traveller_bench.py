@@ -484,9 +484,7 @@ def test_tubes_and_leaks_are_those_of_every_copy() -> None:
 
 
 def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
-    design, laminate = built(
-        "1dof-5mm", "stack.balloons=1", "order.copies=90", "order.shift_hours=24"
-    )
+    design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=90", "order.at_once=90")
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf", copies=90)
     work = Work(design, laminate, plan, [], job)

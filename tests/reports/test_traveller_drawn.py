@@ -124,7 +124,7 @@ def test_the_papers_actuator_is_not_on_other_pages(sheet_files: Any) -> None:
     assert "faced up in the press" not in folded
     assert "balloons of 5 mm" not in folded
     assert "Handling________ min" in folded
-    assert "Total, one actuator________ days" in folded
+    assert "Total, one actuator________ h" in folded
     # From the mouth at 24 to 12, where the seams' corners begin to be round.
     assert "Push the tube in between them, up to 5 mm deep, the inlet's length in" in folded
     assert "the channel runs straight for 12 mm" in folded

@@ -19,7 +19,6 @@ from sbafab.laminate.films import Film
 from sbafab.models.formulas import sizes
 from sbafab.pressing.cycles import Runs
 from sbafab.pressing.schedule import HANDLING_MINUTES, joined_words
-from sbafab.pressing.work_plan import plan_times
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import bench, bill, process, units
 from sbafab.reports.traveller.bench import Tool
@@ -309,7 +308,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
             f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
         )
         rows.append(bill.Time(f"Making {design.name}", units.minutes(whole), made_of))
-        each = plan_times(design.work.design, design.work.laminate, plan)
+        each = bill.waiting(design.work)
         waited += runs.count * len(plan.steps) * (each.warm + each.cool)
         cure = max(cure, each.cure)
     laser = units.minutes(bill.laser_minutes(job.works[0].work))
@@ -321,7 +320,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
 
 
 def _total_time(job: AssemblyJob, worked: float | None, cure: float) -> bill.Time:
-    """Return the days until all actuators are tested, and what comes after."""
+    """Return the hours until all actuators can be tested, and what comes after."""
     hours = units.hours(None) if worked is None else f"{worked / 60:.1f} h"
     joints = sum(placed.part.on is not None for placed in job.assembled.parts)
     basis = (
@@ -329,11 +328,8 @@ def _total_time(job: AssemblyJob, worked: float | None, cure: float) -> bill.Tim
         f"then the tests; then {units.count(joints, 'joint')}, each cured as its package says "
         "before the next"
     )
-    shift = 60 * job.works[0].work.design.order.shift_hours
-    days = units.BLANK
-    if worked is not None:
-        days = f"{math.ceil(worked / shift) + max(1, math.ceil(cure / bill.DAY))}"
-    return bill.Time("Total, without joining", f"{days} days", basis)
+    took = units.hours(None) if worked is None else f"{(worked + cure) / 60:.1f} h"
+    return bill.Time("Total, without joining", took, basis)
 
 
 # Joining, part by part.

@@ -15,7 +15,6 @@ from sbafab.pressing.schedule import (
     Step,
     joined_words,
 )
-from sbafab.pressing.work_plan import shop_of
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
 
@@ -146,7 +145,6 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
     laminate, plan = work.laminate, work.schedule
     if not plan.steps:
         return []
-    shop = shop_of(work.design)
     first = plan.steps[0]
     thick = {item.part: item for item in first.build_up}
     size = units.size(*first.platen_mm)
@@ -162,15 +160,15 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
     has_no_tpe = all(layer.film.material != FIRST[0] for layer in laminate.layers)
     return [
         *_pin_items(
-            laminate.pins * work.runs.together * shop.plates,
+            laminate.pins * work.runs.together,
             plan,
             work.design.registration.pin_standard,
         ),
         (
             "Base plate",
             f"{plate.material}, {units.millimetres(plate.thickness_mm)}, {size}{holes}",
-            str(shop.plates),
-            shop.plates,
+            "1",
+            1,
         ),
         (
             RELEASE_FILM,
@@ -184,8 +182,8 @@ def items(work: Work) -> list[tuple[str, str, str, int]]:
             "Press pad",
             f"{pad.material}, {units.millimetres(pad.thickness_mm)}{piled}, {size}, for "
             f"{first.temperature_c:g} °C in continuous use (our advice; the paper names none)",
-            str(sheets * shop.presses),
-            sheets * shop.presses,
+            str(sheets),
+            sheets,
         ),
     ]
 

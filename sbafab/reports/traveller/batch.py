@@ -1,45 +1,26 @@
-"""Several copies on one traveller: the press cycles by day, the plate's places, serials."""
+"""Several copies on one traveller: press cycles, the plate's places, counts and serials."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sbafab.cutting.fixture import whole_plate
-from sbafab.design.identity import cure_hours
 from sbafab.geometry.region import coord
-from sbafab.pressing.cycles import Runs, batch_times, cycle_name, most_together, serial
-from sbafab.pressing.work_plan import (
-    CONNECT_MINUTES,
-    CUT_SHARE,
-    OPEN_SHARE,
-    SORT_SHARE,
-    TUBES_SHARE,
-    UNPIN_SHARE,
-    PlanEntry,
-    clock,
-    plan_times,
-    serials,
-    shop_of,
-    work_plan,
+from sbafab.pressing.cycles import (
+    CYCLE_HOURS,
+    Runs,
+    batch_times,
+    cycle_name,
+    most_together,
+    serial,
 )
 from sbafab.reports import drawing as draw
-from sbafab.reports.plan_svg import WIDTH, day_strips, legend
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
 """mm of the page that the platen takes."""
-MOST_DAYS = 15
-"""Days whose charts are drawn on the page; plan.svg has them all."""
-
-
-PAUSES = (
-    "The work may pause between any two rows, and after each laminate of a row of cutting, "
-    "sorting, tubes or tests. It may not pause from the first layer of a step until the press is "
-    "opened: loose films move. Only cooling and curing go on after the shift."
-)
 
 
 SORTING = (
@@ -70,32 +51,12 @@ class CopyRow:
 
 
 @dataclass(frozen=True)
-class PlanRow:
-    """Work that is done in one go; ``day`` and ``span`` stand beside the first row of a day."""
-
-    day: int
-    span: int
-    start: str
-    end: str
-    who: str
-    work: str
-    laminates: str
-    minutes: str
-
-
-@dataclass(frozen=True)
 class BatchPage:
     """The section on a batch. Cycles of one size share a column of the counts."""
 
-    at_once: int
-    cycles: int
     summary: str
     why: str
     picture: str
-    charts: tuple[str, ...]
-    plan: tuple[PlanRow, ...]
-    plan_basis: str
-    pauses: str
     identity: tuple[Action, ...]
     sorting: str
     cycle_names: tuple[str, ...]
@@ -108,24 +69,11 @@ def batch_page(work: Work) -> BatchPage | None:
     runs = work.runs
     if runs.copies == 1:
         return None
-    lesser = (
-        " A smaller last cycle shares the same force: its films get somewhat more pressure."
-        if len(set(runs.cycles)) > 1
-        else ""
-    )
     sizes = tuple(dict.fromkeys(runs.cycles))
-    entries = work_plan(work.design, work.laminate, work.schedule, work.job.copies)
     return BatchPage(
-        runs.together,
-        runs.count,
         _summary(work, runs),
-        "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
-        f"say how many it pressed at once).{lesser}",
+        _cycles_basis(work, runs),
         _picture(work, runs),
-        tuple(_charts(work, entries)),
-        _plan(work, entries),
-        _plan_basis(work),
-        PAUSES,
         _identity(work),
         SORTING if work.design.order.tray is not False else "",
         tuple(cycles_of(runs, size) for size in sizes),
@@ -161,103 +109,29 @@ def _summary(work: Work, runs: Runs) -> str:
     )
 
 
-def _charts(work: Work, entries: Sequence[PlanEntry]) -> Iterator[str]:
-    """Yield a chart of each day; none for a plan of more days than a reader turns pages for."""
-    days = max((entry.day for entry in entries), default=0)
-    if not entries or days > MOST_DAYS:
-        return
-    strips = [*day_strips(entries, shop_of(work.design))]
-    for day, height, elements in strips:
-        room = 4.0 if day == strips[-1][0] else 0.0
-        words = f"day {day}: who and what is busy when"
-        picture = Picture(f"plan-day-{day}", WIDTH, height + room, words)
-        picture.add(*elements)
-        if room:
-            picture.add(*legend(entries, (1.0, height + 0.5)))
-        yield picture.svg()
-
-
-def _plan(work: Work, entries: Sequence[PlanEntry]) -> tuple[PlanRow, ...]:
-    """Return the work of every day that takes hands, in its order."""
-    hands = [entry for entry in entries if entry.technician]
-    closings = {(e.cycle, e.step): e for e in entries if e.task == "press"}
-    days = [entry.day for entry in hands]
-    return tuple(
-        PlanRow(
-            entry.day,
-            days.count(entry.day) if number == days.index(entry.day) else 0,
-            clock(entry.start),
-            clock(entry.end),
-            str(entry.technician),
-            _task(work, entry, closings.get((entry.cycle, entry.step))),
-            serials(work.runs, entry.copies, work.design.order.batch),
-            f"{entry.minutes:.0f}",
+def _cycles_basis(work: Work, runs: Runs) -> str:
+    """Return why so many copies share a cycle, and where the work may pause."""
+    sentences = [
+        "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
+        "say how many it pressed at once)."
+    ]
+    if len(set(runs.cycles)) > 1:
+        sentences.append(
+            "A smaller last cycle shares the same force: its films get somewhat more pressure."
         )
-        for number, entry in enumerate(hands)
+    room = most_together(work.laminate, _platen(work))
+    if runs.count > 1 and runs.together < room:
+        most = work.design.order.at_once
+        limit = f"one person makes in {CYCLE_HOURS:g} hours" if most is None else "ordered"
+        sentences.append(f"The plate has room for {room}; a cycle takes no more than {limit}.")
+    sentences.append(
+        "Do not pause from the first layer of a step until the press is opened: loose films move."
     )
-
-
-def _task(work: Work, entry: PlanEntry, closing: PlanEntry | None) -> str:
-    """Return what a row of the plan is, with press and plate where there are several."""
-    shop = shop_of(work.design)
-    plate = f" {entry.plate}" if shop.plates > 1 else ""
-    press = f" {closing.press}" if closing is not None and shop.presses > 1 else ""
-    trim = "trim, " if work.laminate.registration == "ears" else ""
-    words = {
-        "cut": "Cut: this share of all sheets",
-        "sort": "Wipe and sort the parts: this share",
-        "lay": f"lay up on plate{plate}, close press{press}",
-        "open": f"open press{press}, plate{plate} out to cool",
-        "unpin": f"take down from plate{plate}, each to its place in the tray",
-        "tubes": f"{trim}fit the tubes",
-        "test": "leak and proof tests",
-    }[entry.task]
-    step = f", step {entry.step}" if entry.step else ""
-    return f"{cycle_name(entry.cycle)}{step}: {words}" if entry.cycle else words
+    return " ".join(sentences)
 
 
 def _platen(work: Work) -> tuple[float, float]:
     return work.design.press.platen_width, work.design.press.platen_length
-
-
-def _plan_basis(work: Work) -> str:
-    """Return how far the plan can be trusted, or why there is none."""
-    if work.schedule.total_press_minutes is None:
-        return (
-            "No plan: nobody stated the minutes in the press for this film. Tell the designer once "
-            "they are known."
-        )
-    if not work.schedule.steps:
-        return "No plan: nothing is pressed, and nobody stated how fast the seams are made."
-    order, shop = work.design.order, shop_of(work.design)
-    times = plan_times(work.design, work.laminate, work.schedule)
-    holds = most_together(work.laminate, _platen(work))
-    at_press = 1 - CUT_SHARE - SORT_SHARE - TUBES_SHARE
-    cure = "the kit's" if cure_hours(work.design) else "ours: read its package"
-    cure = "as ordered" if order.cure_hours else cure
-    cool = "measured" if work.design.press.cool_minutes else "an estimate"
-    warm = "measured" if work.schedule.heating.time_constant_minutes else "an estimate"
-    resources = (
-        units.count(shop.technicians, "technician"),
-        units.count(shop.presses, "press", "presses"),
-        units.count(shop.plates, "base plate"),
-        "one laser",
-    )
-    return (
-        f"{', '.join(resources)}, shifts of {order.shift_hours:g} h; if it is otherwise, tell the "
-        "designer. A cycle takes no more copies than one person makes in such a shift (the plate "
-        f"has room for {holds}). All sheets are cut and sorted first, as the parts of all cycles "
-        "lie on them. The minutes are estimates: {times.hands:g} of handling "
-        f"for each copy, the paper's total less its time in the press"
-        f"{'' if work.schedule.is_timed else ' (nobody has timed drawn layers)'}; of these "
-        f"{CUT_SHARE:.1%} at the laser, {SORT_SHARE:.1%} to wipe and sort, {TUBES_SHARE:.0%} for "
-        f"the tubes, {at_press:.0%} at the press ({OPEN_SHARE:.0%} of that to open it, "
-        f"{UNPIN_SHARE:.0%} to take down, the rest to lay up, in proportion to the parts of each "
-        f"step; all shares ours). Each step warms {times.warm:g} min before its clock ({warm}) and "
-        f"cools {times.cool:g} min ({cool}). Adhesive: {times.cure / 60:g} h ({cure}). Tests: "
-        f"{times.test:g} min a copy, {CONNECT_MINUTES:g} of them a tube to connect it (ours). "
-        "Weekends are not in it. Write the actual minutes beside each row."
-    )
 
 
 def _identity(work: Work) -> tuple[Action, ...]:

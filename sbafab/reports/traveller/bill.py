@@ -10,9 +10,10 @@ from typing import Literal, NamedTuple
 
 from sbafab.design.identity import cure_hours, tube_name
 from sbafab.laminate.laminate import Layer
+from sbafab.pressing.build_up import BASE_PLATE
 from sbafab.pressing.cycles import batch_times
+from sbafab.pressing.plate_heating import START, cool_minutes, warm_minutes
 from sbafab.pressing.schedule import HANDLING_MINUTES, joined_words
-from sbafab.pressing.work_plan import plan_times, shop_of, work_plan
 from sbafab.reports.drawing import TIMES, layer_numbers
 from sbafab.reports.traveller import acceptance, base_plate, units
 from sbafab.reports.traveller.job import Job, Work
@@ -266,6 +267,10 @@ def kerf_notes(works: Sequence[Work]) -> list[str]:
 
 PAPER_MINUTES = 105.0
 """1.75 h for a 1-DoF or 3-DoF actuator (paper Sec. 4)."""
+CONNECT_MINUTES = 2.0
+"""Minutes to connect one tube to the test bench and free it again: ours."""
+CURE_HOURS = 24.0
+"""Hours in which the adhesive of the tubes cures where neither order nor kit says so: ours."""
 
 
 class Time(NamedTuple):
@@ -306,20 +311,7 @@ def _batch(work: Work) -> list[Time]:
         f"{units.minutes(units.product(runs.copies, plan.estimated_build_minutes))}"
     )
     row = f"All {runs.copies} copies"
-    rows = [Time(row, units.whole_minutes(took.total), made_of)]
-    days = {entry.day for entry in work_plan(work.design, work.laminate, plan, runs.copies)}
-    if days:
-        shop = shop_of(work.design)
-        means = ", ".join(
-            (
-                units.count(shop.technicians, "technician"),
-                units.count(shop.presses, "press", "presses"),
-                units.count(shop.plates, "base plate"),
-            )
-        )
-        words = f"sorting, warming, cooling, curing and tests included, see section Batch; {means}"
-        rows.append(Time("In working days", str(max(days)), words))
-    return rows
+    return [Time(row, units.whole_minutes(took.total), made_of)]
 
 
 def times(work: Work) -> list[Time]:
@@ -340,7 +332,7 @@ def times(work: Work) -> list[Time]:
     if plan.seams:
         metres = sum(seam.length_mm for seam in plan.seams)
         rows.append(Time("Seams", "", f"{metres:.0f} mm of path; nobody stated their speed"))
-    rows += [*_batch(work), *_waiting(work), total_time(work)]
+    rows += [*_batch(work), *_waiting_rows(work), total_time(work)]
     # The paper's minutes are those of a stack of balloons.
     if not work.design.form.is_drawn:
         took = units.whole_minutes(PAPER_MINUTES)
@@ -358,10 +350,38 @@ def _handling_basis(work: Work) -> str:
     )
 
 
-def _waiting(work: Work) -> list[Time]:
+class Waiting(NamedTuple):
+    """Minutes beside handling and press: ``warm`` before the clock of every step, ``cool`` after
+    it, ``cure`` and ``test`` of one copy.
+    """
+
+    warm: float
+    cool: float
+    cure: float
+    test: float
+
+
+def waiting(work: Work) -> Waiting:
+    """Return the minutes of waiting; warming and cooling are estimates until measured."""
+    press, acceptance, steps = work.design.press, work.design.acceptance, work.schedule.steps
+    built = [part for step in steps for part in step.build_up]
+    plate = next((part.thickness_mm for part in built if part.part == BASE_PLATE), 0.0)
+    points = [point for step in steps[:1] for point in step.time_temperature]
+    measured = next((p.after_minutes for p in points if p.point == START), None)
+    tubes = work.laminate.tube_count
+    held = (2 * acceptance.leak_seconds + acceptance.proof_seconds) / 60
+    return Waiting(
+        warm=warm_minutes(plate, press.temperature_c) if measured is None else measured,
+        cool=press.cool_minutes or cool_minutes(plate, press.temperature_c),
+        cure=60 * (cure_hours(work.design) or CURE_HOURS) if tubes else 0.0,
+        test=max(1, tubes) * (held + CONNECT_MINUTES),
+    )
+
+
+def _waiting_rows(work: Work) -> list[Time]:
     """Return warming, cooling, curing and tests."""
     plan, steps = work.schedule, len(work.schedule.steps)
-    each = plan_times(work.design, work.laminate, plan)
+    each = waiting(work)
     is_measured = plan.heating.time_constant_minutes is not None
     rows = []
     if steps:
@@ -384,21 +404,17 @@ def _waits(what: str, steps: int, each: float, basis: str) -> Time:
 
 
 def total_time(work: Work) -> Time:
-    """Return the days that one actuator takes, and how long the first is."""
-    plan, shift = work.schedule, 60 * work.design.order.shift_hours
-    each, row = plan_times(work.design, work.laminate, plan), "Total, one actuator"
+    """Return the hours that one actuator takes, and what they are made of."""
+    plan = work.schedule
+    each, row = waiting(work), "Total, one actuator"
     handled = plan.estimated_build_minutes
     if handled is None:
         basis = "nobody has timed this design; its tests come when the adhesive has cured"
-        return Time(row, f"{units.BLANK} days", basis)
+        return Time(row, units.hours(None), basis)
     worked = handled + len(plan.steps) * (each.warm + each.cool)
-    first = f"{worked / 60:.1f} h until its tubes are glued, warming the press not included"
-    if worked + each.cure + each.test <= shift:
-        return Time(row, "1 day", f"{first}; cured and tested on the same day")
-    days = math.ceil(worked / shift) + max(1, math.ceil(each.cure / DAY))
-    basis = f"{first}; the adhesive cures overnight, tests on the last day"
-    return Time(row, f"{days} days", basis)
-
-
-DAY = 24 * 60.0
-"""Minutes."""
+    cures = f"{each.cure / 60:g} h for the adhesive, " if each.cure else ""
+    basis = (
+        f"{worked / 60:.1f} h until its tubes are glued, {cures}{units.minutes(each.test)} of "
+        "tests; warming the press not included"
+    )
+    return Time(row, f"{(worked + each.cure + each.test) / 60:.1f} h", basis)
