@@ -49,7 +49,6 @@ GROUPS = {
     },
     "Measure": {
         "kerf": "Compute the kerf from a filled coupon.csv.",
-        "recipe": "Take power and speed of a film from a filled testgrid.csv.",
         "inspect": "Compare a scan or photograph of a cut sheet with its cut file.",
         "record": "Record the results of builds, and report on them.",
         "reproduce": "Compare predictions with measurements.",

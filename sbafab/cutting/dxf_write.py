@@ -106,7 +106,7 @@ def seam_text(path: Sequence[Sequence[Edge]], properties: Mapping[str, str]) -> 
     entities = [*map(_seam_run, runs), *_datum_cross()]
     arm = (-DATUM_ARM, -DATUM_ARM, DATUM_ARM, DATUM_ARM)
     boxes = [edge.bounds for run in runs for edge in run]
-    return _with_layer(_document(entities, [*boxes, arm], properties, spare=1), SEAM, SEAM_COLOUR)
+    return _with_seam_layer(_document(entities, [*boxes, arm], properties, spare=1))
 
 
 def _seam_run(edges: Sequence[Edge]) -> _Entity:
@@ -115,45 +115,22 @@ def _seam_run(edges: Sequence[Edge]) -> _Entity:
     return _polyline(SEAM, vertices if closed else [*vertices, (*edges[-1].end, 0.0)], closed)
 
 
-def layered_text(
-    runs: Sequence[tuple[str, Sequence[Point]]],
-    colours: Mapping[str, str],
-    properties: Mapping[str, str],
-    size: Point,
-) -> str:
-    """A DXF document of runs of lines on layers, in order; lower left corner (0, 0), ``size`` mm.
+def _with_seam_layer(text: str) -> str:
+    """Return a document with the layer SEAM in its table, made after that of engraving.
 
-    Layers in ``colours`` are made, each with its true colour (six digits of red, green and blue)
-    and one of AutoCAD's 24 hues, one shade after the other.
-    """
-    entities = [_stroke(layer, run) for layer, run in runs]
-    box = (0.0, 0.0, *size)
-    text = _document(entities, [box], properties, spare=len(colours))
-    for place, (name, rgb) in reversed(list(enumerate(colours.items()))):
-        hue, shade = place % 24, place // 24
-        text = _with_layer(text, name, 10 * (hue + 1) + 4 * shade, place + 1, int(rgb, 16))
-    return text
-
-
-def _with_layer(
-    text: str, name: str, colour: int, from_seed: int = 1, true_colour: int | None = None
-) -> str:
-    """Return a document with one more layer in its table, made after that of engraving.
-
-    Its handle is as far below the next free one as ``from_seed`` says.
+    Its handle is the last one below the next free one.
     """
     seed_tag = "  9\n$HANDSEED\n  5\n"
     _, _, after = text.partition(seed_tag)
-    handle = f"{int(after.partition(chr(10))[0], 16) - from_seed:X}"
+    handle = f"{int(after.partition(chr(10))[0], 16) - 1:X}"
     found = re.search(
         rf"  0\nLAYER\n  5\n\w+\n(?:(?!  0\n).*\n)*?  2\n{ENGRAVE}\n(?:(?!  0\n).*\n)*", text
     )
     if found is None:
         raise ValueError("skeleton.dxf has no layer for engraving: regenerate it.")
     record = re.sub(r"(?<=LAYER\n  5\n)\w+", handle, found[0])
-    record = record.replace(f"  2\n{ENGRAVE}\n", f"  2\n{name}\n")
-    true = "" if true_colour is None else f"420\n{true_colour}\n"
-    record = record.replace(f" 62\n{COLOURS[ENGRAVE]}\n", f" 62\n{colour}\n{true}")
+    record = record.replace(f"  2\n{ENGRAVE}\n", f"  2\n{SEAM}\n")
+    record = record.replace(f" 62\n{COLOURS[ENGRAVE]}\n", f" 62\n{SEAM_COLOUR}\n")
     return text[: found.end()] + record + text[found.end() :]
 
 

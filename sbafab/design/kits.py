@@ -25,11 +25,9 @@ from sbafab.design.files import (
     read_toml,
     shown,
     templates_folder,
-    toml_tables,
     write_copy,
 )
 from sbafab.design.films import FaceBondings, Films, LayerFilms, without_other_products
-from sbafab.design.recipes import Recipe
 from sbafab.design.sections import (
     NAME_PATTERN,
     Acceptance,
@@ -315,37 +313,3 @@ def _table(tables: Mapping[str, Any], section: str) -> Mapping[str, Any]:
 def write_kit(file: Path) -> Path:
     """Copy the paper's kit, named after the new file. Raises DesignError if it exists."""
     return write_copy(templates_folder() / KITS / f"{DEFAULT}.toml", file)
-
-
-def recipe_toml(recipe: Recipe) -> str:
-    """Return a recipe as a table for the end of a kit or design."""
-    import tomli_w
-
-    values = {key: value for key, value in recipe.model_dump().items() if value is not None}
-    return f"[[laser.recipe]]\n{tomli_w.dumps(values)}"
-
-
-def add_recipe(path: Path, recipe: Recipe) -> bool:
-    """Add a recipe to a kit's file; return True if the kit names the recipe's machine.
-
-    The rest stays as it is, comments too. Raises DesignError where the kit cannot be read or
-    written, or has a recipe for the same film, machine and operation.
-    """
-    before = read_kit(path)
-    for table in _table(before.tables, "laser").get("recipe", ()):
-        if recipe.is_rival(Recipe.model_validate(table)):
-            raise DesignError(
-                f"{path} has a recipe to {recipe.operation} {recipe.film} of "
-                f"{recipe.thickness_mm:g} mm on {recipe.machine}; remove it first"
-            )
-    text = before.text.decode("utf-8-sig")
-    new = f"{text.rstrip()}\n\n{recipe_toml(recipe)}"
-    kit = _kit(toml_tables(new, path), path, new.encode())
-    beside = path.with_name(f".{path.name}.new")
-    try:
-        beside.write_bytes(kit.text)
-        beside.replace(path)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        raise DesignError(f"{path} cannot be written: {error.strerror or error}") from None
-    return bool(_table(kit.tables, "laser").get("machine") == recipe.machine)

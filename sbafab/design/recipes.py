@@ -38,7 +38,7 @@ class Recipe(Section):
     kerf_mm: LengthOrZero | None = Field(default=None, le=1)
     """Full kerf width that was measured with these settings; for notes, it compensates nothing."""
     source: str = Field(min_length=1, max_length=200)
-    """Where the settings are from, for instance a filled test grid."""
+    """Where the settings are from, for instance a material test of the laser program."""
     date: str | None = Field(default=None, pattern=DATE_PATTERN)
     """When they were tried, as year-month-day."""
 

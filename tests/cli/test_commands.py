@@ -179,7 +179,7 @@ def test_templates_schema_and_new(
     code, out, _ = run(["new"], capsys)
     assert code == 0
     names = [line.split()[0] for line in out.splitlines()]
-    assert names == [*template_names(), "coupon", "testgrid", "kit"]
+    assert names == [*template_names(), "coupon", "kit"]
     assert run(["new", "1dof-5mm", "--json"], capsys)[0] == 2
     assert list(tmp_path.iterdir()) == []
     code, out, _ = run(["schema"], capsys)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from sbafab.cutting.power_grid import PowerGrid, write_grid
 from sbafab.cutting.properties import PTFE_WARNING
 from tests.interop.made import EXACT, LENGTH, WIDTH, Sheet, outline_bounds
 from tests.interop.page import contours_are_as_on_the_page
@@ -101,25 +99,3 @@ def test_meerk40t_cuts_what_the_sheet_says_in_its_order_with_no_power(sheet: She
     assert read.note.startswith("Powers are 0: set power and speed of each layer")
     assert "KERF_STATE: uncalibrated" in read.note
     assert (PTFE_WARNING in read.note) == (cut_file.name == "PTFE_1.dxf")
-
-
-def test_meerk40t_takes_each_cell_of_a_test_grid_at_its_power_and_speed(tmp_path: Path) -> None:
-    """Its power is in thousandths; a square of 8 mm has 64 mm2."""
-    from meerk40t.extra.lbrn import LbrnLoader
-
-    grid = PowerGrid("TPU", 0.05, "K40", (10.0, 35.0), (5.0, 80.0))
-    write_grid(tmp_path / "grid", grid, "sbafab 0")
-    read = Elements()
-    assert LbrnLoader.load(None, read, str(tmp_path / "grid/testgrid.lbrn2"))
-    labels, *cells = read.op_branch.children
-    told = {op.told["label"].partition(":")[0]: op for op in cells}
-    assert {name: (op.told["power"], op.told["speed"]) for name, op in told.items()} == {
-        "A1": (100, 80),
-        "A2": (100, 5),
-        "B1": (350, 80),
-        "B2": (350, 5),
-    }
-    assert (labels.told["power"], labels.told["speed"]) == (100, 80)
-    for op in cells:
-        [square] = op.children
-        assert abs(area(points_of(square))) == pytest.approx(64.0)
