@@ -35,7 +35,6 @@ GROUPS = {
         "press": "Write the heat-press schedule.",
         "mesh": "Write meshes: solid, cavities, volume and shell.",
         "nest": "Cut several designs from the same film sheets.",
-        "stock": "Show what an output folder takes of what is in stock, and what is lacking.",
     },
     "Predict": {
         "predict": "Predict size, stroke, force, time and bending.",

@@ -104,7 +104,7 @@ def add_batch(table: Table, run: Run) -> None:
         table.add_row(f"{film['material']} film", Text(film_text(film, index["sheets"], 1)))
     for mesh in index.get("meshes", ()):
         table.add_row("solid", Text(f"{mesh['file']}, with a node for each part"))
-    for label, text in (*stock_rows(run), *stale_rows(run.dropped)):
+    for label, text in stale_rows(run.dropped):
         table.add_row(label, Text(text))
     if index:
         table.add_row("folder", Text(str(run.folder)))
@@ -130,19 +130,6 @@ def print_run_verdict(run: Run, change: str) -> None:
         print_written(None if run.kept else run.folder)
     else:
         print_passed(run.folder.name, groups, f"sbafab check {run.folder}", run.folder)
-
-
-def stock_rows(run: Run) -> Iterator[tuple[str, str]]:
-    """Yield the piece in stock that each sheet is cut from, and its rest."""
-    sheets = run.design.sheets
-    others = [film.sheet for film in run.design.films.others.values()]
-    if run.plan is None or all(sheet.piece is None for sheet in (sheets.tpe, sheets.ptfe, *others)):
-        return
-    from sbafab.runs.stock import rests
-
-    for sheet, piece, rest in rests(run.folder):
-        leaves = "no rest worth keeping" if rest is None else rest.size
-        yield "from stock", f"{sheet.material} {sheet.number}: {piece}; leaves {leaves}"
 
 
 def _joint_facts(run: Run) -> Iterator[tuple[str, str]]:
@@ -177,7 +164,6 @@ def _run_facts(run: Run) -> Iterator[tuple[str, str]]:
         f"{len(lam.layers)} in {len(lam.patterns)} patterns: "
         + ", ".join(f"{count} {kind}" for kind, count in counts.items()),
     )
-    yield from stock_rows(run)
     yield from stale_rows(run.dropped)
     # Layers of a folded film share a file.
     cut = {layer["file"] for layer in index["layers"] if layer["file"]}

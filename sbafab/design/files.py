@@ -35,6 +35,7 @@ _SHEETS = (
     'registration.method = "ears" or "channel-pin"'
 )
 _PLAN = "was removed: batches are no longer planned by working day; delete it"
+_STOCK = "was removed: stock files are no longer kept; delete it"
 REMOVED: Mapping[str, str] = {
     "panel": _SHEETS,
     "registration.experimental": _SHEETS,
@@ -43,8 +44,12 @@ REMOVED: Mapping[str, str] = {
     "order.technicians": _PLAN,
     "order.presses": _PLAN,
     "order.base_plates": _PLAN,
+    "sheets.stock": "was removed; write the size of the film at hand as width and length of its "
+    "sheet",
+    "sheets.*.piece": _STOCK,
+    "films.*.sheet.piece": _STOCK,
 }
-"""Tables, keys and values of earlier design files, each with what was removed and what to do."""
+"""Tables, keys ("*": any name) and values of earlier design files: what was removed, what to do."""
 
 
 def listed(values: Iterable[object]) -> str:

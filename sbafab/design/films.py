@@ -81,8 +81,6 @@ class Sheet(Section):
     """What holds the sheet down: x, y from its lower left corner, and diameter."""
     most: int = Field(default=20, ge=1, le=1000)
     """Sheets that may be used."""
-    piece: str | None = Field(default=None, max_length=40)
-    """The piece of the stock file that a run cuts; the run writes it, with width and length."""
     lead_in: Annotated[float, Millimetres(0.01, 20)] | None = None
     """Length of the straight line in the waste by which the beam comes to each contour, in machine
     files; by default none."""

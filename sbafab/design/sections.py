@@ -535,8 +535,6 @@ class Sheets(Section):
     index_marks: bool | None = None
     """Whether the number of its pattern is engraved into the skeleton beside each part that has
     room for it; off by default. Wider spacing leaves more room."""
-    stock: str | None = Field(default=None, min_length=1, max_length=1000)
-    """A stock file beside the design: the smallest pieces that hold the parts are cut first."""
     program: Literal["rdworks", "epilog"] | None = None
     """A laser program, beside LightBurn, that each sheet gets a machine file for: "rdworks" (DXF
     R12 by colours) or "epilog" (SVG with hairlines by colours)."""

@@ -46,7 +46,6 @@ from sbafab.output.swap import JOB_SCHEMA, SCHEMA, listed_files, refuse_busy, re
 from sbafab.pressing.schedule import Schedule
 from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Finding, Findings
-from sbafab.runs.stock import cut_from_stock
 from sbafab.simulators.simulator import (
     Name,
     Result,
@@ -174,7 +173,7 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     old folder is then whole.
     """
     progress = progress or ignore_progress
-    job = cut_from_stock(check_job(request.source, request.name, progress))
+    job = check_job(request.source, request.name, progress)
     target = request.out / job.name
     beside = ""
     try:

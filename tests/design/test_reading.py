@@ -160,6 +160,24 @@ def test_what_was_removed_says_what_to_do_instead(template: str, change: Any, na
         load_design(template, [change])
 
 
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("order.shift_hours=8.0", "order.shift_hours was removed; order.at_once says how many"),
+        ("order.technicians=2", "order.technicians was removed: batches are no longer planned"),
+        ("order.presses=2", "order.presses was removed: .*; delete it"),
+        ("order.base_plates=2", "order.base_plates was removed: .*; delete it"),
+        ('sheets.stock="stock.toml"', "sheets.stock was removed; write .* width and length"),
+        ('sheets.tpe.piece="full"', "sheets.tpe.piece was removed: stock files"),
+        ('films.tpu.sheet.piece="full"', "films.tpu.sheet.piece was removed: stock files"),
+    ],
+)
+def test_a_key_that_was_removed_says_what_to_do_instead(change: str, says: str) -> None:
+    film = {"product": "TPU", "thickness": 0.05, "kind": "structural"}
+    with pytest.raises(DesignError, match=f"^{says}"):
+        load_design("1dof-5mm", [{"films": {"tpu": film}}, change])
+
+
 @pytest.mark.parametrize("name", DESIGNS)
 def test_resolved_design_reads_back_as_the_same(name: str, tmp_path: Path) -> None:
     design = load_design(name)
