@@ -53,7 +53,8 @@ layer's lower face. Films and shapes stand once each; `film`, `shape` and `outli
 | `folds` | `lower` and `upper` are halves of one film, which goes on at `line` |
 | `ports`, `nets` | places in the gap between two layers, and which of them are joined |
 
-`python -I sbafab/laminate/laminate_validator.py FILE` names every fault at its place, with the standard library alone.
+`sbafab schema laminate` prints its JSON schema; `sbafab import FILE` also looks at references, heights and geometry, and
+names the first fault at its place.
 
 ## Meshes
 

@@ -19,11 +19,11 @@ from sbafab.assemblies.records import Assembly
 from sbafab.assemblies.shapes import bent_surface
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.cutting.order import cutting_order
+from sbafab.design import laminate_file
 from sbafab.design.files import Change, as_in_a_file, shown, template_names, template_text
 from sbafab.design.records import Design
 from sbafab.design.records import resolved as written_out
 from sbafab.errors import DesignError
-from sbafab.laminate import laminate_file
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.meshing.solid import solid as surface_of
 from sbafab.meshing.surface import Surface

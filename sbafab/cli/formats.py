@@ -15,11 +15,10 @@ from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cli.explain import DesignKey
 from sbafab.cutting.calibration import Value
+from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
+from sbafab.design.laminate_file import LaminateDocument
 from sbafab.errors import ERROR_SCHEMA
-from sbafab.laminate.films import Film
-from sbafab.laminate.joints import FaceBond, Fold, Net, Port, PortKind, Seam
-from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin
-from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
+from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
 from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
 from sbafab.models.sensitivities import SensitivityRow
@@ -443,41 +442,7 @@ def _checks() -> dict[str, Any]:
 
 
 def _laminate() -> dict[str, Any]:
-    shape = {**COUNT, "description": "place in shapes, from 0"}
-    film = {**COUNT, "description": "place in films, from 0"}
-    line = {**array(number()), "description": "start x, y, end x, y", "minItems": 4, "maxItems": 4}
-    arc = {
-        "type": "array",
-        "prefixItems": [*[number()] * 7, {"type": "boolean"}],
-        "minItems": 8,
-        "maxItems": 8,
-        "description": "start x, y, end x, y, centre x, y, radius; true: counter-clockwise",
-    }
-    contour = {**array({"oneOf": [line, arc]}), "description": "closed; holes run clockwise"}
-    chains = {**array(array({"oneOf": [line, arc]})), "description": "chains, open or closed"}
-    joints = ("seams", "folds", "ports", "nets", "bonds")
-    lists = ("layers", "chambers", "bores", "inlets", "pins", "outline", *joints)
-    return of(
-        Laminate,
-        *lists,
-        schema={"const": LAMINATE_SCHEMA},
-        films=array(of(Film)),
-        layers={
-            **array(of(Layer, "profile", film=film, shape=shape)),
-            "description": "bottom to top",
-        },
-        chambers={**array(of(Chamber)), "description": "void nets, each with one inlet"},
-        bores=array(of(Bore)),
-        inlets=array(of(Inlet)),
-        pins=array(of(Pin)),
-        seams=array(of(Seam, "path", path=chains)),
-        folds=array(of(Fold)),
-        ports=array(of(Port)),
-        nets=array(of(Net)),
-        bonds=array(of(FaceBond)),
-        outline=shape,
-        shapes={**array(array(contour)), "description": "mm, the actuator's axis at 0, 0"},
-    )
+    return LaminateDocument.model_json_schema(mode="serialization")
 
 
 def _nets() -> dict[str, Any]:

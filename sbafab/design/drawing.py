@@ -6,13 +6,13 @@ from functools import lru_cache
 from pathlib import Path
 
 from sbafab.design.files import listed, shown
+from sbafab.design.laminate_file import read_laminate
 from sbafab.design.outline import closed_loops, content, crossing, refuse_crossings, traced
 from sbafab.design.strands import MOST_OF_ENTITY, Strand, counted, is_closed, sealed
 from sbafab.errors import DesignError
 from sbafab.geometry.arcs import FitError
 from sbafab.geometry.contour import Contour, in_reading_order, tidy
 from sbafab.geometry.region import Region
-from sbafab.laminate.laminate_file import read_laminate
 
 LARGEST = 2000.0
 """Bound of a drawing's extent, mm."""

@@ -15,6 +15,7 @@ from sbafab.actuators.drawn import DRAWN, DrawnDesign
 from sbafab.design.drawing import OUTLINE, seam_layer
 from sbafab.design.files import ASSEMBLY, checked, kit_names, listed, read_toml
 from sbafab.design.films import FILM_NAME, HOTTEST, Films
+from sbafab.design.laminate_file import FILE, laminate_json, read_laminate
 from sbafab.design.records import Design, plain_tables, without_kit
 from sbafab.design.sections import Inlet as Inlets
 from sbafab.design.strands import is_closed
@@ -24,7 +25,6 @@ from sbafab.importing.records import Imported, file_name, key_name
 from sbafab.laminate.films import Film
 from sbafab.laminate.joints import FaceBond
 from sbafab.laminate.laminate import Chamber, Inlet, Laminate
-from sbafab.laminate.laminate_file import FILE, laminate_json, read_laminate
 
 DESIGN = "design.toml"
 OF_A_RUN = ("must not be built; failed:", "waived:", "limits lowered:")

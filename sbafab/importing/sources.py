@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from sbafab.design.laminate_file import SCHEMA
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import DESIGN, import_folder, import_laminate
 from sbafab.importing.layer_table import LAYERS, import_table
@@ -14,7 +15,6 @@ from sbafab.importing.parchmint import import_parchmint
 from sbafab.importing.polygons import MOST_BYTES, refuse_without_table
 from sbafab.importing.popupcad import SUFFIX, refuse_alone
 from sbafab.importing.records import Imported, not_json, read_text
-from sbafab.laminate.laminate_validator import SCHEMA
 
 
 class SourceFormat(NamedTuple):

@@ -23,12 +23,12 @@ from sbafab.cutting.sheets import SheetFile, write_sheets
 from sbafab.design.files import kit_names
 from sbafab.design.identity import design_sha256, kit_of
 from sbafab.design.kits import FILE as KIT_FILE
+from sbafab.design.laminate_file import FILE as LAMINATE_FILE
+from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
+from sbafab.design.laminate_file import laminate_json
 from sbafab.design.records import Design, design_toml
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.laminate_file import FILE as LAMINATE_FILE
-from sbafab.laminate.laminate_file import laminate_json
-from sbafab.laminate.laminate_validator import SCHEMA as LAMINATE_SCHEMA
 from sbafab.meshing.mesh_files import MeshFile, write_meshes
 from sbafab.models.calibrated import FILE as CALIBRATION_FILE
 from sbafab.models.calibrated import NONE, load_calibration, shipped_names

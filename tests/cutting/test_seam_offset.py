@@ -19,10 +19,10 @@ from sbafab.api import check_folder, generate
 from sbafab.as_built.check import read_back
 from sbafab.design.identity import actuator_sha256
 from sbafab.design.kits import write_kit
+from sbafab.design.laminate_file import FILE
 from sbafab.errors import DesignError
 from sbafab.importing.laminates import import_folder
 from sbafab.importing.write import write_imported
-from sbafab.laminate.laminate_file import FILE
 from sbafab.rules.finding import Finding
 from tests.actuators.test_free_layers import WELDED
 

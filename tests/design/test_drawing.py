@@ -12,9 +12,9 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.cutting.dxf_write import dxf_text
 from sbafab.design.drawing import read_drawing
+from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc
-from sbafab.laminate.laminate_file import FILE, laminate_json
 from tests.design.drawing import dxf, svg
 from tests.design.test_outline import same_shape
 

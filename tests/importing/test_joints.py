@@ -11,11 +11,11 @@ import pytest
 import tomli_w
 
 from sbafab.actuators import build, load_design
+from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.geometry.edges import Line
 from sbafab.importing.laminates import import_laminate
 from sbafab.importing.write import Written, write_imported
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.laminate_file import FILE, laminate_json
 from tests.actuators.test_free_layers import WELDED
 from tests.laminate.test_folding import folded
 

@@ -15,12 +15,12 @@ from hypothesis import given, settings
 from sbafab.actuators import build, load_design
 from sbafab.design.files import template_names
 from sbafab.design.identity import design_sha256
+from sbafab.design.laminate_file import FILE, laminate_json
 from sbafab.errors import DesignError, OutputError
 from sbafab.importing.laminates import import_folder, import_laminate
 from sbafab.importing.sources import import_source
 from sbafab.importing.write import Written, write_imported
 from sbafab.laminate.laminate import Laminate
-from sbafab.laminate.laminate_file import FILE, laminate_json
 from sbafab.rules.deck import run_deck
 from sbafab.rules.limits import Limits
 from sbafab.runs.run import RunRequest, generate
@@ -235,10 +235,10 @@ def test_an_assembly_is_refused_with_its_designs(importing: Importing, tmp_path:
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("limit", 500, r"films\.ptfe\.temperature_limit = 500 must be at most 400"),
-        ("limit", -5, r"films\.ptfe\.temperature_limit = -5 must be greater than 0"),
+        ("limit", 500, r"films\.ptfe\.temperature_limit = 500\.0 must be at most 400"),
+        ("limit", -5, r"films\.ptfe\.temperature_limit = -5\.0 must be greater than 0"),
         ("density", 1e8, r"films\.tpe\.density = 100000000\.0 must be at most 20000"),
-        ("softens_above", -40, r"films\.tpe\.melting_point = -40 must be greater than 0"),
+        ("softens_above", -40, r"films\.tpe\.melting_point = -40\.0 must be greater than 0"),
     ],
 )
 def test_a_film_that_no_design_takes_is_named(

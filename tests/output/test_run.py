@@ -13,8 +13,8 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.design.identity import design_sha256
+from sbafab.design.laminate_file import read_laminate
 from sbafab.errors import OutputError
-from sbafab.laminate.laminate_file import read_laminate
 from sbafab.meshing import mesh_files
 from sbafab.meshing.conforming.layup import MeshSettings
 from sbafab.output import artefacts

@@ -1,0 +1,413 @@
+"""``laminate.json``: a laminate with exact edges, to be read by other programs and read back here.
+
+Films and shapes stand once each; layers name them by their place in the lists, from 0.
+``LaminateDocument`` is the format: its JSON schema is published, and files are read by it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+
+from sbafab.design.files import sentence
+from sbafab.errors import DesignError
+from sbafab.geometry.contour import Contour
+from sbafab.geometry.edges import Arc, Edge, Line, Point, meeting_points
+from sbafab.geometry.nearby import close_pairs
+from sbafab.geometry.region import Region
+from sbafab.laminate.films import Film
+from sbafab.laminate.joints import FaceBond, Fold, Net, Port, Seam, SeamKind, SeamTool
+from sbafab.laminate.laminate import Bore, Chamber, Inlet, Laminate, Layer, Pin, Role
+
+FILE = "laminate.json"
+SCHEMA = "sbafab/laminate@1"
+JOINED = 1e-5
+"""mm within which an edge begins where the one before it ends, and an arc's ends on its circle."""
+PARALLEL = 1e-3
+"""Sine of the angle between two edges below which they touch and do not cross."""
+
+
+# The format.
+
+
+Index = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Size = Annotated[float, Field(gt=0)]
+Coordinate = Annotated[float, Field(gt=-1e9, lt=1e9)]
+LineRow = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate, Coordinate],
+    Field(description="start x, y, end x, y"),
+]
+ArcRow = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, bool],
+    Field(description="start x, y, end x, y, centre x, y, radius; true: counter-clockwise"),
+]
+
+
+def _edge_kind(row: Any) -> str:
+    return "line" if isinstance(row, list | tuple) and len(row) == 4 else "arc"
+
+
+EdgeRow = Annotated[
+    Annotated[LineRow, Tag("line")] | Annotated[ArcRow, Tag("arc")], Discriminator(_edge_kind)
+]
+Chain = Annotated[tuple[EdgeRow, ...], Field(min_length=1)]
+ShapeIndex = Annotated[Index, Field(description="place in shapes, from 0")]
+
+
+class _Row(BaseModel):
+    model_config = ConfigDict(
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        defer_build=True,
+        json_schema_serialization_defaults_required=True,
+    )
+
+
+class LayerRow(_Row):
+    """A layer of a ``laminate.json``; its film and shape by their places."""
+
+    index: Count
+    role: Role
+    film: Annotated[Index, Field(description="place in films, from 0")]
+    shape: ShapeIndex
+    balloon: Count | None
+    z: float
+    pieces: Count
+    pattern: str
+    turned: bool = False
+
+
+class SeamRow(_Row):
+    """A seam of a ``laminate.json``."""
+
+    name: str
+    below: Count
+    above: Count
+    path: Annotated[tuple[Chain, ...], Field(description="chains, open or closed")]
+    width: Size
+    tool: SeamTool
+    kind: SeamKind
+    order: Count
+
+
+class LaminateDocument(_Row):
+    """A ``laminate.json``. Files of earlier versions lack the keys that have defaults here."""
+
+    schema_id: Annotated[Literal["sbafab/laminate@1"], Field(alias="schema")]
+    name: str
+    family: str
+    registration: str
+    balloons: Index
+    lumen: Size | None
+    tube: Size | None
+    pins_in_full_bonds: bool
+    middle_first: bool = False
+    notes: tuple[str, ...]
+    films: tuple[Film, ...]
+    layers: Annotated[tuple[LayerRow, ...], Field(min_length=1, description="bottom to top")]
+    chambers: Annotated[tuple[Chamber, ...], Field(description="void nets, each with one inlet")]
+    bores: tuple[Bore, ...]
+    inlets: tuple[Inlet, ...]
+    pins: tuple[Pin, ...]
+    seams: tuple[SeamRow, ...] = ()
+    folds: tuple[Fold, ...] = ()
+    ports: tuple[Port, ...] = ()
+    nets: tuple[Net, ...] = ()
+    bonds: tuple[FaceBond, ...] = ()
+    outline: ShapeIndex
+    shapes: Annotated[
+        tuple[tuple[Chain, ...], ...],
+        Field(description="mm, the actuator's axis at 0, 0; closed contours, holes run clockwise"),
+    ]
+
+
+# Out.
+
+
+def laminate_json(laminate: Laminate) -> str:
+    """Return the contents of ``laminate.json``: a row a line."""
+    lines = (f"{json.dumps(key)}: {_rows(value)}" for key, value in _document(laminate).items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+class _Places:
+    """Values that stand once each in a list, and their places in it."""
+
+    def __init__(self) -> None:
+        self.values: list[Any] = []
+        self._places: dict[str, int] = {}
+
+    def of(self, value: Any) -> int:
+        """The place of a value, told apart by its text in the file."""
+        text = json.dumps(value)
+        if text not in self._places:
+            self._places[text] = len(self.values)
+            self.values.append(value)
+        return self._places[text]
+
+
+def _document(laminate: Laminate) -> dict[str, Any]:
+    films, shapes = _Places(), _Places()
+    # Many layers share one profile, which is turned into rows once.
+    rows: dict[int, int] = {}
+
+    def shape(region: Region) -> int:
+        if id(region) not in rows:
+            rows[id(region)] = shapes.of(_shape_rows(region))
+        return rows[id(region)]
+
+    layers = [
+        {
+            "index": layer.index,
+            "role": layer.role,
+            "film": films.of(asdict(layer.film)),
+            "shape": shape(layer.profile),
+            "balloon": layer.balloon,
+            "z": layer.z,
+            "pieces": layer.pieces,
+            "pattern": layer.pattern,
+            "turned": layer.turned,
+        }
+        for layer in laminate.layers
+    ]
+    outline = shape(laminate.outline)
+    return {
+        "schema": SCHEMA,
+        "name": laminate.name,
+        "family": laminate.family,
+        "registration": laminate.registration,
+        "balloons": laminate.balloons,
+        "lumen": laminate.lumen,
+        "tube": laminate.tube,
+        "pins_in_full_bonds": laminate.pins_in_full_bonds,
+        "middle_first": laminate.middle_first,
+        "notes": laminate.notes,
+        "films": films.values,
+        "layers": layers,
+        "chambers": [asdict(chamber) for chamber in laminate.chambers],
+        "bores": [asdict(bore) for bore in laminate.bores],
+        "inlets": [asdict(inlet) for inlet in laminate.inlets],
+        "pins": [asdict(pin) for pin in laminate.pins],
+        "seams": [
+            {**asdict(seam), "path": [[*map(_edge_row, chain)] for chain in seam.path]}
+            for seam in laminate.seams
+        ],
+        "folds": [asdict(fold) for fold in laminate.folds],
+        "ports": [asdict(port) for port in laminate.ports],
+        "nets": [asdict(net) for net in laminate.nets],
+        "bonds": [asdict(bond) for bond in laminate.bonds],
+        "outline": outline,
+        "shapes": shapes.values,
+    }
+
+
+def _shape_rows(region: Region) -> list[list[list[float | bool]]]:
+    return [[_edge_row(edge) for edge in contour.edges] for contour in region.contours]
+
+
+def _edge_row(edge: Edge) -> list[float | bool]:
+    # A contour drawn with whole numbers, which compares equal, is written like any other.
+    ends = [*map(float, (*edge.start, *edge.end))]
+    if isinstance(edge, Line):
+        return [*ends]
+    return [*ends, *map(float, edge.centre), float(edge.radius), edge.ccw]
+
+
+def _rows(value: Any) -> str:
+    if not isinstance(value, list) or not value:
+        return json.dumps(value)
+    return "[\n " + ",\n ".join(map(json.dumps, value)) + "\n]"
+
+
+# In.
+
+
+def read_laminate(path: Path) -> Laminate:
+    """Return the laminate of a ``laminate.json``, equal to the one that was written.
+
+    Keys that the format does not know are passed over. Raises DesignError, which names the file and
+    the place in it, for what is no such file.
+    """
+    try:
+        document = LaminateDocument.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise DesignError(f"{path} cannot be read as a laminate: {error}") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        if first["type"] == "json_invalid":
+            reason = first["ctx"]["error"]
+            raise DesignError(f"{path} cannot be read as a laminate: {reason}") from None
+        words = sentence(error, LaminateDocument, {}, "", FILE)
+        raise DesignError(f"{path} is not a sound laminate; {words}") from None
+    fault = next(_faults(document), None)
+    if fault is not None:
+        raise DesignError(f"{path} is not a sound laminate; {fault}")
+    return _laminate(document)
+
+
+def _laminate(document: LaminateDocument) -> Laminate:
+    shapes = [Region(tuple(map(_contour, shape))) for shape in document.shapes]
+    return Laminate(
+        name=document.name,
+        family=document.family,
+        layers=tuple(
+            Layer(
+                film=document.films[row.film],
+                profile=shapes[row.shape],
+                **row.model_dump(exclude={"film", "shape"}),
+            )
+            for row in document.layers
+        ),
+        chambers=document.chambers,
+        bores=document.bores,
+        inlets=document.inlets,
+        pins=document.pins,
+        lumen=document.lumen,
+        balloons=document.balloons,
+        registration=document.registration,
+        notes=document.notes,
+        outline=shapes[document.outline],
+        pins_in_full_bonds=document.pins_in_full_bonds,
+        middle_first=document.middle_first,
+        tube=document.tube,
+        seams=tuple(
+            Seam(path=tuple(map(_edges, row.path)), **row.model_dump(exclude={"path"}))
+            for row in document.seams
+        ),
+        folds=document.folds,
+        ports=document.ports,
+        nets=document.nets,
+        bonds=document.bonds,
+    )
+
+
+def _contour(rows: Iterable[Sequence[Any]]) -> Contour:
+    return Contour(_edges(rows))
+
+
+def _edges(rows: Iterable[Sequence[Any]]) -> tuple[Edge, ...]:
+    return tuple(map(_edge, rows))
+
+
+def _edge(row: Sequence[Any]) -> Edge:
+    start, end = (row[0], row[1]), (row[2], row[3])
+    return Line(start, end) if len(row) == 4 else Arc(start, end, (row[4], row[5]), row[6], row[7])
+
+
+# Faults that no schema tells: sizes, references, heights and geometry.
+
+
+SIZES = {
+    "films": ("thickness",),
+    "bores": ("diameter",),
+    "inlets": ("width", "length", "tube_diameter"),
+    "pins": ("diameter",),
+}
+"""What must be above 0, by list."""
+
+
+def _faults(document: LaminateDocument) -> Iterator[str]:
+    """Yield the faults of a document that keeps to the schema, each with its place."""
+    for key, names in SIZES.items():
+        for i, row in enumerate(getattr(document, key)):
+            for name in names:
+                if getattr(row, name) <= 0:
+                    yield f"{key}[{i}].{name}: is not above 0"
+    for i, shape in enumerate(document.shapes):
+        yield from _shape_faults(f"shapes[{i}]", shape)
+    for i, seam in enumerate(document.seams):
+        for j, chain in enumerate(seam.path):
+            yield from _chain_faults(f"seams[{i}].path[{j}]", chain, is_closed=False)
+    yield from _layer_faults(document)
+    yield from _reference_faults(document)
+    yield from _joint_faults(document)
+
+
+def _shape_faults(where: str, shape: Sequence[Sequence[Any]]) -> Iterator[str]:
+    for j, contour in enumerate(shape):
+        yield from _chain_faults(f"{where}[{j}]", contour, is_closed=True)
+    place = _crossing([edge for contour in shape for edge in _edges(contour)])
+    if place is not None:
+        yield f"{where}: its edges cross at x {place[0]:.4f}, y {place[1]:.4f}"
+
+
+def _chain_faults(where: str, rows: Sequence[Any], is_closed: bool) -> Iterator[str]:
+    for k, row in enumerate(rows):
+        if (k or is_closed) and math.dist(rows[k - 1][2:4], row[:2]) > JOINED:
+            yield f"{where}[{k}]: does not begin where the edge before it ends"
+        if len(row) == 8:
+            radius = row[6]
+            ends = (math.dist(row[4:6], row[at : at + 2]) for at in (0, 2))
+            if radius <= 0 or any(abs(end - radius) > JOINED for end in ends):
+                yield f"{where}[{k}]: the arc's ends do not lie on its circle"
+
+
+def _crossing(edges: Sequence[Edge]) -> Point | None:
+    """Return where two edges cross, away from their ends; None if no two do."""
+    for i, j in close_pairs([edge.bounds for edge in edges], 0.0):
+        a, b = edges[i], edges[j]
+        for p in meeting_points(a, b):
+            is_end = min(math.dist(p, q) for q in (a.start, a.end, b.start, b.end)) < JOINED
+            (u, v), (r, s) = a.direction(p), b.direction(p)
+            if not is_end and abs(u * s - v * r) > PARALLEL:
+                return p
+    return None
+
+
+def _layer_faults(document: LaminateDocument) -> Iterator[str]:
+    z = 0.0
+    for i, layer in enumerate(document.layers):
+        where = f"layers[{i}]"
+        if layer.index != i + 1:
+            yield f"{where}.index: is {layer.index}; the layers count from 1 at the bottom"
+        if layer.film >= len(document.films):
+            yield f"{where}.film: there is no film {layer.film}"
+            return
+        film = document.films[layer.film]
+        if layer.role.endswith("mask") != film.is_mask:
+            yield f"{where}.role: a {layer.role} cannot be of {film.material}"
+        if abs(layer.z - z) > JOINED:
+            yield f"{where}.z: is {layer.z:g} mm; the films below it are {z:g} mm thick"
+        z = layer.z + film.thickness
+
+
+def _reference_faults(document: LaminateDocument) -> Iterator[str]:
+    """Yield names and places that stand for nothing."""
+    chambers = {chamber.name for chamber in document.chambers}
+    for key in ("bores", "inlets"):
+        for i, row in enumerate(getattr(document, key)):
+            if row.chamber not in chambers:
+                yield f"{key}[{i}].chamber: there is no chamber {json.dumps(row.chamber)}"
+    used = {"outline": document.outline}
+    used |= {f"layers[{i}].shape": layer.shape for i, layer in enumerate(document.layers)}
+    for where, shape in used.items():
+        if shape >= len(document.shapes):
+            yield f"{where}: there is no shape {shape}"
+
+
+def _joint_faults(document: LaminateDocument) -> Iterator[str]:
+    """Yield joints that lie between no two layers of the laminate, and nets of unknown ports."""
+    count = len(document.layers)
+    pairs = [(f"seams[{i}]", row.below, row.above) for i, row in enumerate(document.seams)]
+    pairs += [(f"folds[{i}]", row.lower, row.upper) for i, row in enumerate(document.folds)]
+    pairs += [(f"ports[{i}]", row.below, row.above) for i, row in enumerate(document.ports)]
+    for where, below, above in pairs:
+        if not 1 <= below < above <= count:
+            yield f"{where}: lies between layers {below} and {above} of {count}"
+    for i, fold in enumerate(document.folds):
+        if fold.line[0] == fold.line[1]:
+            yield f"folds[{i}].line: is not two points apart from each other"
+    names = [port.name for port in document.ports]
+    names += [chamber.name for chamber in document.chambers]
+    for i, net in enumerate(document.nets):
+        for name in net.ports:
+            if name not in names:
+                yield f"nets[{i}].ports: there is no port or chamber {json.dumps(name)}"
