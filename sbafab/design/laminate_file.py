@@ -37,15 +37,15 @@ PARALLEL = 1e-3
 
 
 Index = Annotated[int, Field(ge=0)]
-Count = Annotated[int, Field(ge=1)]
-Size = Annotated[float, Field(gt=0)]
-Coordinate = Annotated[float, Field(gt=-1e9, lt=1e9)]
+FromOne = Annotated[int, Field(ge=1)]
+PositiveLength = Annotated[float, Field(gt=0)]
+EdgeNumber = Annotated[float, Field(gt=-1e9, lt=1e9)]
 LineRow = Annotated[
-    tuple[Coordinate, Coordinate, Coordinate, Coordinate],
+    tuple[EdgeNumber, EdgeNumber, EdgeNumber, EdgeNumber],
     Field(description="start x, y, end x, y"),
 ]
 ArcRow = Annotated[
-    tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, bool],
+    tuple[EdgeNumber, EdgeNumber, EdgeNumber, EdgeNumber, EdgeNumber, EdgeNumber, EdgeNumber, bool],
     Field(description="start x, y, end x, y, centre x, y, radius; true: counter-clockwise"),
 ]
 
@@ -57,7 +57,7 @@ def _edge_kind(row: Any) -> str:
 EdgeRow = Annotated[
     Annotated[LineRow, Tag("line")] | Annotated[ArcRow, Tag("arc")], Discriminator(_edge_kind)
 ]
-Chain = Annotated[tuple[EdgeRow, ...], Field(min_length=1)]
+EdgeRows = Annotated[tuple[EdgeRow, ...], Field(min_length=1)]
 ShapeIndex = Annotated[Index, Field(description="place in shapes, from 0")]
 
 
@@ -74,13 +74,13 @@ class _Row(BaseModel):
 class LayerRow(_Row):
     """A layer of a ``laminate.json``; its film and shape by their places."""
 
-    index: Count
+    index: FromOne
     role: Role
     film: Annotated[Index, Field(description="place in films, from 0")]
     shape: ShapeIndex
-    balloon: Count | None
+    balloon: FromOne | None
     z: float
-    pieces: Count
+    pieces: FromOne
     pattern: str
     turned: bool = False
 
@@ -89,13 +89,13 @@ class SeamRow(_Row):
     """A seam of a ``laminate.json``."""
 
     name: str
-    below: Count
-    above: Count
-    path: Annotated[tuple[Chain, ...], Field(description="chains, open or closed")]
-    width: Size
+    below: FromOne
+    above: FromOne
+    path: Annotated[tuple[EdgeRows, ...], Field(description="chains, open or closed")]
+    width: PositiveLength
     tool: SeamTool
     kind: SeamKind
-    order: Count
+    order: FromOne
 
 
 class LaminateDocument(_Row):
@@ -106,8 +106,8 @@ class LaminateDocument(_Row):
     family: str
     registration: str
     balloons: Index
-    lumen: Size | None
-    tube: Size | None
+    lumen: PositiveLength | None
+    tube: PositiveLength | None
     pins_in_full_bonds: bool
     middle_first: bool = False
     notes: tuple[str, ...]
@@ -124,7 +124,7 @@ class LaminateDocument(_Row):
     bonds: tuple[FaceBond, ...] = ()
     outline: ShapeIndex
     shapes: Annotated[
-        tuple[tuple[Chain, ...], ...],
+        tuple[tuple[EdgeRows, ...], ...],
         Field(description="mm, the actuator's axis at 0, 0; closed contours, holes run clockwise"),
     ]
 
