@@ -384,9 +384,7 @@ def _traveller(folder: DesignFolder) -> str:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.page import traveller_html
 
-    order, solid = folder.design.order, folder.solid_png
-    job = order_of(folder.checked)
-    job = replace(job, made_for=order.made_for, note=order.note, solid_png=solid)
+    job = replace(order_of(folder.checked), solid_png=folder.solid_png)
     assert folder.plan.pressing is not None
     return traveller_html(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
 
@@ -419,7 +417,6 @@ def order_of(checked: Checked, folder: str = "") -> Job:
         fixture=f"{folder}{FIXTURE}" if checked.laminate.pins else None,
         underlay=f"{folder}{UNDERLAY}" if guides(checked.laminate) else None,
         kerf={str(name): kerf for name, kerf in kerf_widths(design).items()},
-        copies=design.order.quantity,
     )
 
 

@@ -212,7 +212,7 @@ def _bench_pages(
         folder = f"{design.name}/"
         work = Work(design, laminate, each.pressing, sheets, order_of(each.checked, folder))
         works.append(DesignWork(work, folder))
-    order, sha256 = assembled.assembly.order, assembly_sha256(assembled)
+    sha256 = assembly_sha256(assembled)
     traveller = assembly_html(
         AssemblyJob(
             assembled=assembled,
@@ -224,9 +224,6 @@ def _bench_pages(
             waived=plan.job.waived,
             lowered=plan.settings.lowered,
             picture=picture,
-            copies=order.copies,
-            made_for=order.made_for,
-            note=order.note,
         )
     )
     designs = [each.work for each in works]

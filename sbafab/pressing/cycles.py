@@ -114,12 +114,12 @@ def runs_of(
     return press_runs(copies, laminate.bounds, platen, margin, most)
 
 
-def design_runs(design: Design, laminate: Laminate, copies: int | None = None) -> Runs:
-    """Return the runs of ``copies``, by default the order."""
+def design_runs(design: Design, laminate: Laminate) -> Runs:
+    """Return the runs of a design's order."""
     press, order = design.press, design.order
     return runs_of(
         laminate,
-        order.quantity if copies is None else copies,
+        order.quantity,
         (press.platen_width, press.platen_length),
         _copies_by_hours(design, laminate) if order.at_once is None else order.at_once,
     )

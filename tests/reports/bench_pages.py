@@ -33,7 +33,7 @@ def work_of(sheet_files: Any, template: str, *assignments: str) -> Work:
     plan = schedule(laminate, press_settings(design))
     fixture = "sheets/fixture.dxf" if laminate.pins else None
     underlay = "underlay.pdf" if guides(laminate) else None
-    job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay, copies=design.order.quantity)
+    job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay)
     sheets = sheet_files(laminate) if sheet_files is not None else ()
     return Work(design, laminate, plan, sheets, job)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import os
 import re
@@ -58,7 +59,7 @@ def work_of(sheet_files: Any, template: str, *assignments: str, **job: Any) -> W
     given: dict[str, Any] = {"design_sha256": SHA, "generator": "sbafab 1.0.0", **job}
     given.setdefault("fixture", "sheets/fixture.dxf" if laminate.pins else None)
     plan = schedule(laminate, press_settings(design))
-    sheets = sheet_files(laminate, given.get("copies", 1))
+    sheets = sheet_files(laminate, design.order.quantity)
     return Work(design, laminate, plan, sheets, Job(**given))
 
 
@@ -183,10 +184,9 @@ def test_words_from_outside_stay_words(sheet_files: Any) -> None:
     work = work_of(
         sheet_files,
         "1dof-5mm",
-        made_for=hostile,
-        note=hostile,
+        f"order.made_for={json.dumps(hostile)}",
+        f"order.note={json.dumps(hostile)}",
         findings=[finding],
-        extras=[(hostile, hostile)],
         generator=hostile,
     )
     named = replace(work.laminate, name=hostile)
@@ -201,7 +201,7 @@ def test_words_from_outside_stay_words(sheet_files: Any) -> None:
 
 def test_a_blank_stands_where_nobody_is_named(sheet_files: Any) -> None:
     assert parsed(work_of(sheet_files, "1dof-5mm")).get_element_by_id("made-for").tag == "input"
-    named = page_of(work_of(sheet_files, "1dof-5mm", made_for="Ward 7"))
+    named = page_of(work_of(sheet_files, "1dof-5mm", "order.made_for=Ward 7"))
     assert "Ward 7" in named
     assert 'id="made-for"' not in named
 
@@ -241,8 +241,12 @@ def test_release_films_count_every_press_cycle(sheet_files: Any) -> None:
     """Two new ones each time the press closes, one below what is turned over; nine copies, four at
     most at once, take three cycles.
     """
-    for copies, assignment, cycles in ((1, "", 1), (3, "", 1), (9, "order.at_once=4", 3)):
-        work = work_of(sheet_files, "1dof-5mm", *filter(None, [assignment]), copies=copies)
+    for order, cycles in (
+        (("order.copies=1",), 1),
+        (("order.copies=3",), 1),
+        (("order.copies=9", "order.at_once=4"), 3),
+    ):
+        work = work_of(sheet_files, "1dof-5mm", *order)
         assert work.runs.count == cycles
         closings = cycles * len(work.schedule.steps)
         rows = parsed(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
@@ -252,7 +256,7 @@ def test_release_films_count_every_press_cycle(sheet_files: Any) -> None:
 
 
 def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
-    work = work_of(sheet_files, "3dof-15mm", copies=2, extras=[("Magnet", "1")])
+    work = work_of(sheet_files, "3dof-15mm", "order.copies=2")
     rows = parsed(work).get_element_by_id("materials").getparent().findall(".//tbody/tr")
     bill = [[words_of(cell) for cell in row][1:] for row in rows]
     found = {(name, what): quantity for name, what, quantity in bill}
@@ -268,7 +272,6 @@ def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
     names = [name for name, _ in found]
     assert {"Base plate", "Release film", "Press pad"} <= set(names)
     assert found["Tube", "Braintree RPT040, outer diameter 1.016 mm"] == "6 pieces + 1 spare"
-    assert found["Magnet", ""] == "1"
     area = 2 * sum(
         shapely.Polygon(rings[0], rings[1:]).area
         for layer in work.laminate.tpe_layers
@@ -282,7 +285,7 @@ def test_the_bill_counts_what_is_needed(sheet_files: Any) -> None:
 
 
 def test_the_cut_list_counts_every_pattern(sheet_files: Any) -> None:
-    work = work_of(sheet_files, "3dof-15mm", copies=3)
+    work = work_of(sheet_files, "3dof-15mm", "order.copies=3")
     on_sheets: Counter[str] = Counter()
     for sheet in work.sheets:
         for _, pattern, count in sheet.counts:

@@ -24,7 +24,7 @@ def work_of(template: str, *changes: str) -> Work:
     design = load_design(template, changes)
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
-    return Work(design, laminate, plan, [], Job(SHA, "sbafab 1", copies=design.order.copies))
+    return Work(design, laminate, plan, [], Job(SHA, "sbafab 1"))
 
 
 def bench_words(work: Work) -> str:

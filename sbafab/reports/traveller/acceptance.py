@@ -110,7 +110,7 @@ def _depth(work: Work) -> str:
 
 def _serials(work: Work) -> tuple[str, ...]:
     """Return the serial of each copy of a batch, a box for each; none for one copy, or for many."""
-    count = work.job.copies
+    count = work.copies
     if not 1 < count <= MOST_COPIES:
         return ()
     return tuple(serial(work.runs, n, work.design.order.batch) for n in range(1, count + 1))

@@ -74,9 +74,6 @@ class AssemblyJob:
     waived: Sequence[str]
     lowered: Sequence[str]
     picture: bytes
-    copies: int = 1
-    made_for: str = ""
-    note: str = ""
 
 
 def assembly_html(job: AssemblyJob) -> str:
@@ -91,6 +88,7 @@ def assembly_html(job: AssemblyJob) -> str:
         .render(
             **frame(name, job.sha256, job.generator),
             job=job,
+            order=job.assembled.assembly.order,
             sha256=job.sha256,
             shapes=definitions(part_regions(job.sheets)),
             code=code_svg(text),
@@ -218,7 +216,7 @@ def _bill(job: AssemblyJob) -> list[bill.Item]:
     for design in job.works:
         # Films are summed over the designs, and what a sheet is wrapped with is a part here.
         items += [_named(item, design) for item in bill.bill(design.work) if item.kind == "other"]
-    items += bought(job.assembled, job.copies)
+    items += bought(job.assembled, job.assembled.assembly.order.copies)
     return list(dict.fromkeys(items))
 
 
@@ -231,7 +229,7 @@ def _films(job: AssemblyJob) -> list[bill.Item]:
     areas: dict[Film, float] = {}
     for design in job.works:
         for layer in design.work.laminate.layers:
-            area = layer.profile.area * design.work.job.copies / 100
+            area = layer.profile.area * design.work.copies / 100
             areas[layer.film] = areas.get(layer.film, 0.0) + area
     items = []
     for film, area in areas.items():

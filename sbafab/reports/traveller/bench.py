@@ -87,7 +87,7 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
                 is_folded = bool(work.laminate.folds)
                 shape = work.laminate.as_cut(cut[0]) if is_folded else cut[0].profile
                 pieces = shape.pieces
-                needed = len(cut) * work.job.copies
+                needed = len(cut) * work.copies
                 count += len(pieces) * (needed + work.design.order.spare_parts(needed))
                 lightest = min(lightest, *(piece.area for piece in pieces))
     weight = ""
@@ -162,7 +162,7 @@ def _loose(work: Work) -> tuple[int, int]:
     for layers in work.laminate.patterns.values():
         pieces = len(layers[0].profile.pieces)
         if layers[0].is_mask and pieces > 1:
-            needed = len(layers) * work.job.copies
+            needed = len(layers) * work.copies
             loose += pieces * needed
             spare += pieces * work.design.order.spare_parts(needed)
     return loose, spare

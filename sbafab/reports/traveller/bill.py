@@ -67,10 +67,10 @@ def bill_csv(work: Work) -> str | None:
 
 def bill(work: Work) -> list[Item]:
     """Return all that must be at hand before the work starts, for all copies."""
-    job, laminate = work.job, work.laminate
+    laminate, underlay = work.laminate, work.job.underlay
     items = [*_films(work)]
     if laminate.tube_count:
-        number = laminate.tube_count * job.copies
+        number = laminate.tube_count * work.copies
         diameter = units.millimetres(work.design.inlet.tube_outer_diameter)
         tube = tube_name(work.design)
         pieces = f"{units.count(number, 'piece')} + {SPARE_TUBES} spare"
@@ -82,7 +82,7 @@ def bill(work: Work) -> list[Item]:
     if wrap is not None:
         diameter = units.millimetres(wrap.tube_diameter)
         words = f"to wrap the sheet round, outer diameter {diameter}"
-        items.append(Item("Tube to wrap", words, str(job.copies), job.copies, kind="wrap"))
+        items.append(Item("Tube to wrap", words, str(work.copies), work.copies, kind="wrap"))
         words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
         items.append(Item("Adhesive of the wrap", words, "as needed", kind="wrap"))
         items.append(replace(THREAD, kind="wrap"))
@@ -90,8 +90,8 @@ def bill(work: Work) -> list[Item]:
     for name, what, quantity, count in base_plate.items(work):
         area = count * width * length / 1e6 if name == base_plate.RELEASE_FILM else None
         items.append(Item(name, what, quantity, count, area))
-    if job.underlay is not None:
-        items.append(_underlay(work, job.underlay))
+    if underlay is not None:
+        items.append(_underlay(work, underlay))
         words = (
             f"{base_plate.TAPE}, 0.06 mm thick, 10 mm wide: along the plate's edges, off the films"
         )
@@ -104,7 +104,6 @@ def bill(work: Work) -> list[Item]:
             pages = len(tray_sheets(laminate)) * work.runs.together
             words = "tray.pdf printed at 100 % on plain paper; its bars must measure 100 mm"
             items.append(Item("Tray plan", words, units.count(pages, "page"), pages))
-    items += [Item(name, "", quantity) for name, quantity in job.extras]
     return items
 
 
@@ -133,7 +132,7 @@ def _films(work: Work) -> list[Item]:
     items = []
     for film in dict.fromkeys(layer.film for layer in work.laminate.layers):
         layers = [layer for layer in work.laminate.layers if layer.film == film]
-        area = sum(layer.profile.area for layer in layers) * work.job.copies / 100
+        area = sum(layer.profile.area for layer in layers) * work.copies / 100
         sheets = [sheet for sheet in work.sheets if sheet.material == film.material]
         sizes = Counter(units.size(sheet.width, sheet.length) for sheet in sheets)
         needed = [f"{units.count(number, 'sheet')} {size}" for size, number in sizes.items()]
@@ -141,7 +140,7 @@ def _films(work: Work) -> list[Item]:
             Item(
                 f"{film.material} film",
                 f"{film.product}, {units.millimetres(film.thickness)} thick; {area:.1f} cm² of "
-                f"parts in {units.count(len(layers) * work.job.copies, 'layer')}",
+                f"parts in {units.count(len(layers) * work.copies, 'layer')}",
                 ", ".join(needed) or "see the cut files",
                 len(sheets) or None,
                 sum(sheet.width * sheet.length for sheet in sheets) / 1e6 if sheets else None,
@@ -197,7 +196,7 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
         first.film.material,
         ", ".join(dict.fromkeys(layer.role.replace("-", " ") for layer in layers)),
         layer_numbers([layer.index for layer in layers]),
-        (len(layers) - len(folded) + 1) * work.job.copies,
+        (len(layers) - len(folded) + 1) * work.copies,
         _spares(work, layers[: len(layers) - len(folded) + 1]),
         len(profile.pieces),
         _cut_length(work, first),
@@ -233,7 +232,7 @@ def _spares(work: Work, layers: Sequence[Layer]) -> int:
         for design, pattern, count in sheet.counts
         if (design, pattern) == key
     )
-    needed = len(layers) * work.job.copies
+    needed = len(layers) * work.copies
     return max(0, cut // len(layers[0].profile.pieces) - needed)
 
 
@@ -319,7 +318,7 @@ def times(work: Work) -> list[Time]:
     plan = work.schedule
     rows = []
     if work.sheets:
-        copies = units.count(work.job.copies, "copy", "copies")
+        copies = units.count(work.copies, "copy", "copies")
         basis = f"{laser_basis(work)}; all sheets, {copies}"
         took = units.minutes(laser_minutes(work))
         rows.append(Time("Laser (within handling)", took, basis))

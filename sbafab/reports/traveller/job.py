@@ -45,8 +45,7 @@ class Job:
 
     ``kerf`` by material, None where it was not measured; ``fixture`` the path of the base plate's
     cut file, ``underlay`` that of the page to lay up on, ``solid_png`` the bytes of the picture of
-    the solid. ``lowered`` are limits below the usual ones. ``extras`` are further rows of the bill
-    of materials: item and quantity. Empty ``made_for`` leaves a blank to fill in by hand.
+    the solid. ``lowered`` are limits below the usual ones.
     """
 
     design_sha256: str
@@ -57,11 +56,7 @@ class Job:
     fixture: str | None = None
     underlay: str | None = None
     kerf: Mapping[str, Kerf | None] = field(default_factory=dict)
-    copies: int = 1
-    made_for: str = ""
-    note: str = ""
     solid_png: bytes | None = None
-    extras: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True)
@@ -75,9 +70,14 @@ class Work:
     job: Job
 
     @property
+    def copies(self) -> int:
+        """Number of actuators that are made."""
+        return self.design.order.quantity
+
+    @property
     def runs(self) -> Runs:
         """The press runs of all copies."""
-        return design_runs(self.design, self.laminate, self.job.copies)
+        return design_runs(self.design, self.laminate)
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
         "inflated_diameter": "Diameter on its tube, inflated, at most (computed)",
     }
     return [
-        ("Copies", str(work.job.copies)),
+        ("Copies", str(work.copies)),
         ("Balloons", balloons(laminate)),
         ("Chambers", str(len(laminate.chambers))),
         ("Layers", f"{len(laminate.layers)} of {len(laminate.patterns)} patterns"),
