@@ -162,10 +162,10 @@ def _toml_block(table: str, key: str, widths: Widths, warnings: list[str]) -> st
     return f"{table}\n{doubts}{key} = {value}\n"
 
 
-def _with_interval(value: Value, unit: str = " mm") -> str:
+def _with_interval(value: Value) -> str:
     low, high = value.interval
     return (
-        f"{value.value:.4f}{unit}, standard uncertainty {value.uncertainty:.4f}, "
+        f"{value.value:.4f} mm, standard uncertainty {value.uncertainty:.4f}, "
         f"95 % interval {low:.4f} to {high:.4f}"
     )
 

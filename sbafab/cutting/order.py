@@ -45,9 +45,9 @@ def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, 
     return (*_spread(holes, heat_distance), *_spread(outers, heat_distance))
 
 
-def travel(contours: Iterable[Contour], here: Point = ORIGIN) -> float:
-    """Mm that the head moves between contours, which end where they start."""
-    stops = [here, *map(_start, contours)]
+def travel(contours: Iterable[Contour]) -> float:
+    """Mm that the head moves from the origin to each contour, which ends where it starts."""
+    stops = [ORIGIN, *map(_start, contours)]
     return sum(math.dist(a, b) for a, b in pairwise(stops))
 
 

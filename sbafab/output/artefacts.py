@@ -57,7 +57,7 @@ from sbafab.simulators.simulator import Name, SimulationRequest, simulator, unde
 from sbafab.version import GENERATOR
 
 if TYPE_CHECKING:
-    from sbafab.reports.traveller.job import Job
+    from sbafab.reports.traveller.job import Job, Work
 
 TRAVELLER = "traveller.html"
 BENCH = "bench.html"
@@ -106,6 +106,16 @@ class DesignFolder:
         notes += [f"limits lowered: {', '.join(checked.lowered)}"] if checked.lowered else []
         laminate = checked.laminate
         return replace(laminate, notes=(*laminate.notes, *notes)) if notes else laminate
+
+    @cached_property
+    def work(self) -> Work:
+        """What the pages for the bench are made from; only of a plan with a press schedule."""
+        # `check` and `cut` have no pages for the bench.
+        from sbafab.reports.traveller.job import Work
+
+        assert self.plan.pressing is not None
+        job = order_of(self.checked)
+        return Work(self.design, self.laminate, self.plan.pressing, self.sheets, job)
 
     @cached_property
     def solid_png(self) -> bytes:
@@ -355,14 +365,9 @@ def _tray_pdf(folder: DesignFolder) -> bytes | None:
 
 def _tray_html(folder: DesignFolder) -> str | None:
     # Only a batch, or a design that asks for it, has a page for the phone.
-    from sbafab.reports.traveller.job import Work
     from sbafab.reports.traveller.tray_page import tray_html
 
-    assert folder.plan.pressing is not None
-    if not _has_tray(folder):
-        return None
-    job = order_of(folder.checked)
-    return tray_html(Work(folder.design, folder.laminate, folder.plan.pressing, (), job))
+    return tray_html(folder.work) if _has_tray(folder) else None
 
 
 def _has_tray(folder: DesignFolder) -> bool:
@@ -373,31 +378,24 @@ def _has_tray(folder: DesignFolder) -> bool:
 def _bill(folder: DesignFolder) -> str | None:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.bill import bill_csv
-    from sbafab.reports.traveller.job import Work
 
-    assert folder.plan.pressing is not None
-    job = order_of(folder.checked)
-    return bill_csv(Work(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job))
+    return bill_csv(folder.work)
 
 
 def _traveller(folder: DesignFolder) -> str:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.page import traveller_html
 
-    job = replace(order_of(folder.checked), solid_png=folder.solid_png)
-    assert folder.plan.pressing is not None
-    return traveller_html(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
+    work = folder.work
+    return traveller_html(replace(work, job=replace(work.job, solid_png=folder.solid_png)))
 
 
 def _bench(folder: DesignFolder) -> str:
     # The pages for the bench take as long to load as all the rules.
     from sbafab.reports.traveller.bench import bench_html
-    from sbafab.reports.traveller.job import Work
 
-    assert folder.plan.pressing is not None
-    job = order_of(folder.checked)
-    work = Work(folder.design, folder.laminate, folder.plan.pressing, folder.sheets, job)
-    return bench_html(folder.design.name, job.design_sha256, GENERATOR, [work])
+    work = folder.work
+    return bench_html(work.design.name, work.job.design_sha256, GENERATOR, [work])
 
 
 def order_of(checked: Checked, folder: str = "") -> Job:

@@ -41,16 +41,13 @@ def work_of(sheet_files: Any, template: str, *assignments: str) -> Work:
 def page(sheet_files: Any, template: str, *assignments: str) -> Any:
     """The traveller of a template."""
     work = work_of(sheet_files, template, *assignments)
-    return lxml_html.fromstring(traveller_html(*(getattr(work, name) for name in FIELDS)))
+    return lxml_html.fromstring(traveller_html(work))
 
 
 def bench(template: str, *assignments: str) -> Any:
     """The page of its bench."""
     work = work_of(None, template, *assignments)
     return lxml_html.fromstring(bench_html(work.design.name, SHA, "sbafab 1.0.0", [work]))
-
-
-FIELDS = ("design", "laminate", "schedule", "sheets", "job")
 
 
 def words_of(node: Any) -> str:

@@ -64,7 +64,7 @@ def work_of(sheet_files: Any, template: str, *assignments: str, **job: Any) -> W
 
 
 def page_of(work: Work) -> str:
-    return traveller_html(work.design, work.laminate, work.schedule, work.sheets, work.job)
+    return traveller_html(work)
 
 
 def parsed(work: Work) -> Any:
@@ -211,12 +211,12 @@ import hashlib
 from sbafab.actuators import build, load_design
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.job import Job
+from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 design = load_design("3dof-15mm", ())
 laminate = build(design)
 plan = schedule(laminate, press_settings(design))
-page = traveller_html(design, laminate, plan, [], Job("{sha}", "sbafab 1.0.0"))
+page = traveller_html(Work(design, laminate, plan, [], Job("{sha}", "sbafab 1.0.0")))
 print(hashlib.sha256(page.encode()).hexdigest())
 """
 

@@ -33,7 +33,7 @@ def bench_words(work: Work) -> str:
 
 
 def words_of(work: Work) -> str:
-    text = traveller_html(work.design, work.laminate, work.schedule, [], work.job)
+    text = traveller_html(work)
     return " ".join(lxml_html.fromstring(text).text_content().split())
 
 
@@ -95,7 +95,7 @@ def test_a_film_that_nobody_burst_gets_a_blank() -> None:
 
 def test_every_copy_has_its_proof_test() -> None:
     work = work_of("1dof-5mm", "order.copies=3")
-    text = traveller_html(work.design, work.laminate, work.schedule, [], work.job)
+    text = traveller_html(work)
     page = lxml_html.fromstring(text)
     assert [
         len(page.xpath(f"//*[@id='{name}-{copy}']"))

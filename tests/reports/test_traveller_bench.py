@@ -328,7 +328,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     design, laminate = built("1dof-5mm")
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", underlay="underlay.pdf")
-    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, [], job)))
     told = [re.search(r"The print shows the edges of ([^.:]*)[.:]", step) for step in steps(tree)]
     assert [found and found[1] for found in told] == [
         None,
@@ -362,16 +362,14 @@ def test_spares_are_told_beside_what_is_needed(sheet_files: Any) -> None:
     job = Job(SHA, "sbafab 1.0.0")
     work = Work(design, laminate, plan, sheets, job)
     assert {row.pattern: row.spares for row in cut_list(work) if row.spares} == {"P02": 2, "P06": 2}
-    assert "14 + 2 spare" in words_of(
-        lxml_html.fromstring(traveller_html(design, laminate, plan, sheets, job))
-    )
+    assert "14 + 2 spare" in words_of(lxml_html.fromstring(traveller_html(work)))
 
 
 def test_the_cover_says_what_its_colours_are(sheet_files: Any) -> None:
     design, laminate = built("1dof-5mm")
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", solid_png=b"\x89PNG")
-    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, [], job))
+    tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, [], job)))
     keys = [words_of(key) for key in tree.findall(".//span[@class='key']")]
     assert keys == ["TPE", "film, cut", "bond, cut", "open gap"]
 
@@ -459,7 +457,7 @@ def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any)
     tight = [finding for finding in run_deck(laminate, limits(design)) if finding.rule == "pin-fit"]
     job = Job(SHA, "sbafab 1.0.0", findings=tuple(tight))
     sheets = sheet_files(laminate)
-    tree = lxml_html.fromstring(traveller_html(design, laminate, plan, sheets, job))
+    tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, sheets, job)))
     cut = words_of(tree.get_element_by_id("cut").getparent())
     # 1.04 less twice 0.104 is 0.832; a pin of 1 mm m6 has up to 1.008: 21 %. In step 3 a chamber's
     # pin has 27 walls and 14 masks.
@@ -472,7 +470,7 @@ def test_tubes_and_leaks_are_those_of_every_copy() -> None:
     design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=3")
     plan = schedule(laminate, press_settings(design))
     tree = lxml_html.fromstring(
-        traveller_html(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
+        traveller_html(Work(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0")))
     )
     for part in ("tubes", "leak"):
         section = tree.get_element_by_id(part).getparent()
@@ -480,7 +478,7 @@ def test_tubes_and_leaks_are_those_of_every_copy() -> None:
         first = section.xpath(".//ul[@class='ticks']/li")[0]
         assert len(first.xpath(".//input[@type='checkbox']")) == 3
     alone = traveller_html(
-        design.with_("order.copies=1"), laminate, plan, [], Job(SHA, "sbafab 1.0.0")
+        Work(design.with_("order.copies=1"), laminate, plan, [], Job(SHA, "sbafab 1.0.0"))
     )
     assert "one after the other" not in alone
 

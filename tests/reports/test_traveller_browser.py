@@ -17,7 +17,7 @@ from sbafab.actuators import build, load_design
 from sbafab.assemblies.files import load_assembly
 from sbafab.output.checked import press_settings
 from sbafab.pressing.schedule import schedule
-from sbafab.reports.traveller.job import Job
+from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import record_text, traveller_html
 from sbafab.runs.run import RunRequest, generate
 from tests.quick import few
@@ -54,7 +54,7 @@ def html(sheet_files: Any) -> str:
     laminate = build(design)
     plan = schedule(laminate, press_settings(design))
     job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf")
-    return traveller_html(design, laminate, plan, sheet_files(laminate), job)
+    return traveller_html(Work(design, laminate, plan, sheet_files(laminate), job))
 
 
 @pytest.mark.parametrize("paper", few(PAPERS, 1))

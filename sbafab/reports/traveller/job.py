@@ -61,7 +61,9 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """A design with its laminate, schedule, sheets and order: all that its pages are made from."""
+    """A design with its laminate and its schedule, the ``sheets`` that hold all its copies, and its
+    order: all that its pages are made from.
+    """
 
     design: Design
     laminate: Laminate

@@ -20,14 +20,14 @@ from sbafab.laminate.assembly import pins_when_added
 from sbafab.laminate.films import Film
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.models.formulas import sizes
-from sbafab.pressing.schedule import Schedule, joined_words, layers_in_words
+from sbafab.pressing.schedule import joined_words, layers_in_words
 from sbafab.reports.canvas import COLOURS, KEY
 from sbafab.reports.drawing import TIMES, balloons, layer_numbers
 from sbafab.reports.html_templates import environment
 from sbafab.reports.traveller import acceptance, base_plate, bench, bill, process, units
 from sbafab.reports.traveller.batch import batch_page
 from sbafab.reports.traveller.bill import kerf_states
-from sbafab.reports.traveller.job import HERE, Job, Work, frame
+from sbafab.reports.traveller.job import HERE, Work, frame
 from sbafab.reports.traveller.joints import joint_pages
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS, record_tables
 from sbafab.reports.traveller.shapes import Round, definitions, pattern_regions, rounds
@@ -45,15 +45,8 @@ TEMPLATE = "traveller.html.j2"
 BY_HAND = "none (by hand)"
 
 
-def traveller_html(
-    design: Design,
-    laminate: Laminate,
-    schedule: Schedule,
-    sheets: Sequence[SheetFile],
-    job: Job,
-) -> str:
-    """Return the whole page. ``schedule`` is this laminate's, ``sheets`` hold all its copies."""
-    work = Work(design, laminate, schedule, sheets, job)
+def traveller_html(work: Work) -> str:
+    """Return the whole page."""
     return environment(HERE).get_template(TEMPLATE).render(context(work))
 
 

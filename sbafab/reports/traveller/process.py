@@ -81,8 +81,6 @@ class StepPage:
     plan: str
     exploded: str
     actions: tuple[Action, ...]
-    is_needless: bool
-    """Nothing bonds in it."""
 
 
 def step_pages(work: Work) -> list[StepPage]:
@@ -106,7 +104,6 @@ def step_pages(work: Work) -> list[StepPage]:
                 plan(work.laminate, part, lying, f"plan-{step.step}"),
                 exploded(work.laminate, part, lying, f"exploded-{step.step}"),
                 tuple(_actions(work, part, step, lying, runs)),
-                _is_loose(work, part),
             )
         )
     return pages

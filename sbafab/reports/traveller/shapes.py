@@ -129,11 +129,11 @@ def flat(scale: float, at: Point) -> tuple[float, ...]:
     return scale, 0.0, 0.0, -scale, at[0], at[1]
 
 
-def label(at: Point, words: str, size: float = draw.SMALL, anchor: str = "middle") -> str:
+def label(at: Point, words: str, size: float = draw.SMALL) -> str:
     """Return words over a drawing, with a white rim that keeps them legible."""
     x, y = map(coord, at)
     return (
-        f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="{anchor}" stroke="#ffffff" '
+        f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="middle" stroke="#ffffff" '
         f'stroke-width="{coord(size / 4)}" stroke-linejoin="round" paint-order="stroke" '
         f'fill="{draw.DARK}">{escape(words)}</text>'
     )
