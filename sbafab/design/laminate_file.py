@@ -245,7 +245,8 @@ def read_laminate(path: Path) -> Laminate:
         if first["type"] == "json_invalid":
             reason = first["ctx"]["error"]
             raise DesignError(f"{path} cannot be read as a laminate: {reason}") from None
-        words = sentence(error, LaminateDocument, {}, "", FILE)
+        is_object = bool(first["loc"])
+        words = sentence(error, LaminateDocument, {}, "", FILE) if is_object else "it is no object"
         raise DesignError(f"{path} is not a sound laminate; {words}") from None
     fault = next(_faults(document), None)
     if fault is not None:
