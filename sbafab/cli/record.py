@@ -234,7 +234,8 @@ def _correct(store: Lab, values: Mapping[str, Any]) -> LabRow:
     kind, number = values["correct"]
     is_entry = kind is HistoryEntry
     change = _pairs(" ".join(values.get("entry", ()))) if is_entry else _result(values)
-    if not (change or "withdraw" in values):
+    is_other = values.keys() & ({"serial", *RESULTS} if is_entry else {"entry"})
+    if is_other or not (change or "withdraw" in values):
         wanted = "an --entry with what is right" if is_entry else "the correct result"
         raise click.UsageError(f"give {wanted}, or --withdraw")
     row: LabRow = store.correct(kind, number, {**change, "withdrawn": "withdraw" in values})

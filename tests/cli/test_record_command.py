@@ -139,6 +139,8 @@ def test_a_folder_is_recorded_as_the_design_that_it_was_built_from(
         (["--correct", "1", "--again"], "--again does not go with --correct"),
         (["--correct", "x1", "--leak", "pass"], "no record such as 3 and no entry such as e3"),
         (["--correct", "e1"], "give an --entry"),
+        (["--correct", "e1", "--entry", "note=x", "--leak", "pass"], "give an --entry"),
+        (["--correct", "1", "--leak", "pass", "--entry", "note=x"], "give the correct result"),
         (["--charts", "c"], "--charts"),
         (["--chart", "a.svg"], "lab.sqlite is no file of records"),
         (["1dof-5mm", "--serial", "A1", "--entry", "step"], "must be fields such as step=1"),
