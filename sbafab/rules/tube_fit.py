@@ -16,10 +16,9 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sbafab.geometry.contour import nanometres
-from sbafab.geometry.edges import Edge, Line, Point, meeting_points
-from sbafab.geometry.nearby import EdgeIndex, boxes_meet, widened
-from sbafab.geometry.region import Region, polygon, strip
+from sbafab.geometry.edges import Edge, Line, Point
+from sbafab.geometry.nearby import EdgeIndex, boxes_meet
+from sbafab.geometry.region import Region, strip
 from sbafab.geometry.width import Width
 from sbafab.laminate.joints import Port
 from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer
@@ -36,8 +35,6 @@ BOND = "the bond beside the strip"
 MOUTH = "the mouth"
 UNLIKE = 2 * PAST_MOUTH
 """mm by which a strip may be wider or narrower than its inlet states."""
-ROOM = 1e-9
-"""mm by which what is straight, parallel or at the mouth may be off for rounding."""
 
 
 class _Fit(NamedTuple):
@@ -235,7 +232,7 @@ def _along_run(inlet: Inlet, interface: Interface, needed: float, limits: Limits
         # Films go on beside a seam; their other side is no part of the strip.
         near = [piece for piece in near if piece.contains((x - dx * TOLERANCE, y - dy * TOLERANCE))]
     every = Region(tuple(contour for piece in near for contour in piece.contours))
-    run = _straight_run(every, inlet, beside) or every & beside
+    run = every & beside
     sides = [edge for edge in run.edges if _is_side(edge, inlet)]
     widths = [
         outward_reach(edge.reversed(), EdgeIndex([e for e in run.edges if e is not edge]))
@@ -280,53 +277,6 @@ def _at_worst(fit: _Fit, p: Point, q: Point, limits: Limits) -> _Fit:
         remedy = f"lay the seams beside the inlet of {fit.inlet.chamber} {least:.3f} mm apart"
     firm = edges.with_seams_in_place.left(drawn).value
     return fit._replace(value=value, remedy=remedy, drawn=drawn.value, firm=firm)
-
-
-def _straight_run(unbonded: Region, inlet: Inlet, beside: Region) -> Region | None:
-    """Inlet's run if it is a strip between two straight edges with nothing else near, or None."""
-    sides: list[Edge] = []
-    for edge in unbonded.edges:
-        if not boxes_meet(widened(edge.bounds, ROOM), beside.bounds) or _is_off(edge, inlet):
-            continue
-        if not isinstance(edge, Line):
-            return None
-        near, far = sorted((inlet.depth(edge.start), inlet.depth(edge.end)))
-        if far > ROOM:
-            aside = abs(inlet.offset(edge.start) - inlet.offset(edge.end))
-            if abs(near) > ROOM or far < inlet.length + ROOM or aside > ROOM:
-                return None
-            sides.append(edge)
-    if len(sides) != 2:
-        return None
-    # The inlet's direction leads outward along the one that has the strip on its left.
-    out, back = sorted(sides, key=lambda edge: inlet.depth(edge.end))
-    right, left = inlet.offset(out.end), inlet.offset(back.start)
-    if max(inlet.depth(out.end), inlet.depth(back.start)) > ROOM or not left < right:
-        return None
-    if max(right, -left) > inlet.width - ROOM:
-        return None
-    (inner,) = (edge for edge in beside.edges if inlet.depth(edge.at(0.5)) > inlet.length - ROOM)
-    crossed = []
-    for edge in (out, back):
-        # In the order, and so with the rounding, in which booleans ask where edges meet.
-        edge_a, edge_b = sorted((edge, inner), key=lambda edge_a: edge_a.bounds[0])
-        crossed += meeting_points(edge_a, edge_b)
-    if len(crossed) != 2:
-        return None
-    begin, end = crossed
-    corners = [begin, out.end, back.start, end]
-    # As a boolean hands it out.
-    first = min(range(4), key=lambda i: (nanometres(corners[i][0]), nanometres(corners[i][1])))
-    return polygon(corners[first:] + corners[:first])
-
-
-def _is_off(edge: Edge, inlet: Inlet) -> bool:
-    """Return True if an edge lies deeper than the run, or outside the examined width."""
-    (dx, dy), mouth = inlet.direction, inlet.mouth
-    if -edge.farthest_along(mouth, (dx, dy)) > inlet.length + ROOM:
-        return True
-    aside = (dy, -dx), (-dy, dx)
-    return any(-edge.farthest_along(mouth, way) > inlet.width + ROOM for way in aside)
 
 
 def _needed(inlet: Inlet, interface: Interface) -> float:

@@ -12,10 +12,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple
 
-from sbafab.geometry.boolean import alone, turned_round
 from sbafab.geometry.cache import cached
-from sbafab.geometry.contour import in_reading_order, tidy
-from sbafab.geometry.edges import Arc, Bounds, Edge, Line, Point, distance_to
+from sbafab.geometry.edges import Bounds, Edge, Line, Point, distance_to
 from sbafab.geometry.nearby import widened
 from sbafab.geometry.region import Region, rectangle, union
 from sbafab.laminate.folding import lies_on
@@ -97,7 +95,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
     low_x, low_y, high_x, high_y = laminate.bounds
     frame = rectangle((low_x - 10, low_y - 10), (high_x + 10, high_y + 10))
     openings = {
-        pattern: _around(layers[0].profile, frame).pieces
+        pattern: (frame - layers[0].profile).pieces
         for pattern, layers in laminate.patterns.items()
         if not layers[0].is_mask
     }
@@ -183,22 +181,14 @@ def _gap(
     unbonded: Region, contact: Region, frame: Region, folds: tuple[tuple[Point, Point], ...]
 ) -> _Gap:
     pieces = unbonded.pieces
-    missing = _around(contact, frame).pieces
+    missing = (frame - contact).pieces
     touching: list[tuple[int, int, Edge]] = []
-    # Where no contours touch, one side of a circle is one void as far as edges go on along it.
-    goes_on = not (_touches_itself(unbonded) or _touches_itself(contact))
-    before: Edge | None = None
-    number = home = 0
     for edge in edges_along(unbonded, contact):
         if lies_on(edge, folds):
             # Film goes on there: a fold leaks nothing.
             continue
-        p = edge.at(0.5)
-        if not (goes_on and _follows(before, edge)):
-            home = _holding(missing, beside(edge, -INSET))
-            number = _bounded(pieces, p)
-        touching.append((number, home, edge))
-        before = edge
+        home = _holding(missing, beside(edge, -INSET))
+        touching.append((_bounded(pieces, edge.at(0.5)), home, edge))
     touching.sort(key=lambda entry: entry[0])
     outside = _outside(missing, frame)
     # Inlets open to the outside; of any other two voids it counts that they join, and first where.
@@ -206,23 +196,6 @@ def _gap(
     for number, home, edge in touching:
         joins.setdefault((number, home, edge if home == outside else None), (number, home, edge))
     return _Gap(pieces, missing, tuple(joins.values()), outside)
-
-
-def _touches_itself(region: Region) -> bool:
-    """Return True if contours meet at a point."""
-    return len({edge.start for edge in region.edges}) < len(region.edges)
-
-
-def _follows(before: Edge | None, edge: Edge) -> bool:
-    """Return True if an arc continues the arc before it, on the same circle."""
-    return (
-        isinstance(before, Arc)
-        and isinstance(edge, Arc)
-        and before.end == edge.start
-        and before.centre == edge.centre
-        and before.radius == edge.radius
-        and before.ccw == edge.ccw
-    )
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
@@ -237,20 +210,6 @@ def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
     if len(inside) == 1:
         return inside[0]
     return min(range(len(pieces)), key=lambda number: pieces[number].distance_to_edge(p))
-
-
-def _around(region: Region, frame: Region) -> Region:
-    """The rest of a frame well outside the region: the contours, turned round."""
-    if _touches_itself(region):
-        # Where contours touch at a point, what they leave may hang together otherwise.
-        return frame - region
-    turned = (
-        turned_round(contour) if alone(contour) is contour else tidy(contour.reversed().edges)
-        for contour in region.contours
-    )
-    return Region(
-        in_reading_order([*frame.contours, *(contour for contour in turned if contour is not None)])
-    )
 
 
 def _add_gap(

@@ -13,9 +13,9 @@ import pytest
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
-from sbafab.laminate.laminate import Inlet, Laminate
-from sbafab.rules import boundary, freedoms, margins, tube_fit, voids
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, union
+from sbafab.laminate.laminate import Laminate
+from sbafab.rules import boundary, freedoms, margins
 from sbafab.rules.boundary import facing_films, outward_reach
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -35,7 +35,7 @@ from sbafab.rules.registration_yield import (
     rows_of,
     simulate,
 )
-from sbafab.rules.voids import _around, _gap
+from sbafab.rules.voids import _gap
 
 Good = Callable[..., Laminate]
 BUILDS = 400
@@ -218,20 +218,6 @@ def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
     assert 0 < len(found) < 400
 
 
-@pytest.mark.parametrize("design", DESIGNS)
-def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
-    design: tuple[str, ...], good: Good, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    laminate = good(*design)
-    frame = rectangle((-50, -50), (50, 50))
-    gaps = [(one.unbonded, one.contact, frame, ()) for one in laminate.interfaces]
-    gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
-    found = [gap(*one) for one in gaps]
-    monkeypatch.setattr(voids, "_follows", lambda *_: False)
-    assert [gap(*one) for one in gaps] == found
-    assert any(len(one.touching) > 3 for one in found)
-
-
 TAPERED = ("1dof-5mm", "stack.balloons=4", "chamber.diameter=[5, 8, 6, 8]")
 
 
@@ -263,66 +249,8 @@ def test_films_outside_an_outline_face_nothing_within_it(
     assert facing_films(laminate) == found
 
 
-RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
-STRIP = rectangle((0.0, -0.3), (9.0, 1.3))
-"""A strip that opens at the inlet of that run."""
-
-
-@pytest.mark.parametrize("degrees", [0, 90, 120, 263])
-def test_a_straight_run_is_what_a_boolean_leaves_of_it(degrees: float) -> None:
-    pocket = (STRIP | disc((0.0, 0.5), 2.5)).turned(degrees)
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    mouth = 9.0 * c - 0.5 * s, 9.0 * s + 0.5 * c
-    inlet = replace(RUN, mouth=mouth, direction=(c, s))
-    inner = mouth[0] - 3.0 * c, mouth[1] - 3.0 * s
-    beside = strip(inner, mouth, 2 * inlet.width)
-    run = tube_fit._straight_run(pocket, inlet, beside)
-    assert run is not None
-    assert run.area == pytest.approx(3.0 * 1.6)
-    assert [edge.start for edge in run.edges] == [
-        pytest.approx(edge.start) for edge in (pocket & beside).edges
-    ]
-
-
-@pytest.mark.parametrize(
-    "unbonded",
-    [
-        # A hole in the run, a waist, sides aslant, a shape beside it, wider than is looked at.
-        STRIP - disc((7.5, 0.5), 0.1),
-        STRIP - rectangle((7.0, -1.0), (7.5, 0.0)),
-        polygon([(0, -0.3), (9, -0.2), (9, 1.3), (0, 1.3)]),
-        STRIP | rectangle((7.0, 1.5), (7.5, 2.0)),
-        rectangle((0.0, -1.2), (9.0, 2.2)),
-        # It ends before the mouth, goes on past it, or begins after the run does.
-        rectangle((0.0, -0.3), (8.9, 1.3)),
-        rectangle((0.0, -0.3), (9.5, 1.3)),
-        rectangle((6.5, -0.3), (9.0, 1.3)),
-    ],
-)
-def test_any_other_run_is_left_to_the_boolean(unbonded: Region) -> None:
-    beside = strip((6.0, 0.5), (9.0, 0.5), 3.2)
-    assert tube_fit._straight_run(STRIP, RUN, beside) is not None
-    assert tube_fit._straight_run(unbonded, RUN, beside) is None
-
-
 FRAME = rectangle((-20, -20), (20, 20))
 NOTCHED = rectangle((-4, -3), (4, 3)) - disc((0, 0), 1) - disc((4, 0), 1.5)
-
-
-@pytest.mark.parametrize(
-    "region",
-    [
-        Region(),
-        disc((1, 2), 3),
-        NOTCHED,
-        union([NOTCHED, disc((9, 9), 2)]),
-        # Two squares that touch at a corner, and a hole that touches its outline.
-        union([rectangle((0, 0), (2, 2)), rectangle((2, 2), (4, 4))]),
-        rectangle((0, 0), (6, 6)) - rectangle((0, 2), (2, 4)).turned(45, (0, 2)),
-    ],
-)
-def test_what_is_round_a_region_is_what_a_boolean_leaves(region: Region) -> None:
-    assert _around(region, FRAME).contours == (FRAME - region).contours
 
 
 def test_voids_that_touch_at_a_point_are_told_apart_along_one_circle() -> None:
