@@ -17,7 +17,7 @@ from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
-from sbafab.design.sections import NOT_MEASURED, named_film
+from sbafab.design.sections import named_film
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.geometry.region import Region
@@ -26,9 +26,8 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import TURNS, NestPart, Stock, parts_of
 from sbafab.pressing import dowels
-from sbafab.pressing.build_up import Pad
 from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import PressSettings, Schedule, plate_holes, schedule
+from sbafab.pressing.schedule import Schedule, plate_holes, press_settings, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, summary
@@ -179,32 +178,6 @@ def recipes(design: Design) -> dict[Material, Recipes]:
         for name, film in used_films(design).items()
     }
     return {name: found for name, found in by_film.items() if found}
-
-
-def press_settings(design: Design) -> PressSettings:
-    press = design.press
-    return PressSettings(
-        temperature_c=press.temperature_c,
-        pressure_kpa=press.pressure_kpa,
-        platen=(press.platen_width, press.platen_length),
-        flash_bottom=press.flash_bottom_minutes,
-        bond_bottom=press.bond_bottom_minutes,
-        flash_middle=press.flash_middle_minutes,
-        bond_all=press.bond_all_minutes,
-        validated_balloons=design.rules.validated_balloons,
-        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
-        plate_material=press.plate_material,
-        plate_thickness=press.plate_thickness,
-        release_film=press.release_film,
-        release_thickness=press.release_thickness,
-        underlay_thickness=press.underlay_thickness,
-        pin_standard=design.registration.pin_standard,
-        pin_lengths=design.registration.pin_lengths,
-        plate_made_by=design.registration.plate_made_by,
-        minutes_for=tuple(map(named_film, press.minutes_for)),
-        time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
-        is_timed=not design.form.is_drawn,
-    )
 
 
 def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from sbafab.design.records import Design
-from sbafab.design.sections import named_film
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.laminate.assembly import PLATE_MARGIN, assembly, films_without_minutes
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import HANDLING_MINUTES, PressSettings, Schedule
+from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, press_settings
 
 APART = 5.0
 """Gap in mm between two copies in the press, ours: films flow, and hands need room."""
@@ -130,14 +129,7 @@ def _copies_by_hours(design: Design, laminate: Laminate) -> int:
 
     Minutes that are not stated for the film count as none: the press may then take longer.
     """
-    press = design.press
-    settings = PressSettings(
-        flash_bottom=press.flash_bottom_minutes,
-        bond_bottom=press.bond_bottom_minutes,
-        flash_middle=press.flash_middle_minutes,
-        bond_all=press.bond_all_minutes,
-        minutes_for=tuple(map(named_film, press.minutes_for)),
-    )
+    settings = press_settings(design)
     pressing = 0.0
     if not films_without_minutes(laminate, settings.minutes_for):
         pressing = sum(settings.minutes(part.name) for part in assembly(laminate))

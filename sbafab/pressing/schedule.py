@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple
 
+from sbafab.design.records import Design
+from sbafab.design.sections import NOT_MEASURED, named_film
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import (
@@ -24,7 +26,6 @@ from sbafab.laminate.assembly import (
     pressed_layers,
     stack_count,
 )
-from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import FIRST, PAPER_PRODUCT, PAPER_THICKNESS, Film
 from sbafab.laminate.joints import PRESS, SeamKind, SeamTool
 from sbafab.laminate.laminate import Laminate
@@ -188,7 +189,6 @@ class PressSettings:
     underlay_thickness: float = 0.1
     pin_standard: Standard = "ISO 8734"
     pin_lengths: tuple[float, ...] = ()
-    plate_made_by: PlateMachine = "jig-borer"
     minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
     """Products and thicknesses (mm) of the films that the minutes were stated for."""
     time_constant: float | None = None
@@ -211,6 +211,32 @@ class PressSettings:
             "tack_all": self.flash_middle,
             "bond_all": self.bond_all,
         }[step]
+
+
+def press_settings(design: Design) -> PressSettings:
+    """Return the settings of the press that a design asks for."""
+    press, registration = design.press, design.registration
+    return PressSettings(
+        temperature_c=press.temperature_c,
+        pressure_kpa=press.pressure_kpa,
+        platen=(press.platen_width, press.platen_length),
+        flash_bottom=press.flash_bottom_minutes,
+        bond_bottom=press.bond_bottom_minutes,
+        flash_middle=press.flash_middle_minutes,
+        bond_all=press.bond_all_minutes,
+        validated_balloons=design.rules.validated_balloons,
+        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
+        plate_material=press.plate_material,
+        plate_thickness=press.plate_thickness,
+        release_film=press.release_film,
+        release_thickness=press.release_thickness,
+        underlay_thickness=press.underlay_thickness,
+        pin_standard=registration.pin_standard,
+        pin_lengths=registration.pin_lengths,
+        minutes_for=tuple(map(named_film, press.minutes_for)),
+        time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
+        is_timed=not design.form.is_drawn,
+    )
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Stack, stack
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 
 NONE = "none"
 """The model of what none predicts."""

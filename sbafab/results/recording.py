@@ -18,10 +18,9 @@ from sbafab.design.files import Change
 from sbafab.design.identity import kit_of
 from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
-from sbafab.output.checked import press_settings
 from sbafab.output.schema_ids import HISTORY_SCHEMA
 from sbafab.output.swap import replace_text
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.results.builds import Build, promised, recorded_sha256
 from sbafab.results.records import HistoryEntry, LabRow, Record, Row, columns, row_of

@@ -15,8 +15,8 @@ from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
-from sbafab.output.checked import check, press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.output.checked import check
+from sbafab.pressing.schedule import press_settings, schedule
 
 DESIGNS = [
     ("1dof-5mm", []),

@@ -18,8 +18,7 @@ from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.bill import waiting
 from sbafab.reports.traveller.job import Job, Work
 

@@ -15,8 +15,7 @@ from sbafab.design.identity import kit_of
 from sbafab.design.kits import write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.rules.deck import has_failed
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Run, RunRequest, generate

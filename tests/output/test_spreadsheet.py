@@ -11,8 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.actuators import build
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.pressing.schedule_files import press_csv
 from sbafab.spreadsheet import csv_text, plain_text
 

@@ -19,7 +19,6 @@ from sbafab.laminate.base_plate import (
     pin_error,
 )
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
 from sbafab.pressing.dowels import (
     PinHole,
     Standard,
@@ -28,7 +27,14 @@ from sbafab.pressing.dowels import (
     is_sold,
     lengths_sold,
 )
-from sbafab.pressing.schedule import PressSettings, Schedule, Step, plate_holes, schedule
+from sbafab.pressing.schedule import (
+    PressSettings,
+    Schedule,
+    Step,
+    plate_holes,
+    press_settings,
+    schedule,
+)
 
 Stack = Callable[..., Laminate]
 PAPER = PressSettings()

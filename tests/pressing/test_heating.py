@@ -10,8 +10,8 @@ import pytest
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import PressSettings, Schedule, schedule
+from sbafab.pressing.plate_heating import cool_minutes, warm_minutes
+from sbafab.pressing.schedule import PressSettings, Schedule, press_settings, schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
@@ -195,3 +195,18 @@ def test_every_step_says_how_large_its_laminate_is(template: str, method: str) -
         low_x, low_y, high_x, high_y = layer.profile.bounds
         assert high_x - low_x <= size[0] + 1e-6
         assert high_y - low_y <= size[1] + 1e-6
+
+
+@pytest.mark.parametrize("plate", [6.0, 12.0])
+def test_a_plate_warms_and_cools_as_a_lump_followed_second_by_second(plate: float) -> None:
+    heat = 7850 * 490 * plate / 1000  # J/(m2 K)
+    warm, seconds = 20.0, 0
+    while warm < 130:
+        warm += 500 * (135 - warm) / heat
+        seconds += 1
+    assert warm_minutes(plate, 135) == pytest.approx(seconds / 60, rel=0.04)
+    cold, seconds = 135.0, 0
+    while cold > 40:
+        cold -= 2 * 10 * (cold - 20) / heat
+        seconds += 1
+    assert cool_minutes(plate, 135) == pytest.approx(seconds / 60, rel=0.04)

@@ -13,8 +13,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.schedule import PressSettings, press_settings, schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]

@@ -11,8 +11,7 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.results.recording import entries_of
 from tests.reports.bench_pages import built, page, words_of

@@ -24,8 +24,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.bill import cut_list
@@ -209,7 +208,7 @@ def test_a_blank_stands_where_nobody_is_named(sheet_files: Any) -> None:
 PRINTS = """
 import hashlib
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import press_settings
+from sbafab.pressing.schedule import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html

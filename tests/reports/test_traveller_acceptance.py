@@ -10,8 +10,7 @@ from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.burst import burst
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.acceptance import proof
 from sbafab.reports.traveller.bench import bench_html, film_classes, pressure_range
 from sbafab.reports.traveller.job import Job, Work

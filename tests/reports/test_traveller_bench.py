@@ -14,9 +14,9 @@ from lxml import html as lxml_html
 from sbafab.cutting.sheets import SheetFile
 from sbafab.laminate.films import Film
 from sbafab.nesting.records import Nest
-from sbafab.output.checked import limits, press_settings
+from sbafab.output.checked import limits
 from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.bill import cut_list

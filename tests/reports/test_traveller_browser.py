@@ -15,8 +15,7 @@ from PIL import Image
 
 from sbafab.actuators import build, load_design
 from sbafab.assemblies.files import load_assembly
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import record_text, traveller_html
 from sbafab.runs.run import RunRequest, generate

@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.bench import before_cutting
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.underlay import seams_pdf

@@ -12,9 +12,8 @@ from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
 from sbafab.pressing.cycles import Runs, design_runs
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.tray_page import tray_html
 from sbafab.reports.tray_plan import tray_pdf

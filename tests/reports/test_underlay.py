@@ -16,9 +16,8 @@ import shapely.affinity
 from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
-from sbafab.output.checked import press_settings
 from sbafab.pressing.cycles import runs_of
-from sbafab.pressing.schedule import schedule
+from sbafab.pressing.schedule import press_settings, schedule
 from sbafab.reports.underlay import guides, leaves, underlay_pdf
 from tests.quick import few
 

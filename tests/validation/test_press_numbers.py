@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.output.checked import press_settings
-from sbafab.pressing.schedule import Schedule, schedule
+from sbafab.pressing.schedule import Schedule, press_settings, schedule
 
 
 @pytest.fixture
