@@ -112,8 +112,6 @@ class Boundary:
     @property
     def table(self) -> SideTable:
         """The sides in arrays."""
-        # A page without a server measures widths before it has loaded numpy.
-
         if self._table is None:
             self._table = SideTable(self.sides)
         return self._table

@@ -55,7 +55,7 @@ def replaced_folder(target: Path) -> Iterator[Path]:
                 yield fresh
                 for path in _foreign_files(target):
                     _keep(target / path, fresh / path)
-                put_in_place(fresh, target)
+                _put_in_place(fresh, target)
             finally:
                 shutil.rmtree(fresh, ignore_errors=True)
     except OutputError:
@@ -204,7 +204,7 @@ def read_manifest(folder: Path) -> dict[str, object] | None:
     return manifest if is_ours else None
 
 
-def put_in_place(fresh: Path, target: Path) -> None:
+def _put_in_place(fresh: Path, target: Path) -> None:
     """Puts ``fresh`` in the place of ``target``; the old folder ends up where ``fresh`` was."""
     if not target.exists():
         fresh.rename(target)

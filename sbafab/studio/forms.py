@@ -192,7 +192,7 @@ def _named(reference: str, schema: JsonSchema) -> JsonSchema:
     return definition
 
 
-# Requests of the page, answered by a server or by Python in the page.
+# Requests of the page.
 
 
 SURROGATE = re.compile("[\ud800-\udfff]")
@@ -200,23 +200,23 @@ SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 def started(
-    folder: Path | None,
+    folder: Path,
     opened: str | None = None,
     text: str | None = None,
     template: str | None = None,
 ) -> Any:
-    """Return the first answer to the page; without ``folder`` there is no disk to read from.
+    """Return the first answer to the page.
 
     ``opened`` names a file of the folder, ``text`` is a link's design, ``template`` a template.
     """
     schema = api.schema()
     return {
         "version": __version__,
-        "folder": str(folder or ""),
+        "folder": str(folder),
         "opened": opened,
         "text": text,
         "template": template,
-        "files": places.listed(folder) if folder else [],
+        "files": places.listed(folder),
         "templates": api.templates(),
         "summaries": summaries(),
         "families": families(schema),
@@ -225,7 +225,7 @@ def started(
     }
 
 
-def table(body: bytes | str) -> dict[str, Any]:
+def table(body: bytes) -> dict[str, Any]:
     """The table that a request holds. Raises SbafabError where it is none."""
     try:
         parsed = json.loads(body)

@@ -6,7 +6,6 @@ longer needed. Files are looked for in ``folder`` alone.
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import traceback
 from collections.abc import Callable, Iterator
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
     from sbafab.assemblies.records import Assembly
     from sbafab.design.records import Design
     from sbafab.laminate.laminate import Laminate
-    from sbafab.runs.run import Run
 
 StudioJob = dict[str, Any]
 Answer = dict[str, Any]
@@ -74,25 +72,16 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     pause()
     yield _prediction(design, laminate)
     pause()
-    try:
-        for number, (rule, findings) in enumerate(api.checking(design, laminate, pause), 1):
-            yield {
-                "kind": "rule",
-                "rule": rule,
-                "number": number,
-                "findings": [finding_model(finding) for finding in findings],
-            }
-            pause()
-    except ModuleNotFoundError as error:
-        # Without a server numpy may be missing; only the registration rules, the last ones, ask it.
+    for number, (rule, findings) in enumerate(api.checking(design, laminate, pause), 1):
         yield {
-            "kind": "unmeasured",
-            "message": f"The rules that need {error.name} were not measured: it is not in this "
-            "page. sbafab check measures them.",
+            "kind": "rule",
+            "rule": rule,
+            "number": number,
+            "findings": [finding_model(finding) for finding in findings],
         }
+        pause()
     # After the rules, which a person waits for.
-    with contextlib.suppress(ModuleNotFoundError):
-        yield nets_model(laminate, api.nets_of(design), has)
+    yield nets_model(laminate, api.nets_of(design), has)
     yield {"kind": "checked"}
 
 
@@ -127,8 +116,6 @@ def _prediction(design: Design, laminate: Laminate) -> Answer:
         prediction = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
         return {"kind": "unpredicted", "message": str(error)}
-    except ModuleNotFoundError as error:
-        return {"kind": "unpredicted", "message": f"This needs {error.name}, which is not here."}
     return {"kind": "prediction", "quick": True, **prediction.as_dict()}
 
 
@@ -145,34 +132,14 @@ def elastic(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 def generate(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
     """Write the folder of a design into ``out`` with progress; the last answer names it."""
-    yield _run_answer(
-        api.generate(
-            _read(_source(_text(job), job)), out=job["out"], progress=_progress(job, pause)
-        )
-    )
-
-
-def cut(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """Write cut files and film sheets alone, which a page can do without a server."""
-    design = _read(_source(_text(job), job))
-    if design.family == "assembly":
-        raise DesignError(f"{design.name} is an assembly; cut it with sbafab generate")
-    yield _run_answer(api.cut(design, out=job["out"], progress=_progress(job, pause)))
-
-
-def _progress(job: StudioJob, pause: CancelCheck) -> Callable[[str, int, int], None]:
-    steps: list[Answer] = []
-    tell: Callable[[Answer], None] = job.get("tell", steps.append)
+    tell: Callable[[Answer], None] = job["tell"]
 
     def progress(stage: str, done: int, total: int) -> None:
         pause()
         tell({"kind": "progress", "what": stage, "done": done, "total": total})
 
-    return progress
-
-
-def _run_answer(run: Run) -> Answer:
-    return {
+    run = api.generate(_read(_source(_text(job), job)), out=job["out"], progress=progress)
+    yield {
         "kind": "made",
         "name": run.folder.name,
         "failed": run.failed,
@@ -254,12 +221,11 @@ JOBS: dict[str, Callable[[StudioJob, CancelCheck], Iterator[Answer]]] = {
     "live": live,
     "elastic": elastic,
     "generate": generate,
-    "cut": cut,
     "motion": motion,
 }
 
 
-# The answers of a job, run by a worker process or by Python in the page.
+# The answers of a job, run by a worker process.
 #
 # Errors are answers too: bad input in the command line's words, anything else as a defect.
 
@@ -278,8 +244,6 @@ def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
         yield {"kind": "superseded"}
     except SbafabError as error:
         yield refusal(str(error))
-    except ModuleNotFoundError as error:
-        yield {"kind": "error", "message": f"this needs {error.name}, which is not installed here"}
     except MemoryError:
         yield {"kind": "error", "message": "the design takes more memory than there is"}
     except Exception:

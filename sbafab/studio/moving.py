@@ -7,6 +7,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sbafab import api
 from sbafab.errors import DesignError
 from sbafab.studio.model import flat, packed
@@ -261,7 +263,5 @@ def _within(value: Any, most: float, name: str, unit: str) -> float:
 
 def _frame(placed: PlacedPart) -> Any:
     """Rows (3, 4) that take a part's own frame to the assembly's."""
-    import numpy as np  # a page without a server may lack it
-
     corners = placed.upright(np.concatenate([np.zeros((1, 3)), np.eye(3)]))
     return np.column_stack([*(corners[1:] - corners[0]), corners[0]])

@@ -10,7 +10,7 @@ import stat
 import tempfile
 import tomllib
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -203,19 +203,11 @@ class RunFolder:
 
 def zipped(run: RunFolder) -> bytes:
     """The run's folder as a zip, its files byte for byte, in the order of their names."""
-    paths = sorted(path for path in run.folder.rglob("*") if path.is_file())
-    return packed(
-        (f"{run.name}/{path.relative_to(run.folder).as_posix()}", path.read_bytes())
-        for path in paths
-    )
-
-
-def packed(files: Iterable[tuple[str, bytes]]) -> bytes:
-    """Names and contents as a zip, in this order; equal files give equal bytes."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, file in files:
+        for path in sorted(path for path in run.folder.rglob("*") if path.is_file()):
+            name = f"{run.name}/{path.relative_to(run.folder).as_posix()}"
             entry = zipfile.ZipInfo(name, DAY_ONE)
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, file)
+            archive.writestr(entry, path.read_bytes())
     return content.getvalue()

@@ -1,6 +1,6 @@
 // Open, save and share.
 import { $, download, el } from "./dom.js";
-import { ask, withoutServer } from "./server.js";
+import { ask } from "./server.js";
 
 export class Dialogs {
   constructor(studio, { picture, section }) {
@@ -30,11 +30,6 @@ export class Dialogs {
 
   save() {
     const { studio } = this;
-    if (withoutServer) {
-      download(`${studio.designName ?? "design"}.toml`, studio.text, "application/toml");
-      studio.saved();
-      return;
-    }
     if (studio.name) { this.saved(studio.name); return; }
     const name = el("input", { type: "text", value: `${studio.designName ?? "design"}.toml`, "aria-label": "File name" });
     const go = () => this.saved(name.value.endsWith(".toml") ? name.value : `${name.value}.toml`).then(() => this.dialog.close());
@@ -55,7 +50,7 @@ export class Dialogs {
     const field = el("input", { type: "text", readonly: true, value: link, "aria-label": "Link that holds the design", onfocus: (event) => event.target.select() });
     const copy = el("button", { class: "primary", onclick: async () => { field.select(); await (navigator.clipboard?.writeText(link) ?? Promise.reject()).then(() => { copy.textContent = "Copied"; }).catch(() => document.execCommand("copy")); } }, "Copy link");
     const save = async (made) => { const { name, blob } = await made; download(`${studio.designName}-${name}`, blob); };
-    this.show("Share", el("div", { class: "share" }, field, copy, el("p", {}, `The link holds the whole design (${(link.length / 1000).toFixed(1)} kB)${withoutServer ? ", which stays in this link: no server keeps it." : ` and no token. Who gets it opens it with: sbafab studio "LINK"`}`),
+    this.show("Share", el("div", { class: "share" }, field, copy, el("p", {}, `The link holds the whole design (${(link.length / 1000).toFixed(1)} kB) and no token. Who gets it opens it with: sbafab studio "LINK"`),
       el("span", {}, "Picture of the view above"), el("button", { onclick: () => save(this.picture()) }, "Picture"),
       el("span", {}, "Picture of the section"), el("button", { onclick: () => save(this.section.picture()) }, "Section"),
       el("span", {}, "Design file with its comments"), el("button", { onclick: () => download(`${studio.designName}.toml`, studio.text, "application/toml") }, "Design file")));

@@ -1,6 +1,5 @@
 // What the rules found, as they are measured, and what the models predict.
 import { $, el, plain } from "./dom.js";
-import { withoutServer } from "./server.js";
 
 // ms between two looks at a deck that runs; laying the list out oftener takes the time of what is measured.
 const READABLE = 110;
@@ -23,7 +22,7 @@ export class Findings {
     studio.on("rule", () => { this.soon ??= setTimeout(() => this.draw(), READABLE); });
     studio.on("checked opened", () => this.draw());
     studio.on("figures reference", () => this.drawFigures());
-    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly" || withoutServer; });
+    studio.on("design", () => { this.asked.hidden = studio.family !== "assembly"; });
     studio.on("failed", (answer) => { if (!answer.field) this.draw(); });
   }
   // What an assembly is asked for: one pressure in all its actuators, and a mass at the tips.
@@ -45,7 +44,6 @@ export class Findings {
     const said = [["fail", "failed"], ["warn", "warned"], ["waived", "waived"], ["pass", "passed"]].filter(([verdict]) => count(verdict)).map(([verdict, words]) => `${count(verdict)} ${words}`);
     this.sum.textContent = said.join(", ");
     this.list.replaceChildren(...sorted.map(({ finding, waiting }) => this.line(finding, waiting)));
-    if (studio.unmeasured) this.list.append(el("div", { role: "listitem", class: "unmeasured" }, studio.unmeasured));
   }
   line(finding, waiting) {
     const of = SHARES[finding.rule];
@@ -95,7 +93,6 @@ export class Findings {
   }
 }
 function later(whole) {
-  if (withoutServer) return whole ? "The prediction of the inflated assembly is not available in this page; use sbafab predict." : "The elastic stack's figures are not available in this page; use sbafab predict.";
   return whole ? "The prediction of the inflated assembly follows when you stop editing." : "The elastic stack's figures follow when you stop editing.";
 }
 export const named = (figure) => figure.group + figure.name + figure.model;

@@ -1,6 +1,6 @@
 // The page: puts form, views and findings together, keys and dialogs.
 import { $, css, download, el, icon, recall, remember } from "./dom.js";
-import { ask, linkedDesign, withoutServer } from "./server.js";
+import { ask, linkedDesign } from "./server.js";
 import { Studio } from "./state.js";
 import { Form } from "./form.js";
 import { Editor } from "./editor.js";
@@ -27,18 +27,15 @@ const upper = {};
 async function start() {
   theme(recall("sbafab-theme", matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
   let started;
-  if (withoutServer) notice("Starting Python in this page; this takes some seconds.");
   try {
     started = await ask("/api/start");
   } catch (error) {
-    document.body.replaceChildren(el("main", { class: "fallback" }, el("h1", {}, "sbafab studio"), el("p", { role: "alert" }, error.status ? error.message : withoutServer ? error.message : "The studio does not answer. Start it again: sbafab studio")));
+    document.body.replaceChildren(el("main", { class: "fallback" }, el("h1", {}, "sbafab studio"), el("p", { role: "alert" }, error.status ? error.message : "The studio does not answer. Start it again: sbafab studio")));
     return;
   }
   studio = new Studio(started);
   window.studio = studio;
   $("#notice").hidden = true;
-  $("#record").hidden = withoutServer;
-  if (withoutServer) alone(started.lacks);
 
   new Form(studio);
   new Editor(studio);
@@ -61,13 +58,6 @@ async function start() {
   phone();
   keys();
   begin();
-}
-
-// Without a server: what the page says otherwise, and what it was made without.
-function alone(lacks) {
-  $("#save").title = "Download the design file (Ctrl+S)";
-  $("#make").title = "Check and cut: DXF files and film sheets";
-  if (lacks.length) notice(`This page was made without ${lacks.join(" and ")}: layers, section, solid and all rules but those of registration work; prediction, motion and cut files need it.`);
 }
 
 // What is shown first: a link's design, what the command named, work that a reload interrupted, or the gallery.

@@ -1,7 +1,7 @@
 // Generate with progress, look at what was made, play the cut, take it home as one zip.
 import { $, el, plain } from "./dom.js";
 import { Playing } from "./play_loop.js";
-import { listen, madeLink, tab, withoutServer } from "./server.js";
+import { listen, tab } from "./server.js";
 
 // ms of a sheet, and the least of a cut.
 const SHEET = 6000, CUT = 16;
@@ -10,18 +10,16 @@ export class Make {
   title = "Make";
   constructor(studio) {
     this.studio = studio;
-    this.go = el("button", { class: "primary", onclick: () => this.generate() }, withoutServer ? "Cut" : "Generate");
+    this.go = el("button", { class: "primary", onclick: () => this.generate() }, "Generate");
     this.stop = el("button", { hidden: true, onclick: () => this.abort?.abort() }, "Cancel");
     this.keep = el("input", { type: "checkbox" });
     this.bar = el("progress", { max: 1, value: 0, hidden: true, "aria-label": "Progress" });
     this.said = el("p", { role: "status" });
     this.zip = el("a", { hidden: true, download: "", class: "button" }, "Download zip");
     this.list = el("div", { class: "list", role: "group", "aria-label": "Files" });
-    this.stage = el("div", { class: "show" }, el("p", { class: "empty" }, withoutServer
-      ? "Cut runs the rules, then writes the cut files and film sheets that sbafab cut writes. A design that breaks a rule gets its findings and no cut file. Press schedule, traveller and meshes: sbafab generate, on a computer."
-      : "Generate runs the rules, then writes cut files, film sheets, press schedule, traveller, meshes and pictures: the same bytes as sbafab generate. A design that breaks a rule gets its findings and no cut file."));
+    this.stage = el("div", { class: "show" }, el("p", { class: "empty" }, "Generate runs the rules, then writes cut files, film sheets, press schedule, traveller, meshes and pictures: the same bytes as sbafab generate. A design that breaks a rule gets its findings and no cut file."));
     this.element = el("div", { class: "view" }, el("div", { class: "make" },
-      el("div", { class: "head" }, this.go, this.stop, withoutServer ? null : el("label", {}, this.keep, " into out/ of the folder"), this.bar, this.said, el("span", { class: "grow" }), this.zip),
+      el("div", { class: "head" }, this.go, this.stop, el("label", {}, this.keep, " into out/ of the folder"), this.bar, this.said, el("span", { class: "grow" }), this.zip),
       el("div", { class: "body" }, this.list, this.stage)));
     studio.on("text", () => { if (this.made && this.madeText !== studio.text) this.said.textContent = "The files are from an earlier state of the design; generate again."; });
     studio.on("opened", () => { this.made = null; this.list.replaceChildren(); this.zip.hidden = true; this.said.textContent = ""; });
@@ -43,7 +41,7 @@ export class Make {
         } else if (answer.kind === "made") { done = true; this.madeText = text; made = answer; }
         else if (answer.message) { done = true; this.said.textContent = answer.message; }
       }, this.abort.signal);
-      if (made) await this.show_(made);
+      if (made) this.show_(made);
       if (!done) this.said.textContent = "Cancelled; nothing was written";
     } catch (error) {
       this.said.textContent = error.name === "AbortError" ? "Cancelled; nothing was written" : error.message;
@@ -51,13 +49,13 @@ export class Make {
     this.go.disabled = false;
     this.stop.hidden = this.bar.hidden = true;
   }
-  async show_(made) {
+  show_(made) {
     this.made = made;
     const sheets = made.files.filter((file) => /^sheets\/.*\.svg$/.test(file));
     const broken = made.findings.filter((finding) => finding.verdict === "fail");
     this.said.textContent = made.failed ? `No cut file: ${broken.map((finding) => finding.rule).join(", ")} failed` : `${made.files.length} files of ${made.name}${this.keep.checked ? " in out/" : ""}`;
     this.zip.hidden = !made.files.length;
-    this.zip.href = await madeLink(`/made/${made.key}.zip`);
+    this.zip.href = `/made/${made.key}.zip`;
     this.zip.download = `${made.name}.zip`;
     const groups = [["Sheets", sheets], ["Pages", made.files.filter((file) => file.endsWith(".html"))], ["Pictures", made.files.filter((file) => /^preview\//.test(file))],
       ["Files", made.files.filter((file) => /\.(json|csv|toml)$/.test(file))], ["Cut files", made.files.filter((file) => /^layers\/|^sheets\/.*\.(dxf|lbrn2)$/.test(file))], ["Meshes", made.files.filter((file) => /^mesh\//.test(file))]];
@@ -67,7 +65,7 @@ export class Make {
   }
   async open(file) {
     for (const button of this.list.querySelectorAll("button")) button.setAttribute("aria-pressed", String(button.dataset.file === file));
-    const url = await madeLink(`/made/${this.made.key}/${file}`);
+    const url = `/made/${this.made.key}/${file}`;
     if (/^sheets\/.*\.svg$/.test(file)) return this.sheet(await (await fetch(url)).text());
     if (file.endsWith(".html")) { this.stage.replaceChildren(el("iframe", { src: url, title: file, sandbox: "allow-scripts allow-modals" }), el("div", { class: "tools right-top" }, el("a", { href: url, target: "_blank", rel: "noopener" }, "Open to print"))); return; }
     if (/\.(svg|png)$/.test(file)) { this.stage.replaceChildren(el("img", { src: url, alt: file })); return; }

@@ -1,5 +1,4 @@
-// Talks to the server that this page came from: the token in a header, answers line by line. Where the page came
-// without one, Python in the page answers the same requests.
+// Talks to the server that this page came from: the token in a header, answers line by line.
 import { uniqueName } from "./dom.js";
 
 const KEY = "sbafab-token";
@@ -11,8 +10,6 @@ if (fragment.get("token")) {
 }
 export const linkedDesign = fragment.get("design");
 export const tab = uniqueName();
-const inPage = document.querySelector("meta[name=sbafab-without-server]") ? await import("./in_page.js") : null;
-export const withoutServer = Boolean(inPage);
 
 function request(path, body, signal) {
   const headers = { "X-Sbafab-Token": localStorage.getItem(KEY) ?? "" };
@@ -27,7 +24,6 @@ function request(path, body, signal) {
 
 // The answer's table; an answer that refuses throws its sentence.
 export async function ask(path, body, signal) {
-  if (inPage) return inPage.ask(path, body, signal);
   const response = await request(path, body, signal);
   const answer = await response.json().catch(() => ({ message: `the studio answered ${response.status}` }));
   if (!response.ok) throw Object.assign(new Error(answer.message), { status: response.status });
@@ -36,7 +32,6 @@ export async function ask(path, body, signal) {
 
 // Calls `heard` with every line of the answer as it arrives.
 export async function listen(path, body, heard, signal) {
-  if (inPage) return inPage.listen(path, body, heard, signal);
   const response = await request(path, body, signal);
   if (!response.ok) {
     const answer = await response.json().catch(() => ({}));
@@ -53,6 +48,3 @@ export async function listen(path, body, heard, signal) {
     for (const part of parts) if (part) heard(JSON.parse(part));
   }
 }
-
-// A link to a file that a run wrote: /made/KEY/..., or all of it, /made/KEY.zip.
-export const madeLink = async (path) => (inPage ? inPage.madeLink(path) : path);

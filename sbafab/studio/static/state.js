@@ -1,5 +1,5 @@
 // The design being edited and what is known of it; views listen, none keeps a copy.
-import { ask, listen, tab, withoutServer } from "./server.js";
+import { ask, listen, tab } from "./server.js";
 import { recall, remember, uniqueName } from "./dom.js";
 
 const SETTLE = 500;
@@ -27,7 +27,6 @@ export class Studio {
     this.family = null;
     this.findings = [];
     this.running = [];
-    this.unmeasured = null;
     this.prediction = null;
     this.error = null;
     this.stale = { laminate: true, rules: true, figures: true };
@@ -164,7 +163,6 @@ export class Studio {
     const sent = [...this.pending];
     const flight = (this.flight = { abort: new AbortController(), shown: false, at: this.changedAt ?? performance.now() });
     this.running = [];
-    this.unmeasured = null;
     this.emit("busy", true);
     try {
       await listen("/api/live", this.body(), (answer) => this.heard(answer, flight, sent), flight.abort.signal);
@@ -224,7 +222,6 @@ export class Studio {
         this.emit("checked");
         this.emit("stale");
       },
-      unmeasured: () => { this.unmeasured = answer.message; },
       superseded: () => {},
     };
     (hears[answer.kind] ?? (() => this.fail(answer)))();
@@ -282,10 +279,8 @@ export class Studio {
     this.emit("failed", answer);
     this.emit("stale");
   }
-  // What takes seconds comes once the hand rests, and not while the actuator is being moved. In the page it would
-  // take half a minute, and motion and cutting wait for it.
+  // What takes seconds comes once the hand rests, and not while the actuator is being moved.
   askElastic(after = 1500) {
-    if (withoutServer) return;
     clearTimeout(this.elasticTimer);
     this.elastic?.abort();
     this.elasticTimer = setTimeout(async () => {
@@ -334,13 +329,6 @@ export class Studio {
     this.write(found.text, "disk");
     this.keep();
     this.emit("saved");
-  }
-  // Where no server keeps files, the browser saves what was downloaded.
-  saved(name) {
-    this.commit();
-    Object.assign(this, { savedText: this.text });
-    this.keep();
-    this.emit("saved", name);
   }
   async save(name, over = false) {
     this.commit();
