@@ -362,7 +362,7 @@ def _order_problems(order: SheetOrder) -> list[Problem]:
             problems.append(claim(message))
         for sheet in sheets:
             problems += _name_problems(sheet, order)
-            problems += _stock_problems(sheet, stock, order.design.sheets.engine)
+            problems += _stock_problems(sheet, stock)
         problems += [
             problem
             for film in order.claims.films
@@ -400,14 +400,13 @@ def _kerf(order: SheetOrder, material: Material) -> Kerf | None:
     return kerf.width if kerf is not None else None
 
 
-def _stock_problems(sheet: SheetClaim, stock: Stock, engine: str) -> list[Problem]:
+def _stock_problems(sheet: SheetClaim, stock: Stock) -> list[Problem]:
     pins = tuple((pin.x, pin.y, pin.diameter) for pin in sheet.pins)
     agree: list[tuple[str, object, object]] = [
         ("width", sheet.width, stock.width),
         ("border", sheet.border, stock.border),
         ("spacing", sheet.spacing, stock.spacing),
         ("pins", pins, stock.pins),
-        ("engine", sheet.engine, engine),
     ]
     is_long = sheet.length > stock.length + ROUNDED
     if is_long or not (stock.roll or abs(sheet.length - stock.length) < ROUNDED):

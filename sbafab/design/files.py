@@ -48,6 +48,8 @@ REMOVED: Mapping[str, str] = {
     "sheet",
     "sheets.*.piece": _STOCK,
     "films.*.sheet.piece": _STOCK,
+    "sheets.engine": "was removed, as parts are nested in one way; delete it",
+    "sheets.seconds": "was removed, as nesting takes no time limit; delete it",
 }
 """Tables, keys ("*": any name) and values of earlier design files: what was removed, what to do."""
 

@@ -4,89 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from sbafab.design.files import (
-    FITS,
-    checked,
-    override,
-)
-from sbafab.design.films import UNCALIBRATED, LayerFilms
-from sbafab.design.kits import DEFAULT, SCHEMA, Kit, KitFile, load_kit
+from sbafab.design.files import FITS, checked, override
+from sbafab.design.films import UNCALIBRATED
+from sbafab.design.kits import SCHEMA, Kit, KitFile, load_kit
 from sbafab.design.records import Design, with_unused, without_none
-from sbafab.design.sections import (
-    Acceptance,
-    Inlet,
-    Models,
-    Order,
-    Press,
-    Registration,
-)
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_TPE, Film
-
-LATER: Mapping[str, Sequence[str]] = {
-    "order": ("success_rate", "certainty"),
-    "laser": ("hold_tpe", "hold_ptfe"),
-    "acceptance": ("safety_factor",),
-}
-"""Keys that came after the first hashes, which have none of them."""
-
-
-FIRST_SPARES = 2
-"""What ``order.spares`` was by default, of masks alone; today's default keeps its hash."""
-
-
-def _as_first_hashed(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the kit's hash for its path, and without later keys that have their defaults.
-
-    A design that names no kit and no layup keeps the hash that it had before there were any.
-    """
-    table["kit"] = kit_of(design).sha256 if design.kit != DEFAULT else None
-    if design.layup == LayerFilms():
-        table["layup"] = None
-    if design.inlet.adhesive == Inlet().adhesive:
-        table["inlet"]["adhesive"] = None
-    # What came later, where it says what was always so.
-    if design.acceptance == Acceptance():
-        table["acceptance"] = None
-    if design.models == Models():
-        table["models"] = None
-    for key in ("minutes_for", "time_constant"):
-        if getattr(design.press, key) == getattr(Press(), key):
-            table["press"][key] = None
-    tpe = design.films.tpe
-    if (tpe.product, tpe.modulus, tpe.poisson) == (PAPER_PRODUCT, *PAPER_TPE):
-        table["films"]["tpe"] |= {"modulus": None, "poisson": None}
-    _as_first_ordered(table, design)
-    table["registration"]["pin_error"] = design.pin_error
-    for name, key, usual in (
-        ("registration", "plate_made_by", Registration().plate_made_by),
-        ("press", "underlay_thickness", Press().underlay_thickness),
-    ):
-        if table[name][key] == usual:
-            table[name][key] = None
-    return without_none(table)
-
-
-def _as_first_ordered(table: dict[str, Any], design: Design) -> None:
-    """Remove later keys that have their defaults."""
-    has_usual_spares = all(
-        getattr(design.order, key) == getattr(Order(), key) for key in ("spares", "spare_share")
-    )
-    if has_usual_spares:
-        table["order"] |= {"spares": FIRST_SPARES, "spare_share": None}
-    for section, keys in LATER.items():
-        current = getattr(design, section)
-        default = type(current)()
-        for key in keys if table[section] is not None else ():
-            if getattr(current, key) == getattr(default, key):
-                table[section][key] = None
+from sbafab.design.sections import Models
+from sbafab.laminate.films import Film
 
 
 def design_sha256(design: Design) -> str:
-    """Return the hash of all that decides the output; a drawn outline counts by its content."""
-    return _sha256(_with_drawing(_as_first_hashed(with_unused(design), design), design))
+    """Return the hash of all that decides the output; a named file counts by its content."""
+    return _sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
 
 
 def actuator_sha256(design: Design) -> str:
@@ -96,7 +27,7 @@ def actuator_sha256(design: Design) -> str:
     registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
     Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
     """
-    table = _with_drawing(with_unused(design), design)
+    table = _with_files(with_unused(design), design)
     for section in NO_ACTUATOR:
         table.pop(section, None)
     films = _films(design)
@@ -139,17 +70,14 @@ def _films(design: Design) -> dict[str, list[object]]:
     }
 
 
-def _with_drawing(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """The table with the content of drawn outlines in place of their paths."""
-    contents = {
-        key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in design.drawings.items()
-    }
-    table = override(table, [contents])
-    models = table.get("models")
+def _with_files(table: dict[str, Any], design: Design) -> dict[str, Any]:
+    """Return the table with the contents of drawn outlines and calibration for their paths."""
+    files = dict(design.drawings)
     calibration = design.folder / design.models.calibration
-    if models and calibration.is_file():
-        models["calibration"] = hashlib.sha256(calibration.read_bytes()).hexdigest()
-    return table
+    if design.models != Models() and calibration.is_file():
+        files["models.calibration"] = calibration
+    contents = {key: hashlib.sha256(file.read_bytes()).hexdigest() for key, file in files.items()}
+    return override(table, [contents])
 
 
 def _sha256(table: dict[str, Any]) -> str:

@@ -526,10 +526,6 @@ class Sheets(Section):
 
     tpe: Sheet = Sheet.model_construct()
     ptfe: Sheet = Sheet.model_construct()
-    engine: Literal["bottom-left"] = "bottom-left"
-    """What looks for places: bottom-left, and round lattices where that takes fewer sheets."""
-    seconds: float = Field(default=20.0, gt=0, le=3600)
-    """Not used: how long an engine of earlier versions looked."""
     label: bool = True
     """Whether name, material, number and design hash are engraved into the border."""
     index_marks: bool | None = None
@@ -538,13 +534,6 @@ class Sheets(Section):
     program: Literal["rdworks", "epilog"] | None = None
     """A laser program, beside LightBurn, that each sheet gets a machine file for: "rdworks" (DXF
     R12 by colours) or "epilog" (SVG with hairlines by colours)."""
-
-    @field_validator("engine", mode="before")
-    @classmethod
-    def _is_known(cls, engine: object) -> object:
-        if engine == "spyrrow":
-            raise ValueError('is no engine any more; set "bottom-left", which also lays lattices')
-        return engine
 
 
 class Rules(Section):

@@ -13,7 +13,6 @@ from sbafab.laminate.films import Material, in_order
 from sbafab.nesting.engines import ROUNDING, bottom_left, takes_lattices
 from sbafab.nesting.records import (
     TURNS,
-    EngineName,
     Nest,
     NestPart,
     Placement,
@@ -30,7 +29,6 @@ PLACES = "sheets/nest.json"
 def nest(
     parts: Sequence[NestPart],
     stocks: Mapping[Material, Stock],
-    engine: EngineName = "bottom-left",
 ) -> tuple[Nest, ...]:
     """Return one nest for each material that has parts, TPE first.
 
@@ -39,7 +37,7 @@ def nest(
     nests = []
     for material in materials_of(parts):
         chosen = of_material(parts, material)
-        nests.append(_nest(material, chosen, stocks[material], engine))
+        nests.append(_nest(material, chosen, stocks[material]))
     return tuple(nests)
 
 
@@ -62,11 +60,10 @@ def _nest(
     material: Material,
     parts: tuple[NestPart, ...],
     stock: Stock,
-    engine: EngineName,
 ) -> Nest:
     _check_fit(material, parts, stock)
     placements = bottom_left(parts, stock)
-    result = Nest(engine, material, stock, parts, placements)
+    result = Nest(material, stock, parts, placements)
     if result.sheets > stock.most:
         total = sum(part.count for part in parts)
         raise too_many(material, total, f"{result.sheets} sheets", stock)
@@ -113,9 +110,9 @@ def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
 
 
 def from_dict(
-    data: object, parts: Sequence[NestPart], stocks: Mapping[Material, Stock], engine: EngineName
+    data: object, parts: Sequence[NestPart], stocks: Mapping[Material, Stock]
 ) -> tuple[Nest, ...] | None:
-    """Return the saved nests if they were made of these parts, stocks and engine; otherwise None.
+    """Return the saved nests if they were made of these parts and stocks; otherwise None.
 
     The placements are not checked here, but in ``check_nest``.
     """
@@ -127,7 +124,7 @@ def from_dict(
         return None
     try:
         nests = tuple(
-            Nest(engine, material, stock, chosen, _placements(data["nests"][material], chosen))
+            Nest(material, stock, chosen, _placements(data["nests"][material], chosen))
             for material, stock, chosen in requests
         )
         return nests if data["key"] == as_dict(nests)["key"] else None

@@ -16,7 +16,6 @@ from sbafab.geometry.region import Region
 from sbafab.laminate.films import FIRST, Material
 from sbafab.laminate.laminate import Laminate
 
-EngineName = Literal["bottom-left"]
 Turn = Literal[0, 1, 2, 3]
 """Quarter turns, counterclockwise. Never mirrored: a film's faces differ by their cut."""
 TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
@@ -84,7 +83,6 @@ class Placement:
 class Nest:
     """The places of all parts of one material; ``placements`` have no order."""
 
-    engine: EngineName
     material: Material
     stock: Stock
     parts: tuple[NestPart, ...]

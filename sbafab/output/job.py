@@ -219,7 +219,7 @@ def find_nests(
         return ()
     progress("nesting", 0, 1)
     saved = _saved(parts, design, old_folder / PLACES)
-    return saved or nest(parts, stocks(design), design.sheets.engine)
+    return saved or nest(parts, stocks(design))
 
 
 def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
@@ -228,7 +228,7 @@ def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest,
         if not path.is_file() or path.stat().st_size > MOST_BYTES:
             return None
         data: Any = json.loads(path.read_text(encoding="utf-8"))
-        nests = from_dict(data, parts, stocks(design), design.sheets.engine)
+        nests = from_dict(data, parts, stocks(design))
         if nests is None or not all(_is_possible(nested) for nested in nests):
             return None
         for nested in nests:

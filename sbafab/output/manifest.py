@@ -177,16 +177,15 @@ class SheetClaim(_Claim):
     border: Annotated[float, Field(ge=0, le=MOST_SIZE)]
     spacing: Annotated[float, Field(gt=0, le=MOST_SIZE)]
     pins: Annotated[tuple[SheetPinClaim, ...], Field(max_length=100)]
-    engine: str
     parts: tuple[SheetPartClaim, ...]
     parts_area: float
     density: float
-    label: str = ""
+    label: str
     contours: Count
     cut_length: float
-    travel: float = 0.0
-    unsorted_travel: float = 0.0
-    estimated_minutes: float = 0.0
+    travel: float
+    unsorted_travel: float
+    estimated_minutes: float
 
 
 class MeshClaim(_Claim):
@@ -227,24 +226,24 @@ class Manifest(_Claim):
     units: Literal["mm"]
     design_sha256: str
     generator: str
-    kit: KitClaim | None = None
+    kit: KitClaim
     registration: RegistrationClaim
     kerf: dict[Material, KerfClaim]
     curves: str | None = None
     waived: tuple[str, ...]
-    lowered_limits: tuple[str, ...] = ()
+    lowered_limits: tuple[str, ...]
     sizes: dict[str, float]
-    notes: tuple[str, ...] = ()
-    copies: Annotated[int, Field(ge=1, le=1000)] = 1
+    notes: tuple[str, ...]
+    copies: Annotated[int, Field(ge=1, le=1000)]
     batch: BatchClaim | None = None
     films: tuple[FilmClaim, ...]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...]
     layers: Annotated[tuple[LayerClaim, ...], Field(min_length=1, max_length=10_000)]
     interfaces: tuple[InterfaceClaim, ...]
     bores: tuple[BoreClaim, ...]
     inlets: tuple[InletClaim, ...]
     lumen: float | None
-    fixture: str | None = None
+    fixture: str | None
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)] = ()
     meshes: tuple[MeshClaim, ...] = ()
     mesh_statistics: dict[str, Any] = Field(default_factory=dict)
@@ -257,7 +256,7 @@ class DesignClaim(_Claim):
     folder: str
     copies: Annotated[int, Field(ge=1, le=1000)]
     design_sha256: str
-    kit: KitClaim | None = None
+    kit: KitClaim
 
 
 class JobManifest(_Claim):
@@ -269,7 +268,7 @@ class JobManifest(_Claim):
     designs_sha256: str
     generator: str
     waived: tuple[str, ...]
-    lowered_limits: tuple[str, ...] = ()
+    lowered_limits: tuple[str, ...]
     designs: Annotated[tuple[DesignClaim, ...], Field(min_length=1, max_length=100)]
     films: tuple[FilmUseClaim, ...]
     sheets: Annotated[tuple[SheetClaim, ...], Field(max_length=2000)]
@@ -279,11 +278,11 @@ class JobManifest(_Claim):
 class AssemblyManifest(JobManifest):
     """``manifest.json`` of an assembly: that of a job, with the parts and their places."""
 
-    family: str = ""
+    family: str
     design_sha256: str
-    copies: int = 1
+    copies: int
     parts: Annotated[tuple[dict[str, Any], ...], Field(max_length=1000)]
-    meshes: tuple[dict[str, Any], ...] = ()
+    meshes: tuple[dict[str, Any], ...]
 
 
 # Manifests of plans.
@@ -429,7 +428,6 @@ def _sheet(sheet: SheetFile) -> SheetClaim:
         border=stock.border,
         spacing=stock.spacing,
         pins=tuple(SheetPinClaim(x=x, y=y, diameter=d) for x, y, d in stock.pins),
-        engine=sheet.nest.engine,
         parts=tuple(
             SheetPartClaim(design=design, pattern=pattern, count=count)
             for design, pattern, count in sheet.counts

@@ -140,9 +140,10 @@ def _problems(
         excluded = (*BY_OTHER_COMMANDS, *PAGES) if of_job else BY_OTHER_COMMANDS
         problems.extend(_foreign_problems(claims, regenerated, excluded))
         problems.extend(_file_problems(folder, fresh, claims.files, claims.generator))
-        problems.extend(_index_problems(folder, index, of_job))
-        problems.extend(_prediction_problems(folder, fresh, claims, checked))
-    return problems
+        if claims.generator == GENERATOR:
+            problems.extend(_index_problems(folder, index, of_job))
+            problems.extend(_prediction_problems(folder, fresh, claims, checked))
+    return problems + _version_problems(claims.generator)
 
 
 def _job_problems(
@@ -162,7 +163,7 @@ def _job_problems(
         write_folder(plan_job(whole, designs, folder, ignore_progress), fresh, ignore_progress)
         problems.extend(_foreign_problems(job, file_names(fresh)))
         problems.extend(_file_problems(folder, fresh, job.files, job.generator))
-    return problems
+    return problems + _version_problems(job.generator)
 
 
 def _foreign_problems(
@@ -173,14 +174,11 @@ def _foreign_problems(
     ``excluded``: folders and files of other commands, except files that could be cut.
     """
     return [
-        _problem(
-            f"{path} is listed and is no file of this design",
-            claims.generator,
-            is_done=path.lower().endswith(CUT_ENDINGS),
-        )
+        Problem(DESIGNED, f"{path} is listed and is no file of this design; regenerate the folder")
         for path in claims.files
         if path not in regenerated
         and (could_be_cut(path) or path.partition("/")[0] not in excluded)
+        and _is_compared(path, claims.generator)
     ]
 
 
@@ -241,14 +239,12 @@ def _parts(files: Collection[str]) -> set[RunPart]:
 def _file_problems(
     folder: Path, fresh: Path, listed: Collection[str], generator: str
 ) -> list[Problem]:
-    """Return the files that differ from those made again.
-
-    A difference of a file of another version is a warning, unless it is cut or pressed.
-    """
+    """Return the files that differ from those made again."""
     problems = []
     for path in sorted(path for path in fresh.rglob("*") if path.is_file()):
         name = path.relative_to(fresh).as_posix()
-        if name == INDEX or (path.parent.name == LAYERS and path.suffix == ".dxf"):
+        is_layer = path.parent.name == LAYERS and path.suffix == ".dxf"
+        if name == INDEX or is_layer or not _is_compared(name, generator):
             continue
         if name not in listed or not (folder / name).is_file():
             difference = f"{name} is missing"
@@ -258,18 +254,23 @@ def _file_problems(
         else:
             difference = file_difference(folder / name, path, name)
         if difference:
-            is_done = name.endswith((*PRESS, *CUT_ENDINGS))
-            problems.append(_problem(difference, generator, is_done))
+            problems.append(Problem(DESIGNED, f"{difference}; regenerate the folder"))
     return problems
 
 
-def _problem(message: str, generator: str, is_done: bool) -> Problem:
-    if generator == GENERATOR or is_done:
-        return Problem(DESIGNED, f"{message}; regenerate the folder")
+def _is_compared(path: str, generator: str) -> bool:
+    """Return True for a file of this version, and for one of any version that is cut or pressed."""
+    return generator == GENERATOR or path.lower().endswith((*PRESS, *CUT_ENDINGS))
+
+
+def _version_problems(generator: str) -> list[Problem]:
+    if generator == GENERATOR:
+        return []
     message = (
-        f"{message}, but it was made by {generator}, and this is {GENERATOR}; regenerate the folder"
+        f"the folder was made by {generator}, and this is {GENERATOR}: only what is cut and "
+        "pressed was compared; regenerate the folder"
     )
-    return Problem(DESIGNED, message, verdict="warn")
+    return [Problem(DESIGNED, message)]
 
 
 def _read_index(path: Path) -> dict[str, Any]:
@@ -316,12 +317,12 @@ class _PredictionRequest(BaseModel):
     contact_factor: float
     pocket_loss: float
     modulus_mpa: float | None
-    modulus_ratio: float = 1.0
-    water_delay: float = 0.0
-    air_delay: float = 0.0
-    loss_share: float = 0.0
-    calibration: str = ""
-    overrides: dict[str, float] = {}
+    modulus_ratio: float
+    water_delay: float
+    air_delay: float
+    loss_share: float
+    calibration: str
+    overrides: dict[str, float]
 
 
 class _PredictionFile(BaseModel):
@@ -368,7 +369,7 @@ def _prediction_problems(
         write_artefacts(DesignFolder(plan, (), written, ignore_progress), rows)
     except (ValueError, OSError) as error:
         message = f"predict.json does not say what was asked for ({error})"
-        return [_problem(message, claims.generator, is_done=False)]
+        return [Problem(DESIGNED, f"{message}; regenerate the folder")]
     return _file_problems(folder, written, claims.files, claims.generator)
 
 

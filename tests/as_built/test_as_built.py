@@ -236,6 +236,17 @@ def test_without_its_design_a_folder_fails_and_is_still_measured(doctor: Doctor)
     assert found["bond-width"] == "pass"
 
 
+def test_a_folder_of_another_version_is_one_sentence(doctor: Doctor) -> None:
+    (doctor.folder / "checks.json").write_text("{}")
+    doctor.set_manifest(lambda m: m.update(generator="sbafab 0.0.1"))
+    designed = [f for f in check_folder(doctor.folder) if f.rule == "as-designed"]
+    assert [finding.verdict for finding in designed] == ["fail"]
+    assert "made by sbafab 0.0.1" in designed[0].message
+    # Whoever cuts it still hears of what it would cut.
+    doctor.redraw(5, lambda r: r.moved(0.15, 0.0))
+    assert len([f for f in check_folder(doctor.folder) if f.rule == "as-designed"]) == 2
+
+
 def test_limits_come_from_the_folders_design(doctor: Doctor) -> None:
     path = doctor.folder / "design.toml"
     path.write_text(path.read_text().replace("bond_width = 0.75", "bond_width = 0.8"))

@@ -132,7 +132,6 @@ CLAIMS: list[tuple[str, Callable[[Claims], object], str]] = [
     ("pins", lambda m: m["sheets"][1].update(pins=[{"x": 1, "y": 2, "diameter": 3}]), "pins is"),
     ("width", lambda m: m["sheets"][0].update(width=150.0), "width is 150.0 in the manifest"),
     ("length", lambda m: m["sheets"][0].update(length=150.0), "length is 150.0 in the manifest"),
-    ("engine", lambda m: m["sheets"][0].update(engine="by-hand"), "engine is by-hand"),
     ("density", lambda m: m["sheets"][0].update(density=0.9), "density is 0.9"),
     ("waste", lambda m: m["films"][0].update(waste=1.0), "films: waste of TPE is 1"),
     (

@@ -191,7 +191,7 @@ def test_a_compensated_sheet_says_so_in_its_name(tmp_path: Path) -> None:
 def test_parts_that_overlap_are_not_let_through(tmp_path: Path) -> None:
     part = NestPart("demo", "P01", 1, "TPE", RING, 2)
     places = (Placement(0, 0, 0, (11.0, 11.0)), Placement(0, 0, 0, (12.0, 11.0)))
-    bad = Nest("bottom-left", "TPE", STOCK, (part,), places)
+    bad = Nest("TPE", STOCK, (part,), places)
     with pytest.raises(OutputError, match="touch or cross"):
         write_sheets([bad], tmp_path, SETTINGS, MACHINE)
 

@@ -217,22 +217,6 @@ def test_edges_that_touch_do_not_cross(tmp_path: Path) -> None:
     assert read_laminate(path) == laminate
 
 
-def test_a_file_without_later_keys_is_read_as_before(tmp_path: Path) -> None:
-    laminate = build(load_design("pouch"))
-    document = json.loads(laminate_json(laminate))
-    for key in ("seams", "folds", "ports", "nets", "bonds"):
-        del document[key]
-    for row in document["films"]:
-        del row["faces"]
-    for row in document["layers"]:
-        del row["turned"]
-    for row in document["chambers"]:
-        del row["balloons"]
-    path = tmp_path / "laminate.json"
-    path.write_text(json.dumps(document), encoding="utf-8")
-    assert read_laminate(path) == laminate
-
-
 # Of a stack whose seams have no order, or whose films nothing joins, there is no laminate.
 UNMADE = ("wide top", "no neck")
 ORDERED = [n for n in range(160) if welded_draft(5, n).fault not in UNMADE][:100]

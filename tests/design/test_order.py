@@ -101,8 +101,7 @@ def test_spares_are_a_share_and_at_least_some(
     assert load_design("1dof-5mm", few).order.spare_parts(needed) == expected
 
 
-def test_only_an_order_that_is_asked_for_makes_another_hash() -> None:
-    """Whether the spares of old or of today's defaults are cut must show in the hash."""
+def test_another_order_has_another_hash() -> None:
     usual = design_sha256(load_design("1dof-5mm"))
     others = [
         *(["order.spares=2"], ["order.spares=2", "order.spare_share=0.06"]),

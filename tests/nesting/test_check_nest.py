@@ -23,7 +23,6 @@ STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
 def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:
     placements = len(shifts) if count is None else count
     return Nest(
-        engine="bottom-left",
         material="TPE",
         stock=STOCK,
         parts=(NestPart("demo", "P01", 1, "TPE", SQUARE, placements),),

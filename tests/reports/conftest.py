@@ -43,7 +43,7 @@ def _nest(laminate: Laminate, material: Material, copies: int) -> Nest:
         if layers[0].film.material == material
         for number, piece in enumerate(layers[0].profile.pieces, 1)
     )
-    return Nest("bottom-left", material, STOCK, parts, tuple(_placements(parts)))
+    return Nest(material, STOCK, parts, tuple(_placements(parts)))
 
 
 def _file(nest: Nest, number: int) -> SheetFile:

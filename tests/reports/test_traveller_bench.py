@@ -421,9 +421,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
         replace(nest.placements[0], part=0, turn=0, sheet=0, shift=(20 - low_x, 10 - low_y + y))
         for y in (step * i for i in range(70))
     )
-    long = replace(
-        sheet, width=60.0, length=581.0, nest=Nest("bottom-left", "TPE", stock, nest.parts, places)
-    )
+    long = replace(sheet, width=60.0, length=581.0, nest=Nest("TPE", stock, nest.parts, places))
     svg = lxml_html.fromstring(sheet_map(long, film_of(long), {"1dof-5mm": ""}, "sheet-1"))
     rows = svg.findall(".//svg")
     sizes = [(float(row.get("width")), float(row.get("height"))) for row in rows]
