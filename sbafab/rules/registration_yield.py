@@ -3,16 +3,14 @@
 Monte Carlo with a fixed seed. The paper gives only the largest errors, so the distributions are
 assumed: every cutting error and turn uniform within its most, every shift uniform over a disc.
 
-Each error has a row of random numbers a batch (a shift has two) from a stream that begins equally
-for every laminate. Bounds decide most builds; the rest are summed up row by row.
+Each error has a row of random numbers a batch (a shift has two).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from sbafab.geometry.on_demand import np
@@ -25,9 +23,7 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
 if TYPE_CHECKING:
-    from sbafab.geometry.edge_table import Bools, Floats, Indices
-
-# Random numbers: a row a build for each error, two for a shift.
+    from sbafab.geometry.edge_table import Floats, Indices
 
 
 class CutContour(NamedTuple):
@@ -55,21 +51,7 @@ def rows_by_error(errors: Iterable[Error]) -> tuple[dict[Error, int], int]:
     return rows, count
 
 
-def random_numbers(seed: int, first: int, rows: int, builds: int) -> Floats:
-    """Return numbers from 0 to 1, a row of ``builds`` each, from the ``first`` of a seed's stream.
-
-    The stream is the same for every laminate.
-    """
-    generator = np.random.PCG64(seed)
-    generator.advance(first)
-    return np.random.Generator(generator).random((rows, builds))
-
-
 # Rows: the width left at margins beyond their limit, as its room and a sum over the errors drawn.
-
-
-UNITS = 1000
-"""Factors that are equal to so many parts are one: rows that feel all errors alike."""
 
 
 class RowKind(NamedTuple):
@@ -105,8 +87,7 @@ class MarginRows(NamedTuple):
 def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits) -> MarginRows:
     """Return the margins that can come short at all, by the two contours whose edges they join.
 
-    Of those that depend on all errors equally, the least. Kinds are in the order of the first of
-    them. ``layers`` are those of each group, by seat.
+    Kinds are in the order of the first of them. ``layers`` are those of each group, by seat.
     """
     room = forms.nominal - forms.by_quantity(
         {"bond": limits.worst_bond_width, "overhang": limits.worst_mask_overhang}
@@ -118,9 +99,8 @@ def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits)
     owners = list(dict.fromkeys(between.tolist()))
     rank = np.zeros(len(forms.owners), dtype=np.intp)
     rank[owners] = np.arange(len(owners))
-    chosen = _least_alike(forms, room, short)
-    ranks = rank.take(forms.between.take(chosen))
-    chosen = chosen.take(ranks.argsort(kind="stable"))
+    ranks = rank.take(between)
+    chosen = short.take(ranks.argsort(kind="stable"))
     begins = np.cumsum([0, *np.bincount(ranks, minlength=len(owners)).tolist()])
     kinds = []
     for both, run in zip(owners, forms.run[chosen[begins[:-1]]].tolist(), strict=True):
@@ -150,287 +130,56 @@ def _sign(quantity: Quantity, owner: Owner) -> float:
     return 1.0 if owner.is_film == (quantity == "bond") else -1.0
 
 
-def _least_alike(forms: LinearForms, room: Floats, short: Indices) -> Indices:
-    """Of the short margins between each two owners those with the least room of all with the same
-    factors, rounded.
-    """
-    between = forms.between.take(short)
-    # Where nothing but cutting is felt all factors are 0, and all are alike.
-    shifts = (forms.moves.shift.max(axis=0, initial=0.0) > 0).take(between)
-    factors = forms.normal.take(short, axis=1) * shifts, forms.levers.take(short, axis=1)
-    parts = _parts(np.concatenate(factors)).astype(np.int64)
-    keys = np.concatenate([between[None], parts]).T.copy()
-    names = keys.view(f"V{keys.itemsize * keys.shape[1]}").ravel()
-    # Of each name the last stays: that with the least room, of equal ones the first.
-    order = room.take(short).argsort(kind="stable")[::-1]
-    least = dict(zip(names.take(order).tolist(), order.tolist(), strict=True))
-    return short.take(sorted(least.values()))
+# Random builds in which a margin of an interface comes short.
 
 
-def _parts(factors: Floats) -> Floats:
-    """Factors as whole parts, rounded as the decimal number is."""
-    scaled = factors * UNITS
-    parts = np.rint(scaled)
-    doubtful = np.abs(scaled - np.floor(scaled) - 0.5) < 1e-6
-    if doubtful.any():
-        parts[doubtful] = [round(round(factor, 3) * UNITS) for factor in factors[doubtful].tolist()]
-    return parts
-
-
-# Builds that cuts and shifts bring near a limit, whatever the widths.
-
-
-class ErrorsQuery(NamedTuple):
-    """The errors of each query, a column each.
-
-    ``first`` are the numbers of their first rows: two cuts, then moves. ``signs`` are those of the
-    cuts, ``shift`` (mm) the range of each move that shifts, 0 where it turns, and ``sign`` its
-    sign. ``turning`` are the lines of moves that turn anything.
-    """
-
-    first: Indices
-    signs: Floats
-    shift: Floats
-    sign: Floats
-    turning: Indices
-    cutting: float
-
-
-class LikelyBuilds(NamedTuple):
-    """Builds by the number of the query, in rising order.
-
-    ``cuts`` (mm) is the rest after both cuts, ``moves`` are x and y of all shifts together, with
-    their signs, and the turn of each line that turns anything, -1 to 1 of its most. ``remaining``
-    is the rest after the cuts less the length of the shifts, the most that any normal loses.
-    """
-
-    query: Indices
-    build: Indices
-    cuts: Floats
-    moves: Floats
-    remaining: Floats
-
-
-def likely_builds(numbers: Floats, errors: ErrorsQuery, level: Floats) -> LikelyBuilds:
-    """Return the builds in which cuts and shifts leave less than the ``level`` of a query, mm.
-
-    One error after the other is counted, as most decide soon.
-    """
-    drawn, count = numbers.ravel(), numbers.shape[1]
-    shift = errors.shift
-    query, builds, after_cuts = _cut(numbers, errors, level + shift.sum(axis=0))
-    order = np.argsort(-shift, axis=0, kind="stable")[: (shift > 0).sum(axis=0).max(initial=0)]
-    reach = np.take_along_axis(shift, order, 0)
-    places = np.take_along_axis(errors.first[2:], order, 0) * count
-    after = np.cumsum(reach[::-1], axis=0)[::-1] - reach
-    remaining = after_cuts
-    for place, most_shift, rest in zip(places, reach, after, strict=True):
-        number = drawn.take(place.take(query) + builds)
-        remaining = remaining - most_shift.take(query) * np.sqrt(number)
-        some = picked(remaining < (level + rest).take(query))
-        query, builds = query.take(some), builds.take(some)
-        after_cuts, remaining = after_cuts.take(some), remaining.take(some)
-    shifts = np.zeros((2, len(query)))
-    for line, most in enumerate(shift):
-        acting = picked(most.take(query) > 0)
-        some = query.take(acting)
-        place = errors.first[2 + line].take(some) * count + builds[acting]
-        reached = (errors.sign[line] * most).take(some) * np.sqrt(drawn.take(place))
-        angle = math.tau * drawn.take(place + count)
-        shifts[0, acting] += reached * np.cos(angle)
-        shifts[1, acting] += reached * np.sin(angle)
-    remaining = after_cuts - np.hypot(*shifts)
-    some = picked(remaining < level.take(query))
-    query, builds = query.take(some), builds.take(some)
-    moves = np.empty((2 + len(errors.turning), len(some)))
-    moves[:2] = shifts[:, some]
-    for row, line in enumerate(errors.turning.tolist(), 2):
-        moves[row] = 2 * drawn.take(errors.first[2 + line].take(query) * count + builds) - 1
-    return LikelyBuilds(query, builds, after_cuts.take(some), moves, remaining.take(some))
-
-
-def _cut(numbers: Floats, errors: ErrorsQuery, level: Floats) -> tuple[Indices, Indices, Floats]:
-    """Builds in which cutting errors together come below a level, with their sum, mm."""
-    cutting, (one_sign, other_sign) = errors.cutting, errors.signs
-    share = np.where(level > 0, math.inf, -math.inf)
-    if cutting > 0:
-        share = level / (2 * cutting) + (one_sign + other_sign) / 2
-    least = np.minimum(one_sign, 0) + np.minimum(other_sign, 0)
-    counts: list[int] = []
-    chosen: list[Indices] = [np.zeros(0, dtype=np.intp)]
-    totals = [np.zeros(0)]
-    asking = picked(share > least)
-    for number in asking.tolist():
-        numbers_a, numbers_b = numbers[errors.first[0, number]], numbers[errors.first[1, number]]
-        total = one_sign[number] * numbers_a + other_sign[number] * numbers_b
-        builds = picked(total < share[number])
-        counts.append(len(builds))
-        chosen.append(builds)
-        totals.append(total.take(builds))
-    query = np.repeat(asking, counts)
-    signs = (one_sign + other_sign).take(query)
-    return query, np.concatenate(chosen), cutting * (2 * np.concatenate(totals) - signs)
-
-
-def picked(some: Bools) -> Indices:
-    """The numbers of those that are true."""
-    (numbers,) = some.nonzero()
-    return numbers
-
-
-# Random builds in which every margin of an interface keeps its limit.
-#
-# Most builds are decided without the sum of a row: by the cuts alone where the films hardly move,
-# and by the length of all shifts together, the most that any normal loses. The rest is summed up
-# row by row, and the sum decides. All interfaces are queried at once, in arrays.
-
-
-SURE = 1e-9 - TOLERANCE
-"""mm: what is bounded to be left so far above what holds is so, however the sum is rounded."""
-ROOM = 1e-12
-"""mm: far more than the rounding of a sum of two errors."""
-NEAR = 1e-9
+ROUNDING = 1e-9
 """mm: more than the rounding of a sum of all errors."""
 AT_ONCE = 200_000
 """Sums of rows in builds that are worked out at once, which bounds the memory."""
 
 
-class RowsQuery(NamedTuple):
-    """Rows of an interface: the number of their kind, and the first number of each of its errors.
+def short_builds(
+    rows: MarginRows, kind: int, first: Indices, cutting: float, numbers: Floats
+) -> tuple[Indices, Indices]:
+    """Return in which interfaces and builds a row of a kind comes short.
 
-    Errors are in the order of ``RowKind.errors``; queries in the order of kinds.
+    ``first`` are the numbers of the first row of each error of the kind, a column for each
+    interface; ``numbers`` are from 0 to 1, a row for each error and a column for each build.
     """
-
-    kind: int
-    first: Sequence[int]
-
-
-class _Drawn(NamedTuple):
-    """Builds of what is asked: by number of what asks, of its kind and of the build.
-
-    ``cuts`` (mm) is what both cuts leave; ``moves`` are x and y of all shifts together, as they
-    count, a line for each turn (radians), and 1 for the room.
-    """
-
-    query: Indices
-    kind: Indices
-    build: Indices
-    cuts: Floats
-    moves: Floats
-
-
-class RandomBuilds:
-    """Tells in which builds the rows of interfaces come short, of all interfaces at once.
-
-    Rows that are asked for of several interfaces stand beside each other.
-    """
-
-    def __init__(self, rows: MarginRows, queries: Sequence[RowsQuery], cutting: float) -> None:
-        self.rows = rows
-        begins, lines = rows.begins[:-1], len(rows.turn)
-        least = np.minimum.reduceat(rows.room, begins)
-        turn = rows.turn.repeat(np.diff(rows.begins), axis=1)
-        # However all turns, no row leaves less, before what cuts and shifts take.
-        turned = rows.room - (turn * np.abs(rows.levers)).sum(axis=0)
-        need = SURE - np.minimum.reduceat(turned, begins) + ROOM
-        turning = picked(rows.turn.max(axis=1, initial=0.0) > 0)
-        levers, self.turn = rows.levers[turning], rows.turn[turning]
-        low = np.minimum.reduceat(levers, begins, axis=1) * self.turn
-        high = np.maximum.reduceat(levers, begins, axis=1) * self.turn
-        self.kind = kind = np.array([query.kind for query in queries], dtype=np.intp)
-        first = [(*query.first, *[0] * (2 + lines - len(query.first))) for query in queries]
-        signs = np.array([row_kind.signs for row_kind in rows.kinds]).reshape(-1, 2)
-        self.errors = ErrorsQuery(
-            np.array(first, dtype=np.intp).reshape(-1, 2 + lines).T.copy(),
-            signs.T[:, kind],
-            rows.shift[:, kind],
-            rows.sign[:, kind],
-            turning,
-            cutting,
-        )
-        self.need = need[kind]
-        """What asks may come short where cuts and shifts leave less than this, mm."""
-        self.least = least[kind]
-        self.low, self.high = low[:, kind], high[:, kind]
-        """What the full turn of each line adds to the rows of what asks, at least and at most."""
-        self.factors = np.vstack([rows.normal, levers, rows.room]).T.copy()
-        """Of each row, a column for each line of ``_Drawn.moves``."""
-
-    def short(self, numbers: Floats) -> tuple[Indices, Indices]:
-        """Return the numbers of queries that come short, and the builds in which they do.
-
-        ``numbers`` are from 0 to 1, rows of errors by builds.
-        """
-        drawn = self._drawn(numbers)
-        if not len(drawn.query):
-            return drawn.query, drawn.build
-        least = self._least(drawn)
-        # What is so near to the limit that it hangs on rounding is summed up in one order.
-        is_short = least < -TOLERANCE
-        for near in picked(abs(least + TOLERANCE) < NEAR).tolist():
-            place = int(drawn.query[near]), int(drawn.build[near])
-            is_short[near] = self._is_short(numbers, *place)
-        return drawn.query[is_short], drawn.build[is_short]
-
-    def _drawn(self, numbers: Floats) -> _Drawn:
-        """Builds that the bounds do not decide, sorted by kind."""
-        likely = likely_builds(numbers, self.errors, self.need)
-        query, turns = likely.query, likely.moves[2:]
-        low, high = self.low.take(query, axis=1), self.high.take(query, axis=1)
-        remaining = likely.remaining + self.least.take(query)
-        remaining += np.minimum(low * turns, high * turns).sum(axis=0)
-        chosen = picked(remaining < SURE)
-        query = query.take(chosen)
-        kind = self.kind.take(query)
-        moves = np.vstack([likely.moves.take(chosen, axis=1), np.ones(len(chosen))])
-        moves[2:-1] *= self.turn.take(kind, axis=1)
-        return _Drawn(query, kind, likely.build.take(chosen), likely.cuts.take(chosen), moves)
-
-    def _least(self, drawn: _Drawn) -> Floats:
-        """The rest at the worst row of each build, but for rounding."""
-        least = np.zeros(len(drawn.kind))
-        kinds = range(len(self.rows.begins))
-        begins = np.searchsorted(drawn.kind, kinds).tolist()
-        rows = self.rows.begins.tolist()
-        for number, (start, stop) in enumerate(pairwise(begins)):
-            if start == stop:
-                continue
-            span = slice(rows[number], rows[number + 1])
-            step = max(1, AT_ONCE // (span.stop - span.start))
-            for first in range(start, stop, step):
-                builds = slice(first, min(stop, first + step))
-                remaining = self.factors[span] @ drawn.moves[:, builds]
-                np.minimum.reduce(remaining, axis=0, out=least[builds])
-        result: Floats = least + drawn.cuts
-        return result
-
-    def _is_short(self, numbers: Floats, query: int, build: int) -> bool:
-        """Return True if a row comes short when summed in one order, the same everywhere.
-
-        A matrix product would round differently on another machine.
-        """
-        rows, kind, errors = self.rows, int(self.kind[query]), self.errors
-        span = slice(*rows.begins[kind : kind + 2])
-        remaining, cutting = rows.room[span], errors.cutting
-        first = errors.first[:, query].tolist()
-        for row, sign in zip(first, errors.signs[:, query].tolist(), strict=False):
-            remaining = remaining + sign * (
-                -cutting + (cutting + cutting) * float(numbers[row, build])
-            )
-        for line, row in enumerate(first[2:]):
-            shift, turn, sign = (
-                float(table[line, kind]) for table in (rows.shift, rows.turn, rows.sign)
-            )
-            number = float(numbers[row, build])
-            if shift > 0:
-                radius = shift * math.sqrt(number)
-                angle = math.tau * float(numbers[row + 1, build])
-                x, y = sign * rows.normal[:, span]
-                remaining = remaining + x * (radius * math.cos(angle))
-                remaining = remaining + y * (radius * math.sin(angle))
-            elif turn > 0:
-                remaining = remaining + rows.levers[line, span] * (-turn + (turn + turn) * number)
-        return bool((remaining < -TOLERANCE).any())
+    span = slice(*rows.begins[kind : kind + 2])
+    room, levers = rows.room[span], rows.levers[:, span]
+    shift, turn = rows.shift[:, kind].tolist(), rows.turn[:, kind].tolist()
+    lines = range(len(first) - 2)
+    cuts = sum(
+        sign * cutting * (2 * numbers[row] - 1)
+        for sign, row in zip(rows.kinds[kind].signs, first, strict=False)
+    )
+    # Most builds keep their limits however the shifts point and whatever turns.
+    farthest = sum(shift[line] * np.sqrt(numbers[first[2 + line]]) for line in lines if shift[line])
+    least = room - sum(turn[line] * abs(levers[line]) for line in lines)
+    interfaces, builds = np.nonzero(cuts - farthest + least.min() < ROUNDING - TOLERANCE)
+    is_short = np.zeros(len(builds), dtype=bool)
+    step = max(1, AT_ONCE // len(room))
+    for begin in range(0, len(builds), step):
+        some = slice(begin, begin + step)
+        place, build = interfaces[some], builds[some]
+        remaining = room[:, None] + cuts[place, build]
+        moved = np.zeros((2, len(build)))
+        for line in lines:
+            row = first[2 + line, place]
+            number = numbers[row, build]
+            if shift[line]:
+                angle = math.tau * numbers[row + 1, build]
+                way = np.array([np.cos(angle), np.sin(angle)])
+                moved += rows.sign[line, kind] * shift[line] * np.sqrt(number) * way
+            elif turn[line]:
+                remaining += levers[line, :, None] * (turn[line] * (2 * number - 1))
+        # Not a matrix product, which would round differently on another machine.
+        for normal, move in zip(rows.normal[:, span], moved, strict=True):
+            remaining += normal[:, None] * move
+        is_short[some] = (remaining < -TOLERANCE).any(axis=0)
+    return interfaces[is_short], builds[is_short]
 
 
 # The rule.
@@ -573,20 +322,20 @@ def simulate(
     layers = [seated(group.first) for group in measures.margins]
     rows = rows_of(measures.forms, layers, limits)
     indices = sorted(
-        interface.index for group in measures.margins for interface in group.interfaces
+        {interface.index for group in measures.margins for interface in group.interfaces}
     )
-    return _counted(rows, _row_queries(rows.kinds, measures), indices, limits, seed, measures.pause)
+    return _counted(rows, indices, measures, seed)
 
 
-class _RowQueries(NamedTuple):
-    """Rows of a kind for each interface, by index, and the number of rows drawn."""
+class _DrawnErrors(NamedTuple):
+    """Numbers of the first rows of a kind's errors, a column for each interface (by index)."""
 
-    of: list[tuple[int, RowsQuery]]
-    drawn: int
+    interfaces: Sequence[int]
+    first: Indices
 
 
-def _row_queries(kinds: Sequence[RowKind], measures: Measures) -> _RowQueries:
-    """The rows of every interface, each with its own errors."""
+def _drawn_errors(kinds: Sequence[RowKind], measures: Measures) -> tuple[list[_DrawnErrors], int]:
+    """Return the rows of every kind, each interface with its own errors, and the row count."""
     # In the order in which they are drawn.
     errors: list[dict[Error, int]] = [{} for _ in measures.margins]
     places = []
@@ -595,74 +344,67 @@ def _row_queries(kinds: Sequence[RowKind], measures: Measures) -> _RowQueries:
         places.append([numbers.setdefault(error, len(numbers)) for error in kind.errors])
     felt = [
         [
-            (interface.index, _renamed(list(numbers), group.first, interface, measures.moves))
+            _renamed(list(numbers), group.first, interface, measures.moves)
             for interface in group.interfaces
         ]
         for group, numbers in zip(measures.margins, errors, strict=True)
     ]
-    rows, drawn = rows_by_error(
-        error for entries in felt for _, numbers in entries for error in numbers
+    rows, count = rows_by_error(
+        error for group in felt for of_interface in group for error in of_interface
     )
-    first = [
-        [(index, [rows[error] for error in numbers]) for index, numbers in entries]
-        for entries in felt
-    ]
-    queries = [
-        (index, RowsQuery(number, [numbers[place] for place in places[number]]))
+    first = [np.array([[rows[error] for error in one] for one in group]).T for group in felt]
+    drawn = [
+        _DrawnErrors(
+            [interface.index for interface in measures.margins[kind.group].interfaces],
+            first[kind.group][places[number]],
+        )
         for number, kind in enumerate(kinds)
-        for index, numbers in first[kind.group]
     ]
-    return _RowQueries(queries, drawn)
+    return drawn, count
 
 
 def _counted(
     rows: MarginRows,
-    queries: _RowQueries,
-    indices: Iterable[int],
-    limits: Limits,
+    indices: Sequence[int],
+    measures: Measures,
     seed: int,
-    pause: Callable[[], None],
 ) -> Yield:
     """Draw the builds, in batches, and count those in which all rows keep room."""
-    interfaces = dict.fromkeys(indices, 0)
-    total = limits.yield_builds or _quick_number(len(interfaces))
-    first_builds = total
-    whole = drawn_builds = 0
+    limits = measures.limits
+    errors, drawn_rows = _drawn_errors(rows.kinds, measures)
+    places = [np.searchsorted(indices, of_kind.interfaces) for of_kind in errors]
+    total = first_builds = limits.yield_builds or _quick_number(len(indices))
+    short_of = np.zeros(len(indices), dtype=np.intp)
     quantities = dict.fromkeys(QUANTITIES, 0)
-    of_builds = RandomBuilds(rows, [query for _, query in queries.of], limits.tolerances.cutting)
-    place_of = {index: place for place, index in enumerate(interfaces)}
-    own_place = np.array([place_of[index] for index, _ in queries.of], dtype=np.intp)
-    is_of = {
-        quantity: np.array([kind.quantity == quantity for kind in rows.kinds], dtype=bool)
-        for quantity in QUANTITIES
-    }
+    whole = drawn_builds = 0
+    generator = np.random.default_rng(seed)
     while drawn_builds < total:
-        pause()
+        measures.pause()
         builds = min(BATCH, total - drawn_builds)
-        first = drawn_builds * queries.drawn
-        number, bad = of_builds.short(random_numbers(seed, first, queries.drawn, builds))
-        whole += _different(bad, builds)
-        for quantity in QUANTITIES:
-            quantities[quantity] += _different(bad[is_of[quantity][of_builds.kind[number]]], builds)
-        is_short = np.zeros((len(interfaces), builds), dtype=bool)
-        is_short[own_place[number], bad] = True
-        for index, short in zip(interfaces, is_short, strict=True):
-            interfaces[index] += int(np.count_nonzero(short))
+        numbers = generator.random((drawn_rows, builds))
+        is_short = np.zeros((len(indices), builds), dtype=bool)
+        lacks = {quantity: np.zeros(builds, dtype=bool) for quantity in QUANTITIES}
+        for number, (kind, of_kind) in enumerate(zip(rows.kinds, errors, strict=True)):
+            interface, build = short_builds(
+                rows, number, of_kind.first, limits.tolerances.cutting, numbers
+            )
+            is_short[places[number][interface], build] = True
+            lacks[kind.quantity][build] = True
+        short_of += np.count_nonzero(is_short, axis=1)
+        whole += int(np.count_nonzero(is_short.any(axis=0)))
+        for quantity, one in lacks.items():
+            quantities[quantity] += int(np.count_nonzero(one))
         drawn_builds += builds
         if limits.yield_builds is None and drawn_builds == first_builds:
             total = _precise_number(Share(total - whole, total))
     return Yield(
         Share(total - whole, total),
-        {index: Share(total - bad, total) for index, bad in interfaces.items()},
-        {quantity: Share(total - bad, total) for quantity, bad in quantities.items()},
+        {
+            index: Share(total - short, total)
+            for index, short in zip(indices, short_of.tolist(), strict=True)
+        },
+        {quantity: Share(total - short, total) for quantity, short in quantities.items()},
     )
-
-
-def _different(named: Indices, builds: int) -> int:
-    """Number of distinct builds among those named."""
-    is_named = np.zeros(builds, dtype=bool)
-    is_named[named] = True
-    return int(np.count_nonzero(is_named))
 
 
 def _quick_number(interfaces: int) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 import random
 from collections.abc import Callable
@@ -13,9 +12,9 @@ import pytest
 
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Line
-from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, union
-from sbafab.laminate.laminate import Laminate
-from sbafab.rules import boundary, freedoms, margins
+from sbafab.geometry.region import Region, disc, divided, polygon, rectangle, strip, union
+from sbafab.laminate.laminate import Inlet, Laminate
+from sbafab.rules import boundary, freedoms, margins, tube_fit, voids
 from sbafab.rules.boundary import facing_films, outward_reach
 from sbafab.rules.freedoms import Freedom
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
@@ -24,18 +23,14 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.registration_worst_case import least_remaining
 from sbafab.rules.registration_yield import (
     CutContour,
-    ErrorsQuery,
     MarginRows,
-    RandomBuilds,
     RowKind,
-    RowsQuery,
-    likely_builds,
-    random_numbers,
     rows_by_error,
     rows_of,
+    short_builds,
     simulate,
 )
-from sbafab.rules.voids import _gap
+from sbafab.rules.voids import _around, _gap
 
 Good = Callable[..., Laminate]
 BUILDS = 400
@@ -70,20 +65,20 @@ def rows(number: int, least: float, seed: int) -> MarginRows:
 
 @pytest.mark.parametrize("least", [0.05, 0.15, 0.25])
 @pytest.mark.parametrize("number", [1, 7, 8, 30])
-def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float) -> None:
+def test_builds_that_come_short_are_those_of_plain_sums(number: int, least: float) -> None:
     asked = rows(number, least, number)
     errors = asked.kinds[0].errors
     first, count = rows_by_error(errors)
     # Two interfaces, of which the second one's errors are drawn after the first one's.
-    drawn = random_numbers(5, 0, 2 * count, BUILDS)
-    every = [
-        RowsQuery(kind, [count * interface + first[error] for error in errors])
-        for kind in (0, 1)
-        for interface in (0, 1)
-    ]
-    good = np.ones((4, BUILDS), dtype=bool)
-    good[RandomBuilds(asked, every, 0.1).short(drawn)] = False
-    assert good[2:].all()
+    drawn = np.random.default_rng(5).random((2 * count, BUILDS))
+    every = np.array(
+        [[count * interface + first[error] for interface in (0, 1)] for error in errors]
+    )
+    good = np.ones((2, 2, BUILDS), dtype=bool)
+    for kind in (0, 1):
+        interfaces, builds = short_builds(asked, kind, every, 0.1, drawn)
+        good[kind, interfaces, builds] = False
+    assert good[1].all()
     room, levers = asked.room[:number], asked.levers[2, :number]
     for interface in (0, 1):
         own = {error: drawn[count * interface + row :] for error, row in first.items()}
@@ -98,15 +93,8 @@ def test_bounded_builds_are_those_that_plain_sums_keep(number: int, least: float
         (nx, ny), moved = asked.normal[:, :number], other - shift
         left = room[:, None] + cut - again + levers[:, None] * turn
         left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
-        assert list(good[interface]) == list((left >= -TOLERANCE).all(axis=0))
-    assert 0 < good[:2].sum() < 2 * BUILDS
-
-
-def test_numbers_are_those_of_one_stream() -> None:
-    plain = np.random.default_rng(7).random(60)
-    for first, rows, builds in ((0, 2, 5), (10, 2, 10), (20, 4, 10), (0, 3, 20)):
-        found = random_numbers(7, first, rows, builds)
-        assert found.tolist() == plain[first : first + rows * builds].reshape(rows, -1).tolist()
+        assert list(good[0, interface]) == list((left >= -TOLERANCE).all(axis=0))
+    assert 0 < good[0].sum() < 2 * BUILDS
 
 
 def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
@@ -129,8 +117,6 @@ def test_a_laminate_without_margins_has_neither_forms_nor_rows() -> None:
     forms = linear_forms([], freedoms.Freedoms({}))
     asked = rows_of(forms, [], Limits())
     assert (forms.loss.shape, asked.room.shape, len(asked.kinds)) == ((0,), (0,), 0)
-    number, builds = RandomBuilds(asked, [], 0.1).short(np.empty((0, BUILDS)))
-    assert len(number) == len(builds) == 0
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -182,40 +168,18 @@ def test_edges_aside_of_a_band_or_farther_off_are_none_of_the_nearest(
                 assert found == plain
 
 
-@pytest.mark.parametrize("need", [-0.4, -0.1, 0.0])
-def test_likely_builds_are_those_of_plain_sums(need: float) -> None:
-    first = np.array([[0, 1], [1, 0], [2, 4], [4, 2], [6, 7]])
-    errors = ErrorsQuery(
-        first,
-        signs=np.array([[1.0, -1.0], [1.0, 1.0]]),
-        shift=np.array([[0.2, 0.1], [0.0, 0.3], [0.0, 0.0]]),
-        sign=np.array([[1.0, -1.0], [0.0, 1.0], [0.0, 0.0]]),
-        turning=np.array([2]),
-        cutting=0.1,
-    )
-    drawn = random_numbers(3, 40, 8, 200)
-    likely = likely_builds(drawn, errors, np.full(2, need))
-    told = zip(likely.query.tolist(), likely.build.tolist(), strict=True)
-    found = dict(zip(told, likely.remaining, strict=True))
-    places = {one: place for place, one in enumerate(found)}
-    for asked in (0, 1):
-        for build in range(200):
-            left, moved = 0.0, 0j
-            for row, sign in zip(first[:2, asked], errors.signs[:, asked], strict=True):
-                left += sign * 0.1 * (2 * drawn[row, build] - 1)
-            for line, most in enumerate(errors.shift[:, asked]):
-                row = first[2 + line, asked]
-                if most:
-                    moved += errors.sign[line, asked] * cmath.rect(
-                        most * math.sqrt(drawn[row, build]), math.tau * drawn[row + 1, build]
-                    )
-            left -= abs(moved)
-            assert ((asked, build) in found) == (left < need)
-            if left < need:
-                assert found[asked, build] == pytest.approx(left, abs=1e-12)
-                turned = 2 * drawn[first[4, asked], build] - 1
-                assert likely.moves[2, places[asked, build]] == turned
-    assert 0 < len(found) < 400
+@pytest.mark.parametrize("design", DESIGNS)
+def test_voids_beside_one_circle_are_those_beside_each_of_its_arcs(
+    design: tuple[str, ...], good: Good, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    laminate = good(*design)
+    frame = rectangle((-50, -50), (50, 50))
+    gaps = [(one.unbonded, one.contact, frame, ()) for one in laminate.interfaces]
+    gap = voids._gap.__wrapped__  # type: ignore[attr-defined]
+    found = [gap(*one) for one in gaps]
+    monkeypatch.setattr(voids, "_follows", lambda *_: False)
+    assert [gap(*one) for one in gaps] == found
+    assert any(len(one.touching) > 3 for one in found)
 
 
 TAPERED = ("1dof-5mm", "stack.balloons=4", "chamber.diameter=[5, 8, 6, 8]")
@@ -249,8 +213,66 @@ def test_films_outside_an_outline_face_nothing_within_it(
     assert facing_films(laminate) == found
 
 
+RUN = Inlet("chamber1", (9.0, 0.5), (1.0, 0.0), 1.6, 3.0, 0.8)
+STRIP = rectangle((0.0, -0.3), (9.0, 1.3))
+"""A strip that opens at the inlet of that run."""
+
+
+@pytest.mark.parametrize("degrees", [0, 90, 120, 263])
+def test_a_straight_run_is_what_a_boolean_leaves_of_it(degrees: float) -> None:
+    pocket = (STRIP | disc((0.0, 0.5), 2.5)).turned(degrees)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    mouth = 9.0 * c - 0.5 * s, 9.0 * s + 0.5 * c
+    inlet = replace(RUN, mouth=mouth, direction=(c, s))
+    inner = mouth[0] - 3.0 * c, mouth[1] - 3.0 * s
+    beside = strip(inner, mouth, 2 * inlet.width)
+    run = tube_fit._straight_run(pocket, inlet, beside)
+    assert run is not None
+    assert run.area == pytest.approx(3.0 * 1.6)
+    assert [edge.start for edge in run.edges] == [
+        pytest.approx(edge.start) for edge in (pocket & beside).edges
+    ]
+
+
+@pytest.mark.parametrize(
+    "unbonded",
+    [
+        # A hole in the run, a waist, sides aslant, a shape beside it, wider than is looked at.
+        STRIP - disc((7.5, 0.5), 0.1),
+        STRIP - rectangle((7.0, -1.0), (7.5, 0.0)),
+        polygon([(0, -0.3), (9, -0.2), (9, 1.3), (0, 1.3)]),
+        STRIP | rectangle((7.0, 1.5), (7.5, 2.0)),
+        rectangle((0.0, -1.2), (9.0, 2.2)),
+        # It ends before the mouth, goes on past it, or begins after the run does.
+        rectangle((0.0, -0.3), (8.9, 1.3)),
+        rectangle((0.0, -0.3), (9.5, 1.3)),
+        rectangle((6.5, -0.3), (9.0, 1.3)),
+    ],
+)
+def test_any_other_run_is_left_to_the_boolean(unbonded: Region) -> None:
+    beside = strip((6.0, 0.5), (9.0, 0.5), 3.2)
+    assert tube_fit._straight_run(STRIP, RUN, beside) is not None
+    assert tube_fit._straight_run(unbonded, RUN, beside) is None
+
+
 FRAME = rectangle((-20, -20), (20, 20))
 NOTCHED = rectangle((-4, -3), (4, 3)) - disc((0, 0), 1) - disc((4, 0), 1.5)
+
+
+@pytest.mark.parametrize(
+    "region",
+    [
+        Region(),
+        disc((1, 2), 3),
+        NOTCHED,
+        union([NOTCHED, disc((9, 9), 2)]),
+        # Two squares that touch at a corner, and a hole that touches its outline.
+        union([rectangle((0, 0), (2, 2)), rectangle((2, 2), (4, 4))]),
+        rectangle((0, 0), (6, 6)) - rectangle((0, 2), (2, 4)).turned(45, (0, 2)),
+    ],
+)
+def test_what_is_round_a_region_is_what_a_boolean_leaves(region: Region) -> None:
+    assert _around(region, FRAME).contours == (FRAME - region).contours
 
 
 def test_voids_that_touch_at_a_point_are_told_apart_along_one_circle() -> None:
