@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sbafab.actuators import build, load_design, records
+from sbafab.actuators import build, load_design
 from sbafab.as_built.claims import (
     claim,
     design_problems,
@@ -23,6 +23,7 @@ from sbafab.as_built.cut_files import (
     read_layers,
     read_seams,
     seam_departures,
+    stacked_layers,
 )
 from sbafab.as_built.expected import ExpectedLaminate, WrittenDesign, departure, expected_laminate
 from sbafab.as_built.kerf_removed import chords_for_arc
@@ -49,14 +50,12 @@ from sbafab.as_built.records import (
     read_job,
 )
 from sbafab.as_built.sheets import DesignLot, SheetOrder, sheet_problems
-from sbafab.as_built.stack import laminate_of, stacked_layers
 from sbafab.assemblies.build import Assembled, assemble
 from sbafab.assemblies.checks import lowered_checks, run_checks
 from sbafab.assemblies.files import DESIGN_FILE, assembly_sha256, load_assembly, part_entry
 from sbafab.design.identity import design_sha256
-from sbafab.design.records import Design, validated
+from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
-from sbafab.geometry.region import Region
 from sbafab.laminate.folding import halves
 from sbafab.laminate.laminate import Laminate
 from sbafab.models.formulas import sizes
@@ -75,9 +74,9 @@ AS_DESIGNED = "all that lies here is what design.toml makes"
 
 @dataclass(frozen=True)
 class AsBuiltFolder:
-    """A folder read back; ``laminate`` is None if the file of a layer could not be read.
+    """A folder read back; ``expected`` is the laminate of its design.
 
-    ``expected`` is the laminate of the design, None if it cannot be built.
+    ``laminate`` is None if the file of a layer could not be read, or the design has other layers.
     """
 
     claims: Manifest
@@ -86,7 +85,7 @@ class AsBuiltFolder:
     files: tuple[LayerFile, ...]
     laminate: Laminate | None
     problems: tuple[Problem, ...]
-    expected: ExpectedLaminate | None
+    expected: ExpectedLaminate
     design_findings: tuple[Finding, ...] | None = None
     """The findings of the design check of a run that has just written the folder."""
     measured: tuple[Finding, ...] = ()
@@ -95,10 +94,8 @@ class AsBuiltFolder:
     @property
     def is_expected(self) -> bool:
         """True if every layer file cuts the design's layer; ``laminate`` is then the design's."""
-        laminate, expected = self.laminate, self.expected
-        has_same_seams = (
-            laminate is None or expected is None or laminate.seams == expected.laminate.seams
-        )
+        laminate = self.laminate
+        has_same_seams = laminate is None or laminate.seams == self.expected.laminate.seams
         return has_same_seams and all(
             file.part is not None and file.part.is_expected for file in self.files
         )
@@ -110,6 +107,7 @@ class FolderReadBack:
 
     ``findings`` are those on files, claims, rules, and on the layers of each design of a job;
     ``problems``: where a folder of one design cuts other layers than its ``design.toml`` makes.
+    ``designs`` is empty if a ``design.toml`` cannot be used.
     """
 
     findings: tuple[Finding, ...]
@@ -133,9 +131,26 @@ def read_back(folder: Path, works: Mapping[str, WrittenDesign] | None = None) ->
     if is_job(folder):
         return _read_job(folder, works)
     work = next(iter(works.values())) if works is not None else None
-    built = read_folder(folder, work=work)
+    try:
+        built = read_folder(folder, work=work)
+    except DesignError as error:
+        return _by_hashes(folder, read_claims(folder), [f"{error}"])
     built = replace(built, measured=_run_deck(built))
     return FolderReadBack(_findings(built), tuple(layer_departures(built)), (built,))
+
+
+def _by_hashes(
+    folder: Path, claims: Manifest | JobManifest, reasons: Sequence[str]
+) -> FolderReadBack:
+    """Compare the files of a folder, whose design cannot be used, with the manifest's hashes."""
+    problems = file_problems(folder, claims)
+    findings = findings_of(CLAIMS, problems, "every file has the hash that the manifest lists")
+    unusable = [
+        Problem(DESIGNED, f"{reason}; only the hashes of the files were compared")
+        for reason in reasons
+    ]
+    job = claims if isinstance(claims, JobManifest) else None
+    return FolderReadBack(tuple(findings), tuple(unusable), (), job)
 
 
 def _run_deck(built: AsBuiltFolder) -> tuple[Finding, ...]:
@@ -171,9 +186,14 @@ def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> Folder
     problems: list[Problem] = []
     lowered_limits: list[str] = []
     folders: list[AsBuiltFolder] = []
+    unusable: list[str] = []
     for entry in job.designs:
         work = works.get(entry.name) if works is not None else None
-        built = read_folder(path_in_folder(folder, entry.folder), of_job=True, work=work)
+        try:
+            built = read_folder(path_in_folder(folder, entry.folder), of_job=True, work=work)
+        except DesignError as error:
+            unusable.append(f"{entry.name}: {error}")
+            continue
         built = replace(built, measured=_run_deck(built))
         folders.append(built)
         lowered_limits += lowered(limits_of(built.design))
@@ -190,6 +210,8 @@ def _read_job(folder: Path, works: Mapping[str, WrittenDesign] | None) -> Folder
         if identity != (entry.name, entry.copies, entry.design_sha256):
             message = f"{entry.folder}: name, copies or design_sha256 are not those of its manifest"
             problems.append(claim(message))
+    if unusable:
+        return _by_hashes(folder, job, unusable)
     first = folders[0]
     problems += file_problems(folder, job)
     order = SheetOrder(job, first.design, first.claims.kerf, lots)
@@ -216,23 +238,18 @@ def read_folder(
     """Read the laminate of a folder's cut files, with the problems of files and claims.
 
     The folder of a design ``of_job`` has no film sheets of its own. ``work``: the design of a run
-    that has just written the folder. Raises OutputError as ``read_back`` does.
+    that has just written the folder. Raises OutputError as ``read_back`` does, and DesignError for
+    a ``design.toml`` that is missing or makes no laminate.
     """
     claims = read_claims(folder)
     if all(layer.file is None for layer in claims.layers):
         raise OutputError(f"{folder} holds no cut files; write them with sbafab cut or generate")
-    design, is_readable, problems = _design(folder, claims)
-    if work is not None:
-        expected: ExpectedLaminate | None = work.expected
-    else:
-        expected = expected_laminate(design, claims.curves) if is_readable else None
+    design, digest = _design(folder)
+    expected = work.expected if work is not None else expected_laminate(design, claims.curves)
+    problems = design_problems(claims, design, digest)
     problems += order_problems(claims, design)
-    try:
-        problems += file_problems(folder, claims)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
-    count = len(claims.layers)
-    layers_expected = expected.layers(count) if expected is not None else [None] * count
+    problems += file_problems(folder, claims)
+    layers_expected = expected.layers(len(claims.layers))
     files, file_errors = read_layers(folder, claims, _drawn_in_chords(design), layers_expected)
     problems += file_errors
     files = _as_laid(files, expected)
@@ -248,16 +265,14 @@ def read_folder(
     laminate: Laminate | None = None
     parts = [file.part for file in files if file.part is not None]
     chord_error = max((part.chord_error for part in parts), default=0.0)
-    if len(parts) == len(files):
+    if len(parts) == len(files) == len(expected.laminate.layers):
         try:
-            laminate = _laminate(files, claims, design, expected)
+            laminate = _laminate(files, design, expected.laminate)
             if seams is not None:
                 laminate = replace(laminate, seams=seams)
             problems += _laminate_problems(folder, laminate, claims, parts, design)
             room = 2 * (TOLERANCE + chord_error)
-            outline = expected.laminate.outline if expected is not None else Region()
-            outlined = replace(laminate, outline=outline)
-            problems += size_problems(claims, sizes(design, outlined), room)
+            problems += size_problems(claims, sizes(design, laminate), room)
             laminate = with_plate_pins(folder, laminate, claims)
         except UNMEASURED as error:
             laminate = None
@@ -270,14 +285,14 @@ def read_folder(
     )
 
 
-def _as_laid(files: Sequence[LayerFile], expected: ExpectedLaminate | None) -> list[LayerFile]:
+def _as_laid(files: Sequence[LayerFile], expected: ExpectedLaminate) -> list[LayerFile]:
     """Return the files with each layer as it lies: turned over, or its half of a folded film.
 
     What the design's own layers are cut from is that already.
     """
-    if expected is None or len(files) != len(expected.laminate.layers):
-        return [*files]
     laminate = expected.laminate
+    if len(files) != len(laminate.layers):
+        return [*files]
     roots = {fold.lower for fold in laminate.folds}
     laid = []
     for file in files:
@@ -299,30 +314,17 @@ def _cut_parts(files: Sequence[LayerFile]) -> list[LayerFile]:
     ]
 
 
-def _laminate(
-    files: Sequence[LayerFile],
-    claims: Manifest,
-    design: Design,
-    expected: ExpectedLaminate | None,
-) -> Laminate:
-    """Return the laminate as cut, with bores, inlets and pins of the design.
-
-    The purpose of an opening does not follow from its shape: a window may look like a tooling hole,
-    and an ear like a tab. Only without a usable design are they inferred from the profiles.
-    """
-    if expected is None or len(expected.laminate.layers) != len(files):
-        return laminate_of(files, claims, design)
+def _laminate(files: Sequence[LayerFile], design: Design, designed: Laminate) -> Laminate:
+    """Return the laminate as cut, with bores, inlets and pins of the design."""
     if all(file.part is not None and file.part.is_expected for file in files):
-        return expected.laminate
-    layers = zip(stacked_layers(files, design), expected.laminate.layers, strict=True)
-    cut = tuple(replace(layer, pieces=layer_expected.pieces) for layer, layer_expected in layers)
-    return replace(expected.laminate, layers=cut)
+        return designed
+    layers = zip(stacked_layers(files, design), designed.layers, strict=True)
+    cut = tuple(replace(layer, pieces=expected.pieces) for layer, expected in layers)
+    return replace(designed, layers=cut)
 
 
 def layer_departures(built: AsBuiltFolder) -> list[Problem]:
     """Return the layers whose files differ from the design."""
-    if built.expected is None:
-        return [Problem(DESIGNED, "design.toml makes no laminate to hold the cut files against")]
     problems = []
     expected = built.expected.layers(len(built.files))
     for file, layer in zip(built.files, expected, strict=True):
@@ -343,10 +345,8 @@ def layer_departures(built: AsBuiltFolder) -> list[Problem]:
     return problems
 
 
-def as_designed(built: AsBuiltFolder) -> Checked | None:
-    """Return the folder's design with its findings; None if it cannot be built."""
-    if built.expected is None:
-        return None
+def as_designed(built: AsBuiltFolder) -> Checked:
+    """Return the folder's design with its findings."""
     in_chords = built.claims.curves is not None
     laminate = build(built.design) if in_chords else built.expected.laminate
     is_known = built.is_expected and not in_chords
@@ -380,19 +380,16 @@ def _laminate_problems(
     ]
 
 
-def _design(folder: Path, claims: Manifest) -> tuple[Design, bool, list[Problem]]:
-    """Return the folder's design, True and problems; if unreadable, default values and False."""
+def _design(folder: Path) -> tuple[Design, str]:
+    """Return the folder's design and its hash. Raises DesignError for one that cannot be used."""
+    path = folder / "design.toml"
+    if not path.exists():
+        raise DesignError("design.toml is missing")
     try:
-        design = load_design(folder / "design.toml")
-        digest = design_sha256(design)
+        design = load_design(path)
+        return design, design_sha256(design)
     except (DesignError, OSError) as error:
-        reason = str(error) or type(error).__name__
-        try:
-            design = validated({"name": "unknown", "family": claims.family}, records(), folder)
-        except DesignError as unknown:
-            raise OutputError(f"manifest.json: {unknown}") from None
-        return design, False, [claim(f"checked against default limits, for {reason}")]
-    return design, True, design_problems(claims, design, digest)
+        raise DesignError(f"design.toml cannot be used: {error or type(error).__name__}") from None
 
 
 def _drawn_in_chords(design: Design) -> bool:

@@ -19,6 +19,7 @@ from sbafab.cutting.properties import (
     warning_property,
 )
 from sbafab.design.records import Design
+from sbafab.errors import OutputError
 from sbafab.laminate.folding import fold_roots
 from sbafab.laminate.joints import chamber_gaps
 from sbafab.laminate.laminate import Layer
@@ -54,9 +55,13 @@ def claim(message: str, *layers: int) -> Problem:
 def file_problems(folder: Path, claims: Manifest | JobManifest) -> list[Problem]:
     """Return files that are missing, changed or not in the manifest.
 
-    An unlisted file that could be cut by mistake fails; any other is a warning.
+    An unlisted file that could be cut by mistake fails; any other is a warning. Raises OutputError
+    if the folder cannot be read.
     """
-    hashes = file_hashes(folder)
+    try:
+        hashes = file_hashes(folder)
+    except OSError as error:
+        raise OutputError(f"{folder} cannot be read: {error.strerror or error}") from None
     hashes.pop("manifest.json", None)
     layers = claims.layers if isinstance(claims, Manifest) else ()
     layer_of = {layer.file: number for number, layer in enumerate(layers, start=1)}

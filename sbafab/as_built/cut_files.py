@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
+from sbafab.actuators.stacking import film_of
 from sbafab.as_built.expected import (
     Expected,
     ExpectedLaminate,
@@ -46,9 +47,9 @@ from sbafab.cutting.verify import check_datum
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region
-from sbafab.laminate.films import Material
-from sbafab.laminate.joints import Seam
-from sbafab.laminate.laminate import Laminate
+from sbafab.laminate.films import Film, Material
+from sbafab.laminate.joints import Seam, balloon_numbers
+from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.output.manifest import LayerClaim, Manifest, SeamClaim
 from sbafab.rules.limits import TOLERANCE
 
@@ -121,6 +122,42 @@ def read_layers(
             problems.append(Problem(INTEGRITY, message, (position,)))
         files.append(LayerFile(position, claim, part))
     return _in_agreement(files), problems
+
+
+def stacked_layers(files: Sequence[LayerFile], design: Design) -> tuple[Layer, ...]:
+    """Return the layers of readable files in order; equal profiles share a pattern."""
+    patterns: dict[tuple[str, str, int, bool], str] = {}
+    layers = []
+    z = 0.0
+    folded = {index for fold in design.stated_folds for index in (fold.lower, fold.upper)}
+    balloons = balloon_numbers([file.claim.role for file in files], design.seamed_layers)
+    for file, balloon in zip(files, balloons, strict=True):
+        claim = file.claim
+        if file.part is not None:
+            # Folded layers are cut as one part, so that none is of another layer's pattern.
+            number = file.position if file.position in folded else 0
+            turned = file.position in design.turned_layers
+            shape = (claim.material, file.part.region.key, number, turned)
+            layers.append(
+                Layer(
+                    index=file.position,
+                    role=claim.role,
+                    film=_film(claim, design),
+                    profile=file.part.region,
+                    balloon=balloon,
+                    z=round(z, 9),
+                    pieces=1,
+                    pattern=patterns.setdefault(shape, f"P{len(patterns) + 1:02d}"),
+                )
+            )
+        z += claim.thickness
+    return tuple(layers)
+
+
+def _film(claim: LayerClaim, design: Design) -> Film:
+    """Return the film of a layer's role, with the claimed name and thickness."""
+    film = film_of(design, claim.role, claim.index)
+    return replace(film, material=claim.material, thickness=claim.thickness)
 
 
 def claimed_properties(claims: Manifest, material: str) -> dict[str, str]:
@@ -280,14 +317,14 @@ def check_sequence(drawing: ReadBack) -> None:
 
 
 def read_seams(
-    folder: Path, claims: Manifest, design: Design, expected: ExpectedLaminate | None
+    folder: Path, claims: Manifest, design: Design, expected: ExpectedLaminate
 ) -> tuple[tuple[Seam, ...] | None, list[Problem]]:
     """Return the seams as their files draw them, and problems; None where the design has none.
 
     A path within a micrometre of the design's is the design's own. Each lies where its tool, which
     the design says is beside the machine's head, comes when the head follows the file.
     """
-    designed = () if expected is None else expected.laminate.seams
+    designed = expected.laminate.seams
     problems = _seam_problems(claims, designed)
     if not designed:
         return None, problems

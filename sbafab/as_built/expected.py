@@ -261,10 +261,10 @@ class WrittenDesign(NamedTuple):
     findings: tuple[Finding, ...]
 
 
-def expected_laminate(design: Design, curves: str | None) -> ExpectedLaminate | None:
-    """Return the laminate of a design drawn with ``curves``; None if it cannot be built or cut.
+def expected_laminate(design: Design, curves: str | None) -> ExpectedLaminate:
+    """Return the laminate of a design drawn with ``curves``; with chords, the one that these cut.
 
-    With chords, the laminate that these cut.
+    Raises DesignError if it cannot be built or cut.
     """
     try:
         settings = drawn_settings(design, (), curves)
@@ -273,8 +273,8 @@ def expected_laminate(design: Design, curves: str | None) -> ExpectedLaminate | 
         if settings.curves.in_chords:
             laminate = as_cut(laminate, paths, settings)
         return ExpectedLaminate(laminate, paths)
-    except (DesignError, GeometryError, OutputError, ArithmeticError):
-        return None
+    except (DesignError, GeometryError, OutputError, ArithmeticError) as error:
+        raise DesignError(f"design.toml makes no laminate: {error}") from None
 
 
 def drawn_settings(design: Design, waived: tuple[str, ...], curves: str | None) -> CutSettings:

@@ -103,8 +103,8 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
             f"{folder} holds several designs, and a netlist is one design's; check the folder of "
             "that one"
         )
-    (built,) = read.designs
-    if built.laminate is None:
+    built = next(iter(read.designs), None)
+    if built is None or built.laminate is None:
         message = f"{nets.name} was not compared: not all layers could be read"
         return (*findings, Finding(NETLIST, "fail", None, None, "", Place(), message))
     return (*findings, *netlist_findings(built.laminate, built.limits, netlist, nets.name))
@@ -112,14 +112,12 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
 
 def design_problems_of(folder: Path, read: FolderReadBack) -> list[Problem]:
     """Layers, and all that lies beside them, that are not what the folder's designs make."""
-    checked = [as_designed(built) for built in read.designs]
-    whole = [design for design in checked if design is not None]
-    if len(whole) < len(checked):
+    if not read.designs:
         return [*read.problems]
+    whole = [as_designed(built) for built in read.designs]
     if read.job is not None:
         return [*read.problems, *_job_problems(folder, read.job, whole, read.designs[0].claims)]
     (built,) = read.designs
-    assert built.expected is not None
     return [*read.problems, *_problems(folder, built.claims, whole[0], built.expected.paths)]
 
 

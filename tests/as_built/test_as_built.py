@@ -229,11 +229,29 @@ def test_files_too_many_are_told_cut_files_as_faults(doctor: Doctor) -> None:
     assert "spare.dxf" in failed(doctor.folder)["manifest-claims"].message
 
 
-def test_without_its_design_a_folder_fails_and_is_still_measured(doctor: Doctor) -> None:
-    (doctor.folder / "design.toml").unlink()
-    found = {finding.rule: finding.verdict for finding in check_folder(doctor.folder)}
-    assert found["manifest-claims"] == "fail"
-    assert found["bond-width"] == "pass"
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "design.toml is missing"),
+        ("name = ", "design.toml cannot be used"),
+        ('family = "cubic"', "design.toml cannot be used"),
+        ('family = "1dof"\nname = "x"\nbond.width = 9', "design.toml makes no laminate"),
+    ],
+)
+def test_without_a_usable_design_only_hashes_are_compared(
+    text: str | None, said: str, doctor: Doctor
+) -> None:
+    path = doctor.folder / "design.toml"
+    path.unlink()
+    if text is not None:
+        path.write_text(text)
+    doctor.path(4).write_text("cut twice")
+    designed, *claimed = sorted(check_folder(doctor.folder), key=lambda f: f.rule)
+    assert (designed.rule, designed.verdict) == ("as-designed", "fail")
+    assert said in designed.message
+    assert "only the hashes of the files were compared" in designed.message
+    assert {(finding.rule, finding.verdict) for finding in claimed} == {("manifest-claims", "fail")}
+    assert {finding.where.layers for finding in claimed} == {(4,), ()}
 
 
 def test_a_folder_of_another_version_is_one_sentence(doctor: Doctor) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from unittest.mock import patch
 
 from sbafab.as_built import check as as_built
-from sbafab.as_built import cut_files, stack
+from sbafab.as_built import cut_files
 from sbafab.as_built.check import read_folder
 from sbafab.as_built.cut_files import CutPart, read_part
 from sbafab.as_built.expected import Expected
@@ -113,7 +113,6 @@ def quick(parts: dict[str, CutPart]) -> Iterator[None]:
     with (
         patch.object(cut_files, "read_part", known),
         patch.object(laminate, "interface_regions", regions),
-        patch.object(stack, "interface_regions", regions),
         patch.object(as_built, "RULES", rules),
         patch.object(as_built, "sheet_problems", lambda *_: []),
         patch.object(whole, "design_problems_of", lambda *_: []),
