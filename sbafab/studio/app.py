@@ -42,9 +42,6 @@ from sbafab.studio.workers import BusyError, WaitingJob, WorkerPool
 
 HERE = ("127.0.0.1", "localhost", "[::1]")
 TOKEN_HEADER = b"x-sbafab-token"
-MOST_BODY = 2_000_000
-MOST_AT_ONCE = 64
-"""Requests that are read and answered at a time: at most 128 MB of them."""
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
@@ -59,36 +56,25 @@ MADE_POLICY = (
 
 
 class Guard:
-    """Refuses what does not come from the studio's own page, and bounds what it may send."""
+    """Refuses requests of other sites, and tells the browser what a page may load."""
 
     def __init__(self, app: ASGIApp, token: str, address: str = HERE[0]) -> None:
         self.app, self.token = app, token.encode()
         self.hosts = HERE if address == HERE[0] else (*HERE, address)
-        self.at_once = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "lifespan":
-            await self.app(scope, receive, send)
-            return
-        if scope["type"] != "http":
-            return
-        refused = self.refusal(scope)
+        refused = self.refusal(scope) if scope["type"] == "http" else None
         if refused is not None:
             status, why = refused
             await JSONResponse({"kind": "refused", "message": why}, status)(scope, receive, send)
-            return
-        if self.at_once >= MOST_AT_ONCE:
-            await no_room()(scope, receive, send)
-            return
-        policy = MADE_POLICY if scope["path"].startswith("/made/") else PAGE_POLICY
-        self.at_once += 1
-        try:
-            await self.app(scope, _bounded(receive), _with_headers(send, policy))
-        finally:
-            self.at_once -= 1
+        elif scope["type"] == "http":
+            policy = MADE_POLICY if scope["path"].startswith("/made/") else PAGE_POLICY
+            await self.app(scope, receive, _with_headers(send, policy))
+        else:
+            await self.app(scope, receive, send)
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
-        """Status and reason why a request is not answered."""
+        """Return status and reason if a request is not answered."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"").decode("latin-1")
         if host.rpartition(":")[0] not in self.hosts and host not in self.hosts:
@@ -96,42 +82,10 @@ class Guard:
         origin = headers.get(b"origin")
         if origin is not None and origin.decode("latin-1").partition("://")[2] != host:
             return 403, "this request comes from another site"
-        if headers.get(b"sec-fetch-site", b"same-origin") == b"cross-site" and _is_call(scope):
-            return 403, "this request comes from another site"
-        if _is_call(scope) and not hmac.compare_digest(headers.get(TOKEN_HEADER, b""), self.token):
+        is_call = str(scope["path"]).startswith("/api/")
+        if is_call and not hmac.compare_digest(headers.get(TOKEN_HEADER, b""), self.token):
             return 401, "the link is not this studio's; open the one that sbafab studio printed"
-        length = headers.get(b"content-length", b"0")
-        if not length.isdigit() or int(length) > MOST_BODY:
-            return 413, f"a request holds at most {MOST_BODY:,} bytes"
         return None
-
-
-def no_room() -> JSONResponse:
-    """The answer where too much is asked at once; it is given before any other has begun."""
-    message = "too many requests at once; wait a moment, or close some tabs of the studio"
-    return JSONResponse({"kind": "error", "message": message}, 503, {"retry-after": "1"})
-
-
-def _is_call(scope: Scope) -> bool:
-    return str(scope["path"]).startswith("/api/")
-
-
-class TooLongError(Exception):
-    """A body without a length that grew past the limit."""
-
-
-def _bounded(receive: Receive) -> Receive:
-    total = 0
-
-    async def bounded() -> Message:
-        nonlocal total
-        message = await receive()
-        total += len(message.get("body", b""))
-        if total > MOST_BODY:
-            raise TooLongError
-        return message
-
-    return bounded
 
 
 def _with_headers(send: Send, policy: str) -> Send:
@@ -254,7 +208,7 @@ def app(studio: Studio) -> Starlette:
             Mount("/", StaticFiles(directory=STATIC, html=True)),
         ],
         middleware=[Middleware(Guard, token=studio.token, address=studio.address)],
-        exception_handlers={SbafabError: _refused, BusyError: _busy, TooLongError: _too_long},
+        exception_handlers={SbafabError: _refused, BusyError: _busy},
         lifespan=studio.lifespan,
     )
     application.state.studio = studio
@@ -282,11 +236,8 @@ async def _refused(_: Request, error: Exception) -> Response:
 
 
 async def _busy(_: Request, __: Exception) -> Response:
-    return no_room()
-
-
-async def _too_long(_: Request, __: Exception) -> Response:
-    return JSONResponse({"kind": "error", "message": "the request is too long"}, 413)
+    message = "too many requests at once; wait a moment, or close some tabs of the studio"
+    return JSONResponse({"kind": "error", "message": message}, 503, {"retry-after": "1"})
 
 
 async def start(request: Request) -> Response:

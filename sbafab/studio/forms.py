@@ -195,10 +195,6 @@ def _named(reference: str, schema: JsonSchema) -> JsonSchema:
 # Requests of the page.
 
 
-SURROGATE = re.compile("[\ud800-\udfff]")
-"""Half of a character as JSON may write it alone; no file in UTF-8 can hold it."""
-
-
 def started(
     folder: Path,
     opened: str | None = None,
@@ -233,26 +229,7 @@ def table(body: bytes) -> dict[str, Any]:
         parsed = None
     if not isinstance(parsed, dict):
         raise SbafabError("the request is not a table in JSON")
-    _refuse_surrogates(parsed)
     return parsed
-
-
-def _refuse_surrogates(parsed: dict[str, Any]) -> None:
-    text = parsed.get("text")
-    half = SURROGATE.search(text) if isinstance(text, str) else None
-    if half is not None:
-        line = half.string.count("\n", 0, half.start()) + 1
-        raise SbafabError(
-            f"line {line} of the text holds half a character (U+{ord(half[0]):04X}), which no file "
-            "can; delete it and type it again"
-        )
-    try:
-        json.dumps(parsed, ensure_ascii=False).encode("utf-8")
-    except UnicodeEncodeError as error:
-        raise SbafabError(
-            f"the request holds half a character (U+{ord(error.object[error.start]):04X}), which "
-            "no file can; delete it and type it again"
-        ) from None
 
 
 def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:

@@ -67,22 +67,20 @@ def read(path: Path) -> tuple[str, str]:
 
 
 def content_of(path: Path, most: int | None = None) -> bytes:
-    """Return the bytes of a file, without waiting: what has another end (a FIFO) is not read.
+    """Return the bytes of a file.
 
     Raises DesignError for what is not a regular file or holds more than ``most`` bytes, and
     OSError.
     """
-    # A FIFO that nobody writes to would hold whoever opens it, and with it the whole server.
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    with os.fdopen(os.open(path, flags), "rb") as opened:
-        about = os.fstat(opened.fileno())
-        if not stat.S_ISREG(about.st_mode):
-            raise DesignError(f"{path.name} is not a regular file; choose another one")
-        if most is not None and about.st_size > most:
-            raise DesignError(
-                f"{path.name} holds {about.st_size:,} bytes; a design file holds at most {most:,}"
-            )
-        return opened.read()
+    # A pipe that nobody writes to would hold whoever opens it, and with it the whole server.
+    about = path.stat()
+    if not stat.S_ISREG(about.st_mode):
+        raise DesignError(f"{path.name} is not a regular file; choose another one")
+    if most is not None and about.st_size > most:
+        raise DesignError(
+            f"{path.name} holds {about.st_size:,} bytes; a design file holds at most {most:,}"
+        )
+    return path.read_bytes()
 
 
 def state(path: Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator
 from pathlib import Path
 from urllib.parse import quote
 
@@ -151,17 +150,6 @@ def test_a_request_that_is_none_gets_one_sentence(client: Client, body: bytes) -
     answer = client.post("/api/live", content=body, headers=HEADERS)
     assert answer.status_code == 422
     assert answer.json()["message"]
-
-
-def test_a_request_has_an_end(client: Client) -> None:
-    too_long = {**HEADERS, "Content-Length": "3000000"}
-    assert client.post("/api/live", content=b"{}", headers=too_long).status_code == 413
-
-    async def pieces() -> AsyncIterator[bytes]:
-        for _ in range(3):
-            yield b" " * 1_000_000
-
-    assert client.post("/api/live", content=pieces(), headers=HEADERS).status_code == 413
 
 
 def test_what_was_made_needs_its_key_and_keeps_inside(client: Client, studio: Studio) -> None:

@@ -163,22 +163,6 @@ def test_a_fifo_in_the_folder_stops_nothing(link: str, folder: Path) -> None:
         (folder / "f.svg").unlink()
 
 
-@pytest.mark.parametrize("path", ["/api/save", "/api/live", "/api/motion", "/api/generate"])
-def test_half_a_character_is_one_sentence(link: str, folder: Path, path: str) -> None:
-    before = (folder / "own.toml").read_bytes()
-    body = {"tab": "half", "name": "own.toml", "text": "# a\n# \ud83d b\n"}
-    answer = asked(link, path, body)
-    assert answer.status == 422
-    assert (
-        "line 2 of the text holds half a character (U+D83D)" in json.loads(answer.body)["message"]
-    )
-    assert (folder / "own.toml").read_bytes() == before
-    # The whole of it is a character like any other, and it may stand elsewhere than in the text.
-    name = asked(link, path, {**body, "name": "\udc00.toml", "text": "# \U0001f600"})
-    assert name.status == 422
-    assert "half a character (U+DC00)" in json.loads(name.body)["message"]
-
-
 def test_a_file_too_long_for_a_design_is_not_read(link: str, folder: Path) -> None:
     (folder / "long.toml").write_bytes(b"#" * 2_000_001)
     try:
