@@ -9,13 +9,13 @@ import hashlib
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from sbafab.geometry.arrangement import DIGIT, Arrangement, by_owner
+from sbafab.geometry.arrangement import Arrangement
 from sbafab.geometry.boolean import arranged, bounding, combined, more_than
-from sbafab.geometry.cache import MOST, Exact, cached, cached_attribute
+from sbafab.geometry.cache import Exact, cached, cached_attribute
 from sbafab.geometry.contour import (
     MANY,
     Contour,
@@ -270,34 +270,6 @@ def _difference(a: Region, b: Region) -> Region:
     chains = [*((contour, 1) for contour in a.contours), *((c, -1) for c in b.contours)]
     (contours,) = combined(chains, [more_than(0)])
     return Region(contours)
-
-
-def divided(region: Region, by: Region) -> tuple[Region, Region]:
-    """Return ``region - by`` and ``region & by``, from one arrangement."""
-    if region.is_empty or by.is_empty:
-        return region, Region()
-    return _divided(region, by)
-
-
-@cached
-def _divided(region: Region, by: Region) -> tuple[Region, Region]:
-    chains = [*((c, 1) for c in region.contours), *((c, 1 << DIGIT) for c in by.contours)]
-    outside, inside = combined(chains, [_is_outside, _is_inside])
-    return Region(outside), Region(inside)
-
-
-@lru_cache(maxsize=MOST)
-def _is_outside(turns: int) -> bool:
-    """Membership of places in the first of two regions alone."""
-    first, second = by_owner(turns, 2)
-    return first > 0 >= second
-
-
-@lru_cache(maxsize=MOST)
-def _is_inside(turns: int) -> bool:
-    """Membership of places in both of two regions."""
-    first, second = by_owner(turns, 2)
-    return first > 0 and second > 0
 
 
 def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:

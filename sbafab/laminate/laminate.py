@@ -14,7 +14,7 @@ from typing import Literal, get_args
 from sbafab.errors import DesignError
 from sbafab.geometry.cache import cached_attribute
 from sbafab.geometry.edges import Bounds, Point, box_round
-from sbafab.geometry.region import Region, coord, divided, path_data, union
+from sbafab.geometry.region import Region, coord, path_data, union
 from sbafab.laminate.films import Film, density_of, in_order, ink
 from sbafab.laminate.folding import flat_part, fold_roots, unfolded
 from sbafab.laminate.joints import PRESS, FaceBond, Fold, GapJoints, Net, Port, Seam, chamber_gaps
@@ -447,8 +447,8 @@ def interface_regions(
 ) -> tuple[Region, Region, Region, Region]:
     """Mask, contact, bond and unbonded region of two TPE profiles with masks between."""
     mask = union(masks)
-    _, contact = (None, below) if below.contours == above.contours else divided(below, above)
-    return mask, contact, *divided(contact, mask)
+    contact = below if below.contours == above.contours else below & above
+    return mask, contact, contact - mask, contact & mask
 
 
 def joined_regions(

@@ -13,10 +13,9 @@ from typing import Final, NamedTuple
 from sbafab.geometry.arrangement import DIGIT, Piece, by_owner, overlay
 from sbafab.geometry.boolean import ChainGroup, chains_of, grouped
 from sbafab.geometry.cache import cached
-from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import EPSILON, Arc, Bounds, Edge, Line, Point, left_normal, line_circle
 from sbafab.geometry.nearby import EdgeIndex, widened
-from sbafab.geometry.region import Region, disc, divided, union
+from sbafab.geometry.region import Region, disc, union
 from sbafab.laminate.laminate import LOOSE, Interface, Laminate, Layer
 from sbafab.rules.limits import TOLERANCE
 
@@ -30,8 +29,6 @@ STEEP: Final = 0.01
 
 NEARER: Final = 1e-9
 """mm by which a place must be nearer than the nearest so far."""
-ROUNDING: Final = 1e-12
-"""mm: more than what heights are rounded by."""
 
 
 @cached
@@ -128,9 +125,6 @@ def _nearest(within: _Band, targets: Iterable[Edge]) -> Reach | None:
     best: Reach | None = None
     nearer = math.inf
     for target in targets:
-        least, most = _heights(within.edge, target)
-        if most < -EPSILON or least >= nearer:
-            continue
         for p in within.nearest_candidates(target):
             height = within.height(p)
             if (
@@ -141,28 +135,6 @@ def _nearest(within: _Band, targets: Iterable[Edge]) -> Reach | None:
                 best = Reach(max(0.0, height), p)
                 nearer = best.value - NEARER
     return best
-
-
-def _heights(edge: Edge, target: Edge) -> tuple[float, float]:
-    """Bounds of the distance of a target outward from ``edge``, its line or circle."""
-    if isinstance(edge, Arc):
-        centre = edge.centre
-        far = [math.dist(centre, target.start), math.dist(centre, target.end)]
-        if isinstance(target, Arc):
-            gap = math.dist(centre, target.centre)
-            far += [abs(gap - target.radius), gap + target.radius]
-        else:
-            far.append(math.dist(centre, target.nearest(centre)))
-        least, most = min(far) - edge.radius, max(far) - edge.radius
-        if not edge.ccw:
-            least, most = -most, -least
-    else:
-        heights = [-edge.to_left(target.start), -edge.to_left(target.end)]
-        if isinstance(target, Arc):
-            middle = -edge.to_left(target.centre)
-            heights += [middle - target.radius, middle + target.radius]
-        least, most = min(heights), max(heights)
-    return least - ROUNDING, most + ROUNDING
 
 
 class _Band(NamedTuple):
@@ -280,63 +252,33 @@ class Facing(NamedTuple):
     bare: Region
 
 
-class _Visible(NamedTuple):
-    """The part of a film that no film covers yet, and outlines that it lies outside of."""
-
-    film: Layer
-    region: Region
-    outlines: tuple[Contour, ...] = ()
-
-
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
     """Return every pair of films, not adjacent, that face each other outside pins' openings.
 
     Lowest upper film first. Equal shapes are overlaid once.
     """
     pairs: list[Facing] = []
-    visible: list[_Visible] = []
+    visible: list[tuple[Layer, Region]] = []
+    """The parts of films that no film covers yet."""
     shapes = _Shapes(laminate)
     films = laminate.tpe_layers
     for index, film in enumerate(films):
-        remaining: list[_Visible] = []
-        for entry in visible:
-            below, region, outlines = entry
+        remaining: list[tuple[Layer, Region]] = []
+        for below, region in visible:
             if below is films[index - 1]:
                 rest = shapes.left_by_next(index, below, film)
                 if rest.contours:
-                    remaining.append(_Visible(below, rest, _outlines_of(film.profile, rest)))
-                continue
-            if _fits_in(film.profile, outlines):
-                remaining.append(entry)
+                    remaining.append((below, rest))
                 continue
             shared, rest = shapes.laid(region, film.profile)
             if rest.contours:
-                remaining.append(_Visible(below, rest, _outlines_of(film.profile, rest)))
+                remaining.append((below, rest))
             if shared.contours:
                 faced = shapes.kept_apart(shared, index, below, film)
                 if faced is not None:
                     pairs.append(faced)
-        visible = [*remaining, _Visible(film, film.profile)]
+        visible = [*remaining, (film, film.profile)]
     return tuple(pairs)
-
-
-def _outlines_of(film: Region, rest: Region) -> tuple[Contour, ...]:
-    """Film's outlines if the rest of the other lies outside them, and not in holes; else none."""
-    for hole in film.holes:
-        left, low, right, high = widened(hole.bounds, TOLERANCE)
-        for outer in rest.outers:
-            box = outer.bounds
-            if box[0] >= left and box[1] >= low and box[2] <= right and box[3] <= high:
-                return ()
-    return film.outers
-
-
-def _fits_in(film: Region, outlines: tuple[Contour, ...]) -> bool:
-    """Return True if every outline of a film is among ``outlines``."""
-    return bool(outlines) and all(
-        any(outline is candidate or outline.edges == candidate.edges for candidate in outlines)
-        for outline in film.outers
-    )
 
 
 class _Shapes:
@@ -358,7 +300,7 @@ class _Shapes:
         contact = without_slivers(self.laminate.interfaces[index - 1].contact)
         if not contact.contours:
             return below.profile
-        return without_slivers(divided(below.profile, above.profile)[0])
+        return without_slivers(below.profile - above.profile)
 
     def kept_apart(self, region: Region, index: int, below: Layer, above: Layer) -> Facing | None:
         """Two films that face each other over a region; None where it is all pins' openings."""
@@ -384,7 +326,7 @@ class _Shapes:
 
 def _overlaid(region: Region, film: Region) -> tuple[Region, Region]:
     """Return the part of a region that a film covers, and the rest."""
-    rest, shared = map(without_slivers, divided(region, film))
+    rest, shared = without_slivers(region - film), without_slivers(region & film)
     return shared, rest if shared.contours else region
 
 

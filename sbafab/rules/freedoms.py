@@ -10,24 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from sbafab.geometry.contour import nanometres
-from sbafab.geometry.edges import Point, distance_to
-from sbafab.geometry.nearby import boxes_meet, widened
+from sbafab.geometry.edges import Point
+from sbafab.geometry.nearby import boxes_meet
 from sbafab.geometry.region import Region, centroid
 from sbafab.laminate.assembly import AssemblyStep, laying
 from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
-from sbafab.rules.boundary import beside
 from sbafab.rules.limits import Tolerances
 
 EARS = 'set registration.method = "ears", or draw ears and list their pins if layers are drawn'
 """Remedy where a hand places what pins could hold."""
-INSIDE: Final = 0.05
-"""mm from an edge at which shapes are tested for overlap before booleans are computed."""
-BESIDE: Final = 4
-"""Number of edges of each shape that are sampled, about."""
 
 
 class Part(NamedTuple):
@@ -264,8 +259,8 @@ class _Shapes:
         key = (self.pattern[a.layer], a.piece, self.pattern[b.layer], b.piece)
         if key not in self.overlaps:
             region_a, region_b = self._region(a), self._region(b)
-            self.overlaps[key] = boxes_meet(region_a.bounds, region_b.bounds) and (
-                _plainly_meet(region_a, region_b) or not (region_a & region_b).is_empty
+            self.overlaps[key] = (
+                boxes_meet(region_a.bounds, region_b.bounds) and not (region_a & region_b).is_empty
             )
         return self.overlaps[key]
 
@@ -330,36 +325,3 @@ def _play_on_pins(laminate: Laminate, part: Region) -> dict[str, float]:
         )
         for pin in laminate.pins_in(part)
     }
-
-
-def _plainly_meet(a: Region, b: Region) -> bool:
-    """Return True if a point beside a sampled edge lies well inside both regions."""
-    # What lies beside an edge of the smaller one is rather within the other than the other way.
-    for region, opposite in sorted(((a, b), (b, a)), key=lambda both: _size(both[0])):
-        for edge in region.edges[:: max(1, len(region.edges) // BESIDE)]:
-            p = beside(edge, INSIDE)
-            if all(
-                shape.contains(p) and not _has_edge_near(shape, p) for shape in (opposite, region)
-            ):
-                return True
-    return False
-
-
-def _size(region: Region) -> float:
-    """Half the perimeter of a region's box, mm."""
-    left, low, right, high = region.bounds
-    return right - left + high - low
-
-
-def _has_edge_near(region: Region, p: Point) -> bool:
-    """Return True if an edge of a region lies within half of INSIDE of a point."""
-    left, low, right, high = widened((*p, *p), INSIDE / 2)
-    return any(
-        box[0] <= right
-        and box[2] >= left
-        and box[1] <= high
-        and box[3] >= low
-        and distance_to(edge, p) <= INSIDE / 2
-        for contour in region.contours
-        for edge, box in zip(contour.edges, contour.boxes, strict=True)
-    )

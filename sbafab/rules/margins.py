@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from sbafab.geometry.cache import cached, cached_batch
@@ -195,55 +195,16 @@ def _signature(interface: Interface, moves: Freedoms) -> tuple[object, ...]:
     )
 
 
-class _Loss(NamedTuple):
-    """Bounds of the loss at an interface's margins, mm.
+def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> float:
+    """Return the most that an interface's margins lose when everything moves together, mm.
 
-    ``most`` between any two edges, ``all`` when everything moves together, cutting counted.
+    A place that is wider than the narrowest by more than this is never the worst.
     """
-
-    most: float
-    all: float
-    cutting: float
-
-    def slack(self, least: float, drawn: float, limit: float) -> float:
-        """Return how far above the ``least`` width a place may become the worst or come short, mm.
-
-        Where the least is short as ``drawn``, all that are not short count too.
-        """
-        if not holds(least, drawn):
-            return self.all
-        return min(self.all, self.most + max(0.0, limit + self.cutting - least) + ROOM)
-
-
-def _loss(interface: Interface, limits: Limits, moves: Freedoms) -> _Loss:
-    parts = _parts(interface)
     ways_of_parts = moves.unshared(seated(interface))
-    reach: list[dict[int, float]] = []
-    for region, ways in zip(parts, ways_of_parts, strict=True):
-        box = region.bounds
-        reach.append({id(freedom): freedom.most * _farthest(freedom, box) for freedom in ways})
-    most = max(
-        (
-            _cost_without(costs_b, costs_a) + _cost_without(costs_a, costs_b)
-            for costs_a, costs_b in combinations(reach, 2)
-        ),
-        default=0.0,
-    )
     loose = {id(freedom): freedom for ways in ways_of_parts for freedom in ways}.values()
     box = interface.contact.bounds
-    cutting = 2 * limits.tolerances.cutting
     together = sum([freedom.most * _farthest(freedom, box) for freedom in loose], 0.0)
-    return _Loss(most, cutting + together, cutting)
-
-
-def _cost_without(shared: Mapping[int, float], costs: Mapping[int, float]) -> float:
-    """Total cost of the freedoms that are not shared, mm."""
-    return sum([cost for freedom, cost in costs.items() if freedom not in shared], 0.0)
-
-
-def _parts(interface: Interface) -> list[Region]:
-    """The pieces of an interface's layers, by seat."""
-    return [piece for profile in profiles_of(interface) for piece in profile.pieces]
+    return 2 * limits.tolerances.cutting + together
 
 
 def _farthest(freedom: Freedom, box: Bounds) -> float:
@@ -257,7 +218,7 @@ class InterfaceGroup(NamedTuple):
     """Equal interfaces, the loss that their margins may suffer, and the ``bond``'s least width."""
 
     interfaces: tuple[Interface, ...]
-    loss: _Loss
+    loss: float
     bond: Width | None
 
     @staticmethod
@@ -265,12 +226,6 @@ class InterfaceGroup(NamedTuple):
         interfaces: Sequence[Interface], limits: Limits, moves: Freedoms, bond: Width | None
     ) -> InterfaceGroup:
         return InterfaceGroup(tuple(interfaces), _loss(interfaces[0], limits, moves), bond)
-
-    def slack(self, limits: Limits) -> float:
-        """Return how far above its narrowest place a bond is examined, mm."""
-        if self.bond is None:
-            return 0.0
-        return self.loss.slack(self.bond.value, limits.bond_width, limits.worst_bond_width)
 
 
 def narrow_places(
@@ -285,7 +240,7 @@ def narrow_places(
     ``reaches`` are the masks' reaches past film edges, for each group of interfaces, ``overlaps``
     those of its seams.
     """
-    slacks = [group.slack(limits) for group in groups]
+    slacks = [group.loss if group.bond is not None else 0.0 for group in groups]
     # Of one bond all interfaces ask for the same places.
     widest: dict[Region, float] = {}
     for group, slack in zip(groups, slacks, strict=True):
@@ -315,10 +270,8 @@ def narrow_places(
             if holds(reach.value, flush) or not pin_at(edge, pins)
         )
         if free:
-            least = min(reach.value for _, reach in free)
-            farther = group.loss.slack(least, flush, limits.worst_mask_overhang)
             films_and_masks = profiles[: 2 + len(interface.masks)]
-            overhang = OverhangQuery(interface.mask, free, farther, films_and_masks)
+            overhang = OverhangQuery(interface.mask, free, group.loss, films_and_masks)
             queries.append((number, "overhang", overhang))
     by_group: list[dict[Quantity, Places]] = [{} for _ in groups]
     results = places_of([query for *_, query in queries])

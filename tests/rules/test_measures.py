@@ -25,7 +25,7 @@ from sbafab.rules import (
 )
 from sbafab.rules.boundary import outward_reach
 from sbafab.rules.finding import Finding
-from sbafab.rules.limits import Limits
+from sbafab.rules.limits import Limits, Tolerances
 from sbafab.rules.measures import Measures
 
 AXIS = (0.0, 0.0)
@@ -301,3 +301,12 @@ def test_equal_profiles_are_measured_once(
         rule.check(Measures(good("1dof-5mm", f"stack.balloons={balloons}"), LIMITS))
         counts.append(len(measured))
     assert counts[0] == counts[1] > 0
+
+
+def test_what_is_measured_once_is_measured_of_that_laminate(good: Good) -> None:
+    one = Measures(good("1dof-5mm", "stack.balloons=2"), Limits())
+    more = Measures(good("1dof-5mm", "stack.balloons=4"), Limits())
+    assert len(one.moves) < len(more.moves)
+    assert one.moves is one.moves
+    wide = Limits(tolerances=Tolerances(placement=0.4))
+    assert Measures(one.laminate, wide).moves != one.moves

@@ -6,13 +6,26 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate
-from sbafab.rules.limits import Limits, Tolerances
+from sbafab.rules.freedoms import Freedom, Freedoms
+from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
+from sbafab.rules.margins import linear_forms, pushes
 from sbafab.rules.measures import Measures
-from sbafab.rules.registration_yield import Share, check, simulate
+from sbafab.rules.registration_yield import (
+    CutContour,
+    MarginRows,
+    RowKind,
+    Share,
+    check,
+    rows_by_error,
+    rows_of,
+    short_builds,
+    simulate,
+)
 
 Good = Callable[..., Laminate]
 Spoil = Callable[..., Laminate]
@@ -176,3 +189,91 @@ def test_without_a_target_less_than_the_papers_success_warns(good: Good) -> None
 def test_with_ears_every_build_is_good(good: Good) -> None:
     # No sum of the errors exceeds what bond and overhang have to spare.
     assert simulate(good(*ONE, EARS), Limits()).whole.value == 1
+
+
+# Builds that come short, against plain sums of their errors.
+
+
+FEW = 400
+SHIFT = Freedom(1, 1, 1, 1, 0, 0.2)
+OTHER = Freedom(2, 2, 3, 3, 0, 0.1)
+TURN = Freedom(2, 2, 3, 3, 0, math.radians(1), (0.0, 0.0))
+CUT, AGAIN = CutContour(1, 0), CutContour(2, 0)
+
+
+def rows(number: int, least: float, seed: int) -> MarginRows:
+    """Rows of random normals, rooms and levers that feel two cuts, two shifts and a turn; and as
+    many of another kind, which never come short.
+    """
+    generator = np.random.default_rng(seed)
+    angle = generator.uniform(-math.pi, math.pi, number)
+    moves = SHIFT, OTHER, TURN
+    kind = RowKind(0, "bond", (CUT, AGAIN, *moves), (1.0, -1.0))
+    room = generator.uniform(least, least + 0.1, number)
+    turned = generator.uniform(-9, 9, number)
+    return MarginRows(
+        [kind, kind],
+        np.array([0, number, 2 * number]),
+        np.concatenate([room, room + 1.0]),
+        np.tile([np.cos(angle), np.sin(angle)], 2),
+        np.tile([0 * turned, 0 * turned, turned], 2),
+        shift=np.array([[SHIFT.most] * 2, [OTHER.most] * 2, [0, 0]]),
+        turn=np.array([[0, 0], [0, 0], [TURN.most] * 2]),
+        sign=np.array([[-1.0] * 2, [1.0] * 2, [1.0] * 2]),
+    )
+
+
+@pytest.mark.parametrize("least", [0.05, 0.15, 0.25])
+@pytest.mark.parametrize("number", [1, 7, 8, 30])
+def test_builds_that_come_short_are_those_of_plain_sums(number: int, least: float) -> None:
+    asked = rows(number, least, number)
+    errors = asked.kinds[0].errors
+    first, count = rows_by_error(errors)
+    # Two interfaces, of which the second one's errors are drawn after the first one's.
+    drawn = np.random.default_rng(5).random((2 * count, FEW))
+    every = np.array(
+        [[count * interface + first[error] for interface in (0, 1)] for error in errors]
+    )
+    good = np.ones((2, 2, FEW), dtype=bool)
+    for kind in (0, 1):
+        interfaces, builds = short_builds(asked, kind, every, 0.1, drawn)
+        good[kind, interfaces, builds] = False
+    assert good[1].all()
+    room, levers = asked.room[:number], asked.levers[2, :number]
+    for interface in (0, 1):
+        own = {error: drawn[count * interface + row :] for error, row in first.items()}
+        cut, again = (-0.1 + 0.2 * own[error][0] for error in (CUT, AGAIN))
+        turn = TURN.most * (2 * own[TURN][0] - 1)
+        shift, other = (
+            one.most
+            * np.sqrt(own[one][0])
+            * np.array([np.cos(math.tau * own[one][1]), np.sin(math.tau * own[one][1])])
+            for one in (SHIFT, OTHER)
+        )
+        (nx, ny), moved = asked.normal[:, :number], other - shift
+        left = room[:, None] + cut - again + levers[:, None] * turn
+        left = left + nx[:, None] * moved[0] + ny[:, None] * moved[1]
+        assert list(good[0, interface]) == list((left >= -TOLERANCE).all(axis=0))
+    assert 0 < good[0].sum() < 2 * FEW
+
+
+def test_forms_lose_what_their_pushes_cost(good: Good) -> None:
+    laminate = good("3dof-15mm", "stack.balloons=2")
+    measures = Measures(laminate, Limits())
+    forms = linear_forms(measures.margins, measures.moves)
+    assert len(forms.loss) == sum(len(group) for group in measures.margins)
+    for number, (whole, pinned) in enumerate(zip(forms.loss, forms.pinned_loss, strict=True)):
+        run = forms.runs[forms.run[number]]
+        group = measures.margins[run.group]
+        margin = group[number - int(forms.begins[forms.run[number]]) + run.first]
+        assert margin.quantity == run.quantity
+        found = pushes(margin, group.first, measures.moves)
+        assert whole == pytest.approx(sum(push.cost for push in found))
+        held = [push.cost for push in found if not push.freedom.by_hand]
+        assert pinned == pytest.approx(sum(held))
+
+
+def test_a_laminate_without_margins_has_neither_forms_nor_rows() -> None:
+    forms = linear_forms([], Freedoms({}))
+    asked = rows_of(forms, [], Limits())
+    assert (forms.loss.shape, asked.room.shape, len(asked.kinds)) == ((0,), (0,), 0)

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import pytest
 
-from sbafab.geometry.region import disc, strip
+from sbafab.geometry.region import disc, polygon, strip, union
 from sbafab.laminate.laminate import Laminate
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import Limits
 from sbafab.rules.measures import Measures
 from sbafab.rules.sealing import check
+from sbafab.rules.voids import _gap
 
 AXIS = (0.0, 0.0)
 ONE = ("1dof-5mm", "stack.balloons=3")
@@ -217,3 +218,24 @@ def test_a_second_mouth_beside_the_inlet_leaks(good: Good, spoil: Spoil) -> None
         "chamber1 leaks to the outside at interface 1 (x 8.250, y 1.300), from its pocket at "
         "chamber interface 1; close the opening or bond round it"
     )
+
+
+def test_voids_that_touch_at_a_point_are_told_apart() -> None:
+    """A pocket round a hole of radius 2. A square of film stands in the hole on its corners and
+    leaves four voids; or two wedges of bond reach the hole's edge and leave two pockets.
+    """
+    hole, frame = disc((0, 0), 2), disc((0, 0), 9)
+    ring, film = disc((0, 0), 3) - hole, disc((0, 0), 5) - hole
+    square = polygon([(2, 0), (0, 2), (-2, 0), (0, -2)])
+    gap = _gap(ring, film | square, frame, ())
+    # Four segments of 4 (pi / 4 - 1 / 2) each, and what is round the film.
+    segments = [number for number, void in enumerate(gap.missing) if void.area < 2]
+    assert [gap.missing[n].area for n in segments] == [pytest.approx(math.pi - 2)] * 4
+    assert sorted({(pocket, void) for pocket, void, _ in gap.touching}) == [
+        (0, number) for number in segments
+    ]
+    wedges = union(polygon([(way * 2, 0), (way * 4, 1), (way * 4, -1)]) for way in (1, -1))
+    gap = _gap(ring - wedges, film, frame, ())
+    assert len(gap.unbonded) == 2
+    joined = {(pocket, gap.missing[void].area) for pocket, void, _ in gap.touching}
+    assert sorted(joined) == [(0, pytest.approx(4 * math.pi)), (1, pytest.approx(4 * math.pi))]
