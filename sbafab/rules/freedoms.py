@@ -21,7 +21,7 @@ from sbafab.laminate.joints import Seam
 from sbafab.laminate.laminate import LOOSE, Laminate
 from sbafab.rules.limits import Tolerances
 
-EARS = 'set registration.method = "ears", or draw ears and list their pins if layers are drawn'
+EARS = 'set registration.method = "ears" (drawn layers: draw ears, list their pins)'
 """Remedy where a hand places what pins could hold."""
 
 
