@@ -280,7 +280,7 @@ def batch_problems(laminate: Laminate, claims: Manifest, design: Design) -> list
     places, bounds = _places(claims), laminate.bounds
     if not are_apart(places, bounds, 2 * TOLERANCE):
         problems.append(claim(f"places in the press are less than {APART:g} mm apart"))
-    room = sorted((design.press.platen_width, design.press.platen_length))
+    room = sorted(design.press.platen)
     margin = 2 * PLATE_MARGIN if laminate.pins else 0.0
     taken = sorted(
         max(p[i] for p in places) - min(p[i] for p in places) + bounds[i + 2] - bounds[i] + margin

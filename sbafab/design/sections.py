@@ -446,6 +446,26 @@ class Press(Section):
     """Minutes in which the base plate cools beside the press until it can be touched; measured once
     at the bench. By default the traveller's times take a first-order estimate."""
 
+    @property
+    def platen(self) -> tuple[float, float]:
+        """Heated area, mm x mm."""
+        return self.platen_width, self.platen_length
+
+    @property
+    def platen_area(self) -> float:
+        """Heated area, mm2."""
+        return self.platen_width * self.platen_length
+
+    @property
+    def force_n(self) -> float:
+        """Force on the whole platen."""
+        return self.pressure_kpa * self.platen_area / 1000
+
+    @property
+    def timed_films(self) -> tuple[tuple[str, float], ...]:
+        """Product and thickness, mm, of the films that the minutes were stated for."""
+        return tuple(map(named_film, self.minutes_for))
+
 
 class Acceptance(Section):
     """What an actuator works at, and must stand before it is handed on: all ours but the burst that

@@ -240,7 +240,7 @@ def _underlay(folder: DesignFolder) -> bytes | None:
 
     places = design_runs(folder.design, folder.laminate).places
     press = folder.design.press
-    platen = press.platen_width, press.platen_length
+    platen = press.platen
     return underlay_pdf(folder.laminate, design_sha256(folder.design), places, platen)
 
 

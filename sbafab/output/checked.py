@@ -17,7 +17,6 @@ from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
-from sbafab.design.sections import named_film
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.geometry.region import Region
@@ -27,7 +26,7 @@ from sbafab.nesting.nest import refuse_unfit
 from sbafab.nesting.records import TURNS, NestPart, Stock, parts_of
 from sbafab.pressing import dowels
 from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import Schedule, plate_holes, press_settings, schedule
+from sbafab.pressing.schedule import Schedule, plate_holes, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.finding import Finding, summary
@@ -141,7 +140,7 @@ def limits(design: Design) -> Limits:
         dead_end=design.rules.dead_end or USUAL.dead_end,
         target_yield=design.rules.target_yield,
         yield_builds=design.rules.yield_builds,
-        minutes_for=tuple(map(named_film, design.press.minutes_for)),
+        minutes_for=design.press.timed_films,
         working_pressure=design.acceptance.working_pressure_kpa,
         safety_factor=design.acceptance.safety_factor,
         waive=frozenset(design.rules.waive),
@@ -161,7 +160,7 @@ def cut_settings(
         curves=curves,
         generator=GENERATOR,
         warnings=warnings(design),
-        platen=(design.press.platen_width, design.press.platen_length),
+        platen=design.press.platen,
         machine=design.laser.machine,
         recipes=recipes(design),
         entries=entries(design),
@@ -187,7 +186,7 @@ def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
     """
     if not laminate.pins:
         return ()
-    holes = plate_holes(laminate, press_settings(design))
+    holes = plate_holes(laminate, design)
     return dowels.hole_notes(laminate.pins, holes, design.registration.plate_made_by)
 
 
@@ -300,7 +299,7 @@ def plan_design(
 def schedule_of(checked: Checked) -> Schedule:
     """Return the press schedule; first step and warnings name waived rules and lowered limits."""
     cycles = design_runs(checked.design, checked.laminate).cycles
-    plain = schedule(checked.laminate, press_settings(checked.design), cycles)
+    plain = schedule(checked.laminate, checked.design, cycles)
     remarks = []
     if checked.waived:
         rules = ", ".join(checked.waived)

@@ -12,13 +12,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
+from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import distinct_layers
 from sbafab.laminate.laminate import Laminate
-
-PadMaterial = Literal["silicone sponge", "silicone rubber"]
 
 BASE_PLATE, UNDERLAY, RELEASE = "base plate", "underlay", "release film"
 LAMINATE, PAD = "laminate", "press pad"
@@ -35,24 +33,6 @@ MOST_UNEVEN = 2.0
 """Largest pressure on the films over that on the platen, beyond which a set-up is refused: ours."""
 LARGEST_COMPRESSION = 0.6
 """Share of its thickness by which a pad can be compressed; then its cells are shut."""
-
-
-@dataclass(frozen=True)
-class Pad:
-    """The compliant sheet: ``thickness`` None stands for the thinnest that is even enough.
-
-    ``hardness`` is Shore A. The default is a soft closed-cell sponge, 0.41 MPa by Gent's formula:
-    103 kPa at a quarter of its height, where grade 3 of ASTM D1056 ends for silicone (class D, 9 to
-    15 psi) and grade 4 begins (15 to 22 psi; suppliers' summaries, the standard was not opened).
-    """
-
-    material: PadMaterial = "silicone sponge"
-    thickness: float | None = None
-    hardness: float = 10.0
-
-    @property
-    def modulus(self) -> float:
-        return gent_modulus(self.hardness)
 
 
 @dataclass(frozen=True)
@@ -103,6 +83,16 @@ def gent_modulus(shore_a: float) -> float:
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
 
 
+def pad_modulus(press: Press) -> float:
+    """Return Young's modulus of the press pad, kPa.
+
+    The default pad is a soft closed-cell sponge, 0.41 MPa by Gent's formula: 103 kPa at a quarter
+    of its height, where grade 3 of ASTM D1056 ends for silicone (class D, 9 to 15 psi) and grade 4
+    begins (15 to 22 psi; suppliers' summaries, the standard was not opened).
+    """
+    return gent_modulus(press.pad_hardness)
+
+
 def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> StackShape:
     """Return the footprint of a stack of layers, given by index.
 
@@ -124,7 +114,7 @@ def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> S
     )
 
 
-def column_modulus(pad: Pad, thickness: float, under: StackShape) -> float:
+def column_modulus(press: Press, thickness: float, under: StackShape) -> float:
     """Return the pad's modulus in kPa against the height of a stack.
 
     A sponge gives way column by column. Solid rubber keeps its volume and must flow aside: E (1 +
@@ -132,27 +122,25 @@ def column_modulus(pad: Pad, thickness: float, under: StackShape) -> float:
     (1959) 111, as Strojniski vestnik 60 (2014) 506, Eq. 1, quotes it: 2 is for unfilled rubber
     between plates it is bonded to).
     """
-    if pad.material == "silicone sponge":
-        return pad.modulus
+    if press.pad_material == "silicone sponge":
+        return pad_modulus(press)
     shape = under.area / (under.rim * thickness)
-    return pad.modulus * (1 + 2 * shape * shape)
+    return pad_modulus(press) * (1 + 2 * shape * shape)
 
 
-def pressures(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: StackShape
-) -> Pressures:
+def pressures(press: Press, thickness: float, under: StackShape) -> Pressures:
     """Return the pressures on a stack by that on the whole platen, in equilibrium with the force.
 
     Near the edge the pad spans from the stack to the plate, as long as a soft half-space does
     under its pressure (a gap of width w closes by about 2 p w / E), and half of what it carries
     there lies on the outermost film.
     """
-    share = min(1.0, under.area / (platen[0] * platen[1]))
-    more = column_modulus(pad, thickness, under) * under.height / thickness
-    plate = platen_kpa - more * share
+    share = min(1.0, under.area / press.platen_area)
+    more = column_modulus(press, thickness, under) * under.height / thickness
+    plate = press.pressure_kpa - more * share
     film = plate + more
-    free = under.height * pad.modulus / (2 * platen_kpa)
-    lower = pad.modulus * under.below / thickness
+    free = under.height * pad_modulus(press) / (2 * press.pressure_kpa)
+    lower = pad_modulus(press) * under.below / thickness
     return Pressures(
         round(film, 1),
         round(film + max(plate, 0.0) / 2, 1),
@@ -162,65 +150,59 @@ def pressures(
     )
 
 
-def pad_thickness(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, stacks: Sequence[StackShape]
-) -> float:
+def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
     """Return the pad's thickness in mm: the setting's, or the thinnest sold, or pile, that is even
     enough.
 
     Raises DesignError where the set-up cannot give the pressure on the platen.
     """
-    if pad.material == "silicone sponge" and pad.hardness > HARDEST_SPONGE:
+    if press.pad_material == "silicone sponge" and press.pad_hardness > HARDEST_SPONGE:
         raise DesignError(
-            f"press.pad_hardness = {pad.hardness:g} Shore A is harder than any silicone "
+            f"press.pad_hardness = {press.pad_hardness:g} Shore A is harder than any silicone "
             f"sponge, {HARDEST_SPONGE:g} at most; lower it, or set press.pad_material = "
             '"silicone rubber"'
         )
-    if pad.thickness is not None:
-        reasons = (_refusal(platen_kpa, platen, pad, pad.thickness, under) for under in stacks)
+    if press.pad_thickness is not None:
+        reasons = (_refusal(press, press.pad_thickness, under) for under in stacks)
         why = next((reason for reason in reasons if reason), "")
         if why:
             raise DesignError(
-                f"press.pad_thickness = {pad.thickness:g} of {pad.material} of {pad.hardness:g} "
-                f"Shore A cannot press with {platen_kpa:g} kPa: {why}"
+                f"press.pad_thickness = {press.pad_thickness:g} of {press.pad_material} of "
+                f"{press.pad_hardness:g} Shore A cannot press with {press.pressure_kpa:g} kPa: "
+                f"{why}"
             )
-        return pad.thickness
+        return press.pad_thickness
     for thickness in (*PADS, *(PADS[-1] * number for number in range(2, 9))):
         if all(
-            pressures(platen_kpa, platen, pad, thickness, under).film <= EVEN * platen_kpa
-            and not _refusal(platen_kpa, platen, pad, thickness, under)
+            pressures(press, thickness, under).film <= EVEN * press.pressure_kpa
+            and not _refusal(press, thickness, under)
             for under in stacks
         ):
             return thickness
     highest = max(stacks, key=lambda under: under.height)
-    why = (
-        _refusal(platen_kpa, platen, pad, 8 * PADS[-1], highest)
-        or "it is too uneven; take a softer one"
-    )
+    why = _refusal(press, 8 * PADS[-1], highest) or "it is too uneven; take a softer one"
     raise DesignError(
-        f"no press pad of {pad.material} of {pad.hardness:g} Shore A (press.pad_hardness) can "
-        f"press with {platen_kpa:g} kPa: {why}"
+        f"no press pad of {press.pad_material} of {press.pad_hardness:g} Shore A "
+        f"(press.pad_hardness) can press with {press.pressure_kpa:g} kPa: {why}"
     )
 
 
-def _refusal(
-    platen_kpa: float, platen: tuple[float, float], pad: Pad, thickness: float, under: StackShape
-) -> str:
+def _refusal(press: Press, thickness: float, under: StackShape) -> str:
     """Return the reason why a pad cannot give the pressure, and a remedy; empty where it can."""
-    estimate = pressures(platen_kpa, platen, pad, thickness, under)
-    pressed = estimate.plate / pad.modulus + under.height / thickness
+    estimate = pressures(press, thickness, under)
+    force = press.pressure_kpa * press.platen_area
+    pressed = estimate.plate / pad_modulus(press) + under.height / thickness
     if estimate.plate <= 0:
         return (
             f"over a stack {under.height:.3f} mm high it does not reach the base plate, and the "
-            f"films take the whole force, {platen_kpa * platen[0] * platen[1] / under.area:.0f} "
-            "kPa; make it thicker or softer"
+            f"films take the whole force, {force / under.area:.0f} kPa; make it thicker or softer"
         )
-    if estimate.film > MOST_UNEVEN * platen_kpa:
+    if estimate.film > MOST_UNEVEN * press.pressure_kpa:
         return (
             f"over a stack {under.height:.3f} mm high the films would get {estimate.film:.0f} kPa; "
             "make it thicker or softer"
         )
-    if pad.material == "silicone sponge" and pressed > LARGEST_COMPRESSION:
+    if press.pad_material == "silicone sponge" and pressed > LARGEST_COMPRESSION:
         return (
             f"it would be pressed together by {pressed:.0%}, and can be by "
             f"{LARGEST_COMPRESSION:.0%}; make it harder or thicker"
@@ -228,21 +210,19 @@ def _refusal(
     return ""
 
 
-def pressure_basis(
-    platen_kpa: float, pad: Pad, thickness: float, under: StackShape, estimate: Pressures
-) -> str:
+def pressure_basis(press: Press, thickness: float, under: StackShape, estimate: Pressures) -> str:
     """Return the sentence that explains the estimated pressures."""
     return (
-        f"estimate: {platen_kpa:g} kPa on the platen are about {estimate.film:.0f} on the films, "
-        f"as the pad ({thickness:g} mm, {pad.modulus / 1000:.2f} MPa) gives way {under.height:.3f} "
-        f"mm more there; {estimate.edge:.0f} within {estimate.free:.1f} mm of their edge, "
-        f"{estimate.bond:.0f} over the lowest bond, {estimate.plate:.0f} beside them"
+        f"estimate: {press.pressure_kpa:g} kPa on the platen are about {estimate.film:.0f} on the "
+        f"films, as the pad ({thickness:g} mm, {pad_modulus(press) / 1000:.2f} MPa) gives way "
+        f"{under.height:.3f} mm more there; {estimate.edge:.0f} within {estimate.free:.1f} mm of "
+        f"their edge, {estimate.bond:.0f} over the lowest bond, {estimate.plate:.0f} beside them"
     )
 
 
-def unpressed(platen_kpa: float, pad: Pad, stands_out: float) -> float:
+def unpressed(press: Press, stands_out: float) -> float:
     """Return the width in mm round a protruding pin where the pad does not press."""
-    return stands_out * pad.modulus / (2 * platen_kpa)
+    return stands_out * pad_modulus(press) / (2 * press.pressure_kpa)
 
 
 def pad_sheets(thickness: float) -> int:

@@ -10,7 +10,7 @@ from sbafab.design.records import Design
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.laminate.assembly import PLATE_MARGIN, assembly, films_without_minutes
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, press_settings
+from sbafab.pressing.schedule import HANDLING_MINUTES, Schedule, minutes_closed
 
 APART = 5.0
 """Gap in mm between two copies in the press, ours: films flow, and hands need room."""
@@ -119,7 +119,7 @@ def design_runs(design: Design, laminate: Laminate) -> Runs:
     return runs_of(
         laminate,
         order.quantity,
-        (press.platen_width, press.platen_length),
+        press.platen,
         _copies_by_hours(design, laminate) if order.at_once is None else order.at_once,
     )
 
@@ -129,10 +129,10 @@ def _copies_by_hours(design: Design, laminate: Laminate) -> int:
 
     Minutes that are not stated for the film count as none: the press may then take longer.
     """
-    settings = press_settings(design)
+    press = design.press
     pressing = 0.0
-    if not films_without_minutes(laminate, settings.minutes_for):
-        pressing = sum(settings.minutes(part.name) for part in assembly(laminate))
+    if not films_without_minutes(laminate, press.timed_films):
+        pressing = sum(minutes_closed(press, part.name) for part in assembly(laminate))
     handling = 60 * CYCLE_HOURS - pressing
     return max(1, math.floor(handling / HANDLING_MINUTES + ROUNDING))
 
@@ -196,9 +196,7 @@ def batch_json(design: Design, laminate: Laminate, schedule: Schedule) -> dict[s
     return {
         "copies": runs.copies,
         "at_once": runs.together,
-        "at_once_at_most": most_together(
-            laminate, (design.press.platen_width, design.press.platen_length)
-        ),
+        "at_once_at_most": most_together(laminate, design.press.platen),
         "cycles": list(runs.cycles),
         "serials": [serial(runs, n + 1, design.order.batch) for n in range(runs.copies)],
         "places_mm": [list(place) for place in runs.places],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from sbafab.design.sections import NOT_MEASURED, Press
 from sbafab.laminate.laminate import Laminate
 
 # Warming of a cold plate between hot platens: a time-temperature line, first order.
@@ -86,8 +87,10 @@ class Heating:
         return HeatPoint(name, edge_c, round(constants, 3), after)
 
 
-def heating(laminate: Laminate, platen_c: float, time_constant_minutes: float | None) -> Heating:
+def heating(laminate: Laminate, press: Press) -> Heating:
     """Return the warming of the plate; the press must be hotter than its films melt."""
+    platen_c = press.temperature_c
+    tau = None if press.time_constant == NOT_MEASURED else press.time_constant
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
     melting = [film.softens_above for film in films if film.softens_above is not None]
     is_known = bool(melting) and not any(
@@ -100,13 +103,9 @@ def heating(laminate: Laminate, platen_c: float, time_constant_minutes: float | 
         platen_c=platen_c,
         melting_c=hottest,
         clock_c=clock,
-        time_constant_minutes=time_constant_minutes,
+        time_constant_minutes=tau,
         basis=f"estimate, ours: first order from {ROOM:g} C, tau "
-        + (
-            "not measured (press.time_constant)"
-            if time_constant_minutes is None
-            else f"{time_constant_minutes:g} min as measured"
-        )
+        + ("not measured (press.time_constant)" if tau is None else f"{tau:g} min as measured")
         + "; the paper states its minutes at 135 C and not when its clock starts",
     )
 

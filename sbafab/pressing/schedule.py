@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
 
 from sbafab.design.records import Design
-from sbafab.design.sections import NOT_MEASURED, named_film
+from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.laminate.assembly import (
@@ -37,13 +37,11 @@ from sbafab.pressing.build_up import (
     RELEASE,
     UNDERLAY,
     BuildUpPart,
-    Pad,
     StackShape,
 )
 from sbafab.pressing.dowels import (
     PinHole,
     PinSetting,
-    Standard,
     is_sold,
     pin_holes,
     plate_thickness,
@@ -93,11 +91,11 @@ class Caution(NamedTuple):
         return f"{self.words}; {self.remedy}" if self.remedy else self.words
 
 
-def _unstated_minutes(films: Sequence[Film], press: PressSettings) -> Caution:
+def _unstated_minutes(films: Sequence[Film], press: Press) -> Caution:
     """Return the warning that no minutes are stated for these films."""
     names = [f'"{film.said}"' for film in films]
     stated = joined_words(
-        [f"{product}, {thickness:g} mm" for product, thickness in press.minutes_for]
+        [f"{product}, {thickness:g} mm" for product, thickness in press.timed_films]
     )
     return Caution(
         f"the minutes are blank: they were stated for {stated or 'no film'}, and none for "
@@ -112,15 +110,17 @@ STATED_C = 135.0
 
 
 def _minutes_of_another_temperature(
-    laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
+    laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
 ) -> Iterator[Caution]:
     """Yield the warning that the paper's minutes are pressed at another temperature than the
     paper's. Minutes that differ from the paper's, and those of films that it did not press, were
     stated by the user, who tried them as set.
     """
-    paper = PressSettings()
+    paper = Press.model_construct()
     usual = [
-        str(part.number) for part in parts if press.minutes(part.name) == paper.minutes(part.name)
+        str(part.number)
+        for part in parts
+        if minutes_closed(press, part.name) == minutes_closed(paper, part.name)
     ]
     if press.temperature_c == STATED_C or not (usual and _is_the_papers(laminate)):
         return
@@ -169,74 +169,16 @@ HANDLING_MINUTES = 60.0
 """The paper's total build time of 1.75 h less its 45 minutes in the press."""
 
 
-@dataclass(frozen=True)
-class PressSettings:
-    """Settings of the press; the defaults are the paper's (Sec. 2)."""
-
-    temperature_c: float = 135.0
-    pressure_kpa: float = 110.0
-    platen: tuple[float, float] = (152.4, 152.4)
-    flash_bottom: float = 3.0
-    bond_bottom: float = 12.0
-    flash_middle: float = 10.0
-    bond_all: float = 20.0
-    validated_balloons: int = 20
-    pad: Pad = field(default_factory=Pad)
-    plate_material: str = "steel"
-    plate_thickness: float | None = None
-    release_film: str = "PTFE film"
-    release_thickness: float = 0.05
-    underlay_thickness: float = 0.1
-    pin_standard: Standard = "ISO 8734"
-    pin_lengths: tuple[float, ...] = ()
-    minutes_for: tuple[tuple[str, float], ...] = ((PAPER_PRODUCT, PAPER_THICKNESS),)
-    """Products and thicknesses (mm) of the films that the minutes were stated for."""
-    time_constant: float | None = None
-    """Minutes in which the edge of the cold plate makes 63 % of its way; None: not measured."""
-    is_timed: bool = True
-    """Whether the paper's minutes by hand are taken for this laminate; not for drawn layers."""
-
-    @property
-    def force_n(self) -> float:
-        """Force on the whole platen."""
-        return self.pressure_kpa * self.platen[0] * self.platen[1] / 1000
-
-    def minutes(self, step: StepName) -> float:
-        """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
-        return {
-            "flash_bottom": self.flash_bottom,
-            "tack_bottom": self.flash_bottom,
-            "bond_bottom": self.bond_bottom,
-            "flash_middle": self.flash_middle,
-            "tack_all": self.flash_middle,
-            "bond_all": self.bond_all,
-        }[step]
-
-
-def press_settings(design: Design) -> PressSettings:
-    """Return the settings of the press that a design asks for."""
-    press, registration = design.press, design.registration
-    return PressSettings(
-        temperature_c=press.temperature_c,
-        pressure_kpa=press.pressure_kpa,
-        platen=(press.platen_width, press.platen_length),
-        flash_bottom=press.flash_bottom_minutes,
-        bond_bottom=press.bond_bottom_minutes,
-        flash_middle=press.flash_middle_minutes,
-        bond_all=press.bond_all_minutes,
-        validated_balloons=design.rules.validated_balloons,
-        pad=Pad(press.pad_material, press.pad_thickness, press.pad_hardness),
-        plate_material=press.plate_material,
-        plate_thickness=press.plate_thickness,
-        release_film=press.release_film,
-        release_thickness=press.release_thickness,
-        underlay_thickness=press.underlay_thickness,
-        pin_standard=registration.pin_standard,
-        pin_lengths=registration.pin_lengths,
-        minutes_for=tuple(map(named_film, press.minutes_for)),
-        time_constant=None if press.time_constant == NOT_MEASURED else press.time_constant,
-        is_timed=not design.form.is_drawn,
-    )
+def minutes_closed(press: Press, step: StepName) -> float:
+    """Return the minutes that the press stays closed in a step; tacking is a flash bond."""
+    return {
+        "flash_bottom": press.flash_bottom_minutes,
+        "tack_bottom": press.flash_bottom_minutes,
+        "bond_bottom": press.bond_bottom_minutes,
+        "flash_middle": press.flash_middle_minutes,
+        "tack_all": press.flash_middle_minutes,
+        "bond_all": press.bond_all_minutes,
+    }[step]
 
 
 @dataclass(frozen=True)
@@ -354,7 +296,7 @@ class Schedule:
         return (*self.remarks, *(caution.sentence for caution in self.cautions))
 
 
-def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] = (1,)) -> Schedule:
+def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,)) -> Schedule:
     """Return the press steps of a laminate, bottom balloon first.
 
     Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
@@ -363,6 +305,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
     or plate do not do for the laminate. ``together`` are the laminates that lie in the press at
     once, one number for each size of cycle, the largest first: they share the force.
     """
+    press = design.press
     refuse_temperature(laminate, press)
     parts = assembly(laminate)
     under, *smaller = (
@@ -370,11 +313,11 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         for count in dict.fromkeys(together)
     )
     stacks = [*under, *chain.from_iterable(smaller)]
-    pad = build_up.pad_thickness(press.pressure_kpa, press.platen, press.pad, stacks)
-    pins = pins_by_step(laminate, press)
+    pad = build_up.pad_thickness(press, stacks)
+    pins = pins_by_step(laminate, design)
     plate = plate_thickness(press.plate_thickness, pins)
-    warming = heating(laminate, press.temperature_c, press.time_constant)
-    has_minutes = not films_without_minutes(laminate, press.minutes_for)
+    warming = heating(laminate, press)
+    has_minutes = not films_without_minutes(laminate, press.timed_films)
     steps = tuple(
         _step(
             laminate,
@@ -387,7 +330,7 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
                 step_pins,
                 _underlay(laminate, part, press),
                 warming,
-                press.minutes(part.name) if has_minutes else None,
+                minutes_closed(press, part.name) if has_minutes else None,
             ),
             f" {SNIP}" if laminate.registration == "ears" and part is parts[-1] else "",
         )
@@ -399,24 +342,26 @@ def schedule(laminate: Laminate, press: PressSettings, together: Sequence[int] =
         f"{HANDLING_MINUTES:g} min to cut, lay up, pin and fit the tubing; the latter is assumed "
         "the same for every design (paper: 1.75 h in all)"
     )
-    if not press.is_timed:
+    is_timed = not design.form.is_drawn
+    if not is_timed:
         by_hand = "a time by hand that nobody measured for drawn layers: no total"
-    has_total = total is not None and press.is_timed and not laminate.seams
+    has_total = total is not None and is_timed and not laminate.seams
     return Schedule(
         steps,
         total,
         (total or 0.0) + HANDLING_MINUTES if has_total else None,
         f"{pressed} in the press and {by_hand}",
-        tuple(_cautions(laminate, press, parts, steps)),
+        tuple(_cautions(laminate, design, parts, steps)),
         warming,
-        press.is_timed,
+        is_timed,
         tuple(seam_steps(laminate)),
         tuple(fold_steps(laminate)),
     )
 
 
-def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSetting, ...]]:
+def pins_by_step(laminate: Laminate, design: Design) -> list[tuple[PinSetting, ...]]:
     """Return the pins of every press step. Raises DesignError where pins or plate do not do."""
+    press, registration = design.press, design.registration
     parts = assembly(laminate)
     heights = [build_up.footprint(laminate, part.layers).height for part in parts]
     return settings_by_step(
@@ -427,18 +372,18 @@ def pins_by_step(laminate: Laminate, press: PressSettings) -> list[tuple[PinSett
             )
             for height, part in zip(heights, parts, strict=True)
         ],
-        press.pin_standard,
-        press.pin_lengths,
+        registration.pin_standard,
+        registration.pin_lengths,
         press.plate_thickness,
     )
 
 
-def plate_holes(laminate: Laminate, press: PressSettings) -> dict[str, PinHole]:
+def plate_holes(laminate: Laminate, design: Design) -> dict[str, PinHole]:
     """Return the base plate's hole of every pin that some step uses, by the pin's name."""
-    return pin_holes(pins_by_step(laminate, press))
+    return pin_holes(pins_by_step(laminate, design))
 
 
-def _underlay(laminate: Laminate, part: AssemblyStep, press: PressSettings) -> float:
+def _underlay(laminate: Laminate, part: AssemblyStep, press: Press) -> float:
     """Return the thickness of the underlay of a step, mm; 0 where nothing is laid by hand."""
     return press.underlay_thickness if is_laid_by_hand(laminate, part) else 0.0
 
@@ -458,12 +403,10 @@ class _Setting(NamedTuple):
 
 
 def _step(
-    laminate: Laminate, part: AssemblyStep, press: PressSettings, setting: _Setting, after: str
+    laminate: Laminate, part: AssemblyStep, press: Press, setting: _Setting, after: str
 ) -> Step:
     count = stack_count(laminate, part.layers)
-    estimate = build_up.pressures(
-        press.pressure_kpa, press.platen, press.pad, setting.pad, setting.under
-    )
+    estimate = build_up.pressures(press, setting.pad, setting.under)
     title = TITLES[part.name] if count == 1 else TITLES_OF_SEVERAL[part.name]
     if part.name == "flash_bottom" and len(part.layers) > 2:
         title = f"Bottom balloon{'s' * (count > 1)}, {layers_in_words(part.layers)}"
@@ -488,9 +431,7 @@ def _step(
         edge_kpa=estimate.edge,
         bond_kpa=estimate.bond,
         plate_kpa=estimate.plate,
-        pressure_basis=build_up.pressure_basis(
-            press.pressure_kpa, press.pad, setting.pad, setting.under, estimate
-        )
+        pressure_basis=build_up.pressure_basis(press, setting.pad, setting.under, estimate)
         + _round_pins(press, setting),
         build_up=tuple(_items(press, setting, _size(laminate, part))),
         pin_settings=setting.pins,
@@ -507,21 +448,19 @@ def _size(laminate: Laminate, part: AssemblyStep) -> tuple[float, float]:
     return round(max(high_x) - min(low_x), 6), round(max(high_y) - min(low_y), 6)
 
 
-def _round_pins(press: PressSettings, setting: _Setting) -> str:
+def _round_pins(press: Press, setting: _Setting) -> str:
     beneath = setting.under.height + press.release_thickness + setting.underlay
     out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in setting.pins), default=0.0)
     if not out:
         return ""
-    free = build_up.unpressed(press.pressure_kpa, press.pad, out)
+    free = build_up.unpressed(press, out)
     return f"; up to {free:.1f} mm round a pin none"
 
 
-def _items(
-    press: PressSettings, setting: _Setting, size: tuple[float, float]
-) -> Iterator[BuildUpPart]:
+def _items(press: Press, setting: _Setting, size: tuple[float, float]) -> Iterator[BuildUpPart]:
     """Yield the build-up from the lower platen up; ``size`` in mm is that of the films."""
     release = BuildUpPart(RELEASE, press.release_film, press.release_thickness, press.platen)
-    pad = f"{press.pad.material}, {press.pad.hardness:g} Shore A"
+    pad = f"{press.pad_material}, {press.pad_hardness:g} Shore A"
     yield BuildUpPart(BASE_PLATE, press.plate_material, setting.plate, press.platen)
     if setting.underlay:
         yield BuildUpPart(UNDERLAY, "plain paper, printed", setting.underlay, press.platen)
@@ -636,7 +575,7 @@ HOTTEST_TRIED = 150.0
 PRESSURES_TRIED = (70.0, 200.0)
 
 
-def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
+def refuse_temperature(laminate: Laminate, press: Press) -> None:
     parts, pressed = assembly(laminate), pressed_layers(laminate)
     if not pressed:
         return
@@ -671,11 +610,11 @@ def refuse_temperature(laminate: Laminate, press: PressSettings) -> None:
     if press.temperature_c > build_up.PAD_LIMIT_C:
         raise DesignError(
             f"press.temperature_c = {press.temperature_c:g} is more than the press pad of "
-            f"{press.pad.material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
+            f"{press.pad_material} stands, {build_up.PAD_LIMIT_C:g} C; lower it"
         )
 
 
-def _refuse_bonds(laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]) -> None:
+def _refuse_bonds(laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]) -> None:
     """Raises DesignError where the press is too cold for its bonds, or too hot for those of seams
     that are in it.
     """
@@ -704,10 +643,11 @@ def _refuse_bonds(laminate: Laminate, press: PressSettings, parts: Sequence[Asse
 
 def _cautions(
     laminate: Laminate,
-    press: PressSettings,
+    design: Design,
     parts: Sequence[AssemblyStep],
     steps: Sequence[Step],
 ) -> Iterator[Caution]:
+    press, registration = design.press, design.registration
     yield from _unknown_films(laminate, press)
     yield from _other_temperatures(laminate, press, parts)
     low, high = PRESSURES_TRIED
@@ -716,9 +656,10 @@ def _cautions(
             f"{press.pressure_kpa:g} kPa lies outside {low:g} to {high:g} kPa; 110 kPa is "
             "validated, and earlier work pressed at 70 kPa"
         )
-    if laminate.balloons > press.validated_balloons:
+    validated = design.rules.validated_balloons
+    if laminate.balloons > validated:
         yield Caution(
-            f"{laminate.balloons} balloons are more than the {press.validated_balloons} validated; "
+            f"{laminate.balloons} balloons are more than the {validated} validated; "
             "heat must pass the whole laminate, so try the bond on a sample first"
         )
     uneven = [step for step in steps if not low <= step.film_kpa <= high]
@@ -743,11 +684,13 @@ def _cautions(
             "slide aside: hold it in a frame, and see whether the press opens so far"
         )
     unsold = {
-        pin.diameter for pin in laminate.pins if not is_sold(pin.diameter, press.pin_standard)
+        pin.diameter
+        for pin in laminate.pins
+        if not is_sold(pin.diameter, registration.pin_standard)
     }
-    if unsold and not press.pin_lengths:
+    if unsold and not registration.pin_lengths:
         yield Caution(
-            f"{press.pin_standard} has no dowel pin of diameter "
+            f"{registration.pin_standard} has no dowel pin of diameter "
             f"{joined_words([f'{diameter:g}' for diameter in sorted(unsold)])}",
             "change the diameter, or make the pins and give their lengths in "
             "registration.pin_lengths",
@@ -759,9 +702,9 @@ def _cautions(
             yield Caution(words, at_step=True)
 
 
-def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[Caution]:
+def _unknown_films(laminate: Laminate, press: Press) -> Iterator[Caution]:
     """Yield warnings of films without stated minutes or melting point."""
-    if films := films_without_minutes(laminate, press.minutes_for):
+    if films := films_without_minutes(laminate, press.timed_films):
         yield _unstated_minutes(films, press)
     for film in dict.fromkeys(layer.film for layer in pressed_layers(laminate)):
         if not film.is_mask and film.softens_above is None and not film.stays_solid:
@@ -773,10 +716,10 @@ def _unknown_films(laminate: Laminate, press: PressSettings) -> Iterator[Caution
 
 
 def _other_temperatures(
-    laminate: Laminate, press: PressSettings, parts: Sequence[AssemblyStep]
+    laminate: Laminate, press: Press, parts: Sequence[AssemblyStep]
 ) -> Iterator[Caution]:
     """Yield warnings of a temperature that nobody stated minutes for, or has pressed at."""
-    if not films_without_minutes(laminate, press.minutes_for):
+    if not films_without_minutes(laminate, press.timed_films):
         yield from _minutes_of_another_temperature(laminate, press, parts)
     if press.temperature_c > HOTTEST_TRIED and _is_the_papers(laminate):
         yield Caution(

@@ -18,7 +18,7 @@ from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Stack, stack
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 
 NONE = "none"
 """The model of what none predicts."""
@@ -78,7 +78,7 @@ def predicted(
 
 def process() -> Iterator[Row]:
     design = load_design("3dof-15mm").completed()
-    plan = schedule(build(design), press_settings(design))
+    plan = schedule(build(design), design)
     assert plan.estimated_build_minutes is not None, "the paper states minutes for its film"
     yield Row(
         "time to build, 3-DoF",

@@ -20,7 +20,7 @@ from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.output.schema_ids import HISTORY_SCHEMA
 from sbafab.output.swap import replace_text
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import TESTS_TABLE, RecordTable, record_tables
 from sbafab.results.builds import Build, promised, recorded_sha256
 from sbafab.results.records import HistoryEntry, LabRow, Record, Row, columns, row_of
@@ -65,7 +65,7 @@ def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
     if not isinstance(built, Design):
         return (TESTS_TABLE,)
     laminate = laminate_of(built)
-    return record_tables(built, laminate, schedule(laminate, press_settings(built)))
+    return record_tables(built, laminate, schedule(laminate, built))
 
 
 # Rows from values, and from files: all or none.

@@ -16,7 +16,7 @@ from sbafab.geometry.region import Region, disc
 from sbafab.laminate.assembly import assembly
 from sbafab.laminate.laminate import Laminate, Layer
 from sbafab.output.checked import check
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 
 DESIGNS = [
     ("1dof-5mm", []),
@@ -208,7 +208,7 @@ def test_two_pins_hold_base_and_cap_whenever_they_are_laid(
 ) -> None:
     design = load_design(name, [*assignments, 'registration.method="ears"'])
     laminate = build(design)
-    for step in schedule(laminate, press_settings(design)).steps:
+    for step in schedule(laminate, design).steps:
         assert bool(step.pins) == (step.bond == "flash")
         for index in step.layers if step.pins else ():
             layer = laminate.layer(index)

@@ -16,7 +16,7 @@ from sbafab.design.kits import read_kit, write_kit
 from sbafab.design.records import Design, design_toml, resolved
 from sbafab.design.sections import Acceptance, Laser, Press, Registration, Rules, Sheets
 from sbafab.errors import DesignError
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.bill import waiting
 from sbafab.reports.traveller.job import Job, Work
 
@@ -137,7 +137,7 @@ def test_the_time_of_curing_is_that_of_the_kits_adhesive(lab: Path) -> None:
     ):
         design = load_design("1dof-5mm", changes)
         laminate = build(design)
-        planned = schedule(laminate, press_settings(design))
+        planned = schedule(laminate, design)
         work = Work(design, laminate, planned, (), Job("0" * 64, "sbafab 1"))
         assert waiting(work).cure == 60 * cure
 

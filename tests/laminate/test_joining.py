@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import pytest
 
+from sbafab.actuators import load_design
 from sbafab.errors import DesignError
 from sbafab.geometry.region import Region, rectangle
 from sbafab.laminate.films import Film
 from sbafab.laminate.joining import joinings
 from sbafab.laminate.joints import FaceBond, Fold, Seam, balloon_numbers
 from sbafab.laminate.laminate import Chamber, Laminate, Layer
-from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.schedule import schedule
 
 COATED = Film("COAT", "coated nylon", 0.1, None, 160.0, 250.0, faces=("pu", "nylon"))
 MASK = Film("PTFE", "PTFE film", 0.025, 2200.0, 260.0, 260.0, "mask")
@@ -133,9 +134,9 @@ def test_a_press_that_melts_the_open_faces_of_a_seam_is_refused() -> None:
     layers = tuple(replace(layer, film=cold) for layer in stack.layers)
     stack = replace(stack, layers=layers, seams=(seam("a", 1, 2, 8, 1),), bonds=cool)
     with pytest.raises(DesignError, match="135 would weld layers 1 and 2 all over, which seam a"):
-        schedule(stack, PressSettings())
+        schedule(stack, load_design("1dof-5mm"))
     hot = replace(stack, bonds=(replace(WELD, temperature_c=180.0), cool[1]))
-    assert [step.step for step in schedule(hot, PressSettings()).seams] == [1]
+    assert [step.step for step in schedule(hot, load_design("1dof-5mm")).seams] == [1]
 
 
 def test_films_that_bond_in_the_press_cannot_lie_in_it_beside_a_seam() -> None:

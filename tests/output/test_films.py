@@ -15,7 +15,7 @@ from sbafab.design.identity import kit_of
 from sbafab.design.kits import write_kit
 from sbafab.design.records import Design
 from sbafab.errors import DesignError
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.rules.deck import has_failed
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import Run, RunRequest, generate
@@ -123,7 +123,7 @@ def test_the_folder_holds_the_kit_that_it_cites(run: Run, design: Design) -> Non
 def test_the_press_knows_what_melts(design: Design) -> None:
     def press(*changes: str) -> None:
         changed = design.with_(*changes)
-        schedule(build(changed), press_settings(changed))
+        schedule(build(changed), changed)
 
     press()
     with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120 C"):

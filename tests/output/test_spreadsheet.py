@@ -11,7 +11,7 @@ import pytest
 
 import sbafab
 from sbafab.actuators import build
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.pressing.schedule_files import press_csv
 from sbafab.spreadsheet import csv_text, plain_text
 
@@ -109,5 +109,5 @@ def test_a_sweep_s_table_holds_no_formula(tmp_path: Path) -> None:
 
 def test_a_press_table_holds_no_formula() -> None:
     design = sbafab.load("1dof-5mm", {"press.plate_material": "x;=1+1"})
-    plan = schedule(build(design), press_settings(design))
+    plan = schedule(build(design), design)
     assert formulas(press_csv(plan)) == []

@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from sbafab.actuators import load_design
+from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.build_up import (
     EVEN,
     PADS,
-    Pad,
     StackShape,
     column_modulus,
     gent_modulus,
+    pad_modulus,
     pad_thickness,
     pressures,
 )
-from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.pressing.schedule_files import press_json
 
 Stack = Callable[..., Laminate]
-PAPER = PressSettings()
+PAPER = load_design("1dof-5mm")
 PLATEN = (152.4, 152.4)
 LAMINATE = StackShape(height=1.865, area=150.0, rim=50.0, below=0.375)
+
+
+def rubber(thickness: float | None, hardness: float) -> dict[str, Any]:
+    """Keys of a press pad of solid rubber."""
+    keys = {"pad_material": "silicone rubber", "pad_hardness": hardness}
+    return keys if thickness is None else {**keys, "pad_thickness": thickness}
 
 
 def test_gents_modulus_is_that_of_rubber() -> None:
@@ -35,14 +43,15 @@ def test_gents_modulus_is_that_of_rubber() -> None:
     assert gent_modulus(20) == pytest.approx(720, rel=0.05)
 
 
-@pytest.mark.parametrize("pad", [Pad(), Pad("silicone rubber", 25.0, 40.0)])
-def test_what_films_and_plate_get_is_the_force(pad: Pad) -> None:
-    found = pressures(110.0, PLATEN, pad, 25.0, LAMINATE)
+@pytest.mark.parametrize("pad", [{}, rubber(25.0, 40.0)])
+def test_what_films_and_plate_get_is_the_force(pad: dict[str, Any]) -> None:
+    press = Press(**pad)
+    found = pressures(press, 25.0, LAMINATE)
     platen = PLATEN[0] * PLATEN[1]
     carried = found.film * LAMINATE.area + found.plate * (platen - LAMINATE.area)
     assert carried == pytest.approx(110.0 * platen, rel=1e-3)
     # The pad is pressed together by the laminate's height more over it than beside it.
-    more = (found.film - found.plate) / column_modulus(pad, 25.0, LAMINATE) * 25.0
+    more = (found.film - found.plate) / column_modulus(press, 25.0, LAMINATE) * 25.0
     assert more == pytest.approx(LAMINATE.height, rel=5e-3)
     assert found.bond < found.film < found.edge
 
@@ -53,9 +62,9 @@ def test_the_pad_spans_beside_what_stands_out(stack: Stack) -> None:
     The pin of step 1 is 4 mm long in a hole of 3.25, over 0.063 of films and 0.05 below them; it
     may be 0.25 longer and its hole 0.05 shallower.
     """
-    found = pressures(110.0, PLATEN, Pad(), 25.0, LAMINATE)
+    found = pressures(Press(), 25.0, LAMINATE)
     assert found.free == pytest.approx(1.865 * 412.7 / (2 * 110), abs=0.05)
-    first = schedule(stack(2), replace(PAPER, pin_lengths=(4.0,))).steps[0]
+    first = schedule(stack(2), PAPER.with_("registration.pin_lengths=[4]")).steps[0]
     out = 4 - 3.25 + 0.25 + 0.05 - 0.063 - 0.05
     width = out * 412.7 / (2 * 110)
     assert first.pressure_basis.endswith(f"; up to {width:.1f} mm round a pin none")
@@ -65,9 +74,11 @@ def test_solid_rubber_must_flow_aside_and_is_harder_than_a_sponge() -> None:
     # A disc of radius a on a pad of height H has the shape factor a / 2 H.
     a, thickness = 10.0, 5.0
     disc = StackShape(1.0, math.pi * a * a, 2 * math.pi * a, 0.0)
-    solid = Pad("silicone rubber", thickness, 10.0)
-    assert column_modulus(solid, thickness, disc) == pytest.approx(solid.modulus * (1 + 2 * 1.0))
-    assert column_modulus(Pad(), thickness, disc) == Pad().modulus
+    solid = Press(**rubber(thickness, 10.0))
+    assert column_modulus(solid, thickness, disc) == pytest.approx(
+        pad_modulus(solid) * (1 + 2 * 1.0)
+    )
+    assert column_modulus(Press(), thickness, disc) == pad_modulus(Press())
 
 
 def test_the_pad_is_the_thinnest_that_is_even_enough(stack: Stack) -> None:
@@ -75,34 +86,35 @@ def test_the_pad_is_the_thinnest_that_is_even_enough(stack: Stack) -> None:
     [pad] = {item.thickness_mm for step in plan.steps for item in step.build_up[-1:]}
     assert max(step.film_kpa for step in plan.steps) <= EVEN * 110
     thinner = PADS[PADS.index(pad) - 1]
-    with_thinner = schedule(stack(15), replace(PAPER, pad=Pad(thickness=thinner)))
+    with_thinner = schedule(stack(15), PAPER.with_(press={"pad_thickness": thinner}))
     assert max(step.film_kpa for step in with_thinner.steps) > EVEN * 110
 
 
 @pytest.mark.parametrize(
     ("pad", "said"),
     [
-        (Pad(thickness=3.0), r"pad_thickness = 3 of .* 1\.\d+ mm high the films would get \d+ kPa"),
-        (Pad("silicone rubber", 3.0, 60.0), "make it thicker or softer"),
-        (Pad(hardness=5.0, thickness=50.0), "harder or thicker"),
-        (Pad(hardness=50.0), "harder than any silicone sponge, 30 at most"),
-        (Pad("silicone rubber", None, 90.0), "no press pad"),
+        (
+            {"pad_thickness": 3.0},
+            r"pad_thickness = 3 of .* 1\.\d+ mm high the films would get \d+ kPa",
+        ),
+        (rubber(3.0, 60.0), "make it thicker or softer"),
+        ({"pad_hardness": 5.0, "pad_thickness": 50.0, "pressure_kpa": 180.0}, "harder or thicker"),
+        ({"pad_hardness": 50.0}, "harder than any silicone sponge, 30 at most"),
+        (rubber(None, 90.0), "no press pad"),
     ],
 )
 def test_a_set_up_that_cannot_give_the_pressure_is_refused(
-    stack: Stack, pad: Pad, said: str
+    stack: Stack, pad: dict[str, Any], said: str
 ) -> None:
-    high = replace(PAPER, pad=pad, pressure_kpa=180.0 if pad.hardness == 5 else 110.0)
     with pytest.raises(DesignError, match=said):
-        schedule(stack(15), high)
+        schedule(stack(15), PAPER.with_(press=pad))
 
 
 def test_a_pad_that_does_not_reach_the_base_plate_is_refused() -> None:
     # A quarter of the platen lies 2 mm high under 3 mm of hard rubber.
     wide = StackShape(height=2.0, area=5800.0, rim=300.0, below=0.0)
-    hard = Pad("silicone rubber", 3.0, 60.0)
     with pytest.raises(DesignError, match="the films take the whole force, 440 kPa"):
-        pad_thickness(110.0, PLATEN, hard, [wide])
+        pad_thickness(Press(**rubber(3.0, 60.0)), [wide])
 
 
 def test_the_reason_is_that_of_the_highest_pile() -> None:
@@ -116,12 +128,12 @@ def test_the_reason_is_that_of_the_highest_pile() -> None:
     more = modulus * (1 + 2 * (100 / (40 * 200)) ** 2) * 2 / 200
     film = 110 + more * (1 - 100 / (PLATEN[0] * PLATEN[1]))
     with pytest.raises(DesignError, match=f"the films would get {film:.0f} kPa"):
-        pad_thickness(110.0, PLATEN, Pad("silicone rubber", None, 90.0), [under])
+        pad_thickness(Press(**rubber(None, 90.0)), [under])
 
 
 def test_a_pad_has_its_own_heat_limit(stack: Stack) -> None:
     with pytest.raises(DesignError, match="more than the press pad of silicone sponge stands"):
-        schedule(stack(2), replace(PAPER, temperature_c=210))
+        schedule(stack(2), PAPER.with_("press.temperature_c=210"))
 
 
 def test_every_step_lists_platen_to_platen(stack: Stack) -> None:
@@ -138,7 +150,7 @@ def test_every_step_lists_platen_to_platen(stack: Stack) -> None:
 
 
 def test_a_pile_and_uneven_films_draw_warnings(stack: Stack) -> None:
-    uneven = schedule(stack(15), replace(PAPER, pad=Pad(thickness=8.0)))
+    uneven = schedule(stack(15), PAPER.with_("press.pad_thickness=8"))
     assert any("outside 70 to 200 kPa; take a thicker" in words for words in uneven.warnings)
-    piled = schedule(stack(15), replace(PAPER, pad=Pad(thickness=50.0)))
+    piled = schedule(stack(15), PAPER.with_("press.pad_thickness=50"))
     assert any("a pile of 2 sheets" in words for words in piled.warnings)

@@ -27,17 +27,10 @@ from sbafab.pressing.dowels import (
     is_sold,
     lengths_sold,
 )
-from sbafab.pressing.schedule import (
-    PressSettings,
-    Schedule,
-    Step,
-    plate_holes,
-    press_settings,
-    schedule,
-)
+from sbafab.pressing.schedule import Schedule, Step, plate_holes, schedule
 
 Stack = Callable[..., Laminate]
-PAPER = PressSettings()
+PAPER = load_design("1dof-5mm")
 ISO_8734 = {1.0: (3, 4, 5, 6, 8, 10), 2.0: (5, 6, 8, 10, 12, 14, 16, 18, 20)}
 """Lengths in mm of ISO 8734, Table 1."""
 LENGTHS_FROM_TO = {
@@ -122,8 +115,8 @@ def test_no_pin_falls_through_or_stands_off_its_height() -> None:
     ):
         design = load_design(template, [f'registration.method="{method}"'])
         laminate = build(design)
-        plan = schedule(laminate, press_settings(design))
-        holes = plate_holes(laminate, press_settings(design))
+        plan = schedule(laminate, design)
+        holes = plate_holes(laminate, design)
         for _ in range(400):
             for step in plan.steps:
                 for pin in step.pin_settings:
@@ -154,8 +147,8 @@ def test_the_underlay_lifts_the_stack(stack: Stack) -> None:
     design = load_design("1dof-5mm")
     laminate = build(design)
     for thick in (0.1, 0.3):
-        settings = replace(press_settings(design), underlay_thickness=thick)
-        third = schedule(laminate, settings).steps[2]
+        paper = design.with_(press={"underlay_thickness": thick})
+        third = schedule(laminate, paper).steps[2]
         films = sum(laminate.layer(index).film.thickness for index in third.layers)
         assert under(third) == pytest.approx(films + 0.05 + thick)
         assert third.top_mm == pytest.approx(films + 0.05 + thick)
@@ -184,7 +177,7 @@ def test_what_pins_may_be_off_follows_from_the_machine() -> None:
 def test_the_shop_is_told_of_its_holes() -> None:
     design = load_design("3dof-15mm")
     laminate = build(design)
-    holes = plate_holes(laminate, press_settings(design))
+    holes = plate_holes(laminate, design)
     jig = hole_notes(laminate.pins, holes, "jig-borer")
     assert len(jig) == 3
     for line, diameter in zip(jig, (1, 2), strict=False):
@@ -209,17 +202,17 @@ def test_the_push_out_hole_lets_a_punch_through_and_no_pin() -> None:
 
 
 def test_own_lengths_and_the_other_standard(stack: Stack) -> None:
-    own = schedule(stack(15), replace(PAPER, pin_lengths=(4.5, 7.0)))
+    own = schedule(stack(15), PAPER.with_("registration.pin_lengths=[4.5, 7]"))
     assert {pin.length_mm for step in own.steps for pin in step.pin_settings} <= {4.5, 7.0}
-    other = schedule(stack(2), replace(PAPER, pin_standard="ISO 2338"))
+    other = schedule(stack(2), PAPER.with_("registration.pin_standard=ISO 2338"))
     assert {pin.length_mm for step in other.steps for pin in step.pin_settings} == {4.0}
 
 
 def test_pins_or_plate_that_do_not_do_are_refused(stack: Stack) -> None:
     with pytest.raises(DesignError, match=r"at least \d\.\d+ mm long .* longest there is has 3"):
-        schedule(stack(15), replace(PAPER, pin_lengths=(3.0,)))
+        schedule(stack(15), PAPER.with_("registration.pin_lengths=[3]"))
     with pytest.raises(DesignError, match=r"press.plate_thickness = 2 is thinner than the 3\.\d+"):
-        schedule(stack(15), replace(PAPER, plate_thickness=2.0))
+        schedule(stack(15), PAPER.with_("press.plate_thickness=2"))
 
 
 def test_a_plate_as_thin_as_the_shallowest_shoulder_is_taken(stack: Stack) -> None:
@@ -229,12 +222,12 @@ def test_a_plate_as_thin_as_the_shallowest_shoulder_is_taken(stack: Stack) -> No
     0.438. A pin of 4 mm, give or take 0.25, leaves a shoulder 4 - 0.25 - 0.05 - 0.438 = 3.262 deep
     at most: 3.25 in steps of 0.05. 1 mm stays under it. The pin of 6 mm would take 5.25.
     """
-    own = replace(PAPER, pin_lengths=(4.0, 6.0))
-    plan = schedule(stack(2), replace(own, plate_thickness=4.25))
+    own = PAPER.with_("registration.pin_lengths=[4, 6]")
+    plan = schedule(stack(2), own.with_("press.plate_thickness=4.25"))
     assert plate(plan) == 4.25
     assert {pin.seat_mm for step in plan.steps for pin in step.pin_settings} == {3.25}
     with pytest.raises(DesignError, match=r"plate_thickness = 4.24 is thinner than the 4.25 mm"):
-        schedule(stack(2), replace(own, plate_thickness=4.24))
+        schedule(stack(2), own.with_("press.plate_thickness=4.24"))
     # 6 mm is the thinnest plate sold.
     assert plate(schedule(stack(2), own)) == 6.0
 
@@ -243,7 +236,8 @@ def test_the_depth_with_which_pins_stand_out_least_is_taken(stack: Stack) -> Non
     """As above, but with pins of 5.04: 5.04 - 0.3 - 0.438 = 4.302, drilled 4.30 deep, stands out
     0.74 where pins of 4 stand out 0.75.
     """
-    plan = schedule(stack(2), replace(PAPER, pin_lengths=(4.0, 5.04), plate_thickness=8.0))
+    own = PAPER.with_("registration.pin_lengths=[4, 5.04]", "press.plate_thickness=8")
+    plan = schedule(stack(2), own)
     pins = {(pin.length_mm, pin.seat_mm) for step in plan.steps for pin in step.pin_settings}
     assert pins == {(5.04, 4.3)}
 

@@ -11,7 +11,7 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.plate_heating import cool_minutes, warm_minutes
-from sbafab.pressing.schedule import PressSettings, Schedule, press_settings, schedule
+from sbafab.pressing.schedule import Schedule, schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
@@ -19,12 +19,12 @@ Stack = Callable[..., Laminate]
 
 def plan_of(template: str, *changes: str) -> Schedule:
     design = load_design(template, changes)
-    return schedule(build(design), press_settings(design))
+    return schedule(build(design), design)
 
 
 def test_the_line_of_the_papers_films(stack: Stack) -> None:
     """From 20 C between platens at 135: 120 C after ln(115 / 15), 130 C after ln(115 / 5)."""
-    plan = schedule(stack(6), PressSettings())
+    plan = schedule(stack(6), load_design("1dof-5mm"))
     for step in plan.steps:
         melting, start, end = step.time_temperature
         assert (melting.point, melting.edge_c) == ("melting point", 120)
@@ -67,7 +67,7 @@ def test_the_clock_never_starts_below_the_melting_point(stack: Stack) -> None:
         layer if layer.is_mask else replace(layer, film=films[layer.film])
         for layer in laminate.layers
     ]
-    plan = schedule(replace(laminate, layers=tuple(layers)), PressSettings())
+    plan = schedule(replace(laminate, layers=tuple(layers)), load_design("1dof-5mm"))
     assert plan.heating.clock_c == 132
     assert plan.heating.clock_c < plan.heating.platen_c
 
@@ -186,7 +186,7 @@ def test_the_middle_layers_are_as_large_as_they_are_cut(
 def test_every_step_says_how_large_its_laminate_is(template: str, method: str) -> None:
     design = load_design(template, [f"registration.method={method}"])
     laminate = build(design)
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     for step in plan.steps:
         (size,) = [part.size_mm for part in step.build_up if part.part == "laminate"]
         assert 0 < min(size) <= max(size) <= 152.4

@@ -13,11 +13,11 @@ import pytest
 from sbafab.actuators import build, load_design
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import PressSettings, press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 
 Stack = Callable[..., Laminate]
-PAPER = PressSettings()
+PAPER = load_design("1dof-5mm")
 CASES = [
     {"balloons": 1},
     {"balloons": 1, "lumen": True},
@@ -155,8 +155,8 @@ def test_masks_in_a_bonded_stack_are_held_by_its_films() -> None:
 def test_the_tpe_must_melt(stack: Stack) -> None:
     for temperature in (20, 120):
         with pytest.raises(DesignError, match="does not bond Stretchlon 200, which melts at 120"):
-            schedule(stack(2), replace(PAPER, temperature_c=temperature))
-    warm = schedule(stack(2), replace(PAPER, temperature_c=121))
+            schedule(stack(2), PAPER.with_(press={"temperature_c": temperature}))
+    warm = schedule(stack(2), PAPER.with_("press.temperature_c=121"))
     (only,) = beside_hand_placing(warm.warnings)
     assert only.startswith("minutes stated for 135 C, the press is set to 121 C")
 
@@ -164,22 +164,20 @@ def test_the_tpe_must_melt(stack: Stack) -> None:
 def test_the_masks_must_stand_the_heat(stack: Stack) -> None:
     for temperature in (260, 300):
         with pytest.raises(DesignError, match=r"limit of the masks, 260 C .* fumes"):
-            schedule(stack(2), replace(PAPER, temperature_c=temperature))
+            schedule(stack(2), PAPER.with_(press={"temperature_c": temperature}))
 
 
 @pytest.mark.parametrize(
     ("change", "warning"),
     [
-        ({"temperature_c": 151}, "151 C is hotter than the 150 C"),
-        ({"pressure_kpa": 69}, "69 kPa lies outside 70 to 200"),
-        ({"pressure_kpa": 201}, "201 kPa lies outside 70 to 200"),
-        ({"validated_balloons": 5}, "6 balloons are more than the 5 validated"),
+        ("press.temperature_c=151", "151 C is hotter than the 150 C"),
+        ("press.pressure_kpa=69", "69 kPa lies outside 70 to 200"),
+        ("press.pressure_kpa=201", "201 kPa lies outside 70 to 200"),
+        ("rules.validated_balloons=5", "6 balloons are more than the 5 validated"),
     ],
 )
-def test_what_was_never_tried_is_warned_about(
-    stack: Stack, change: dict[str, float], warning: str
-) -> None:
-    found = beside_hand_placing(schedule(stack(6), replace(PAPER, **change)).warnings)
+def test_what_was_never_tried_is_warned_about(stack: Stack, change: str, warning: str) -> None:
+    found = beside_hand_placing(schedule(stack(6), PAPER.with_(change)).warnings)
     (found,) = (text for text in found if not text.startswith("minutes stated"))
     assert found.startswith(warning)
 
@@ -247,7 +245,7 @@ def test_ears_and_tails_are_snipped_off_at_the_end(stack: Stack) -> None:
 def test_no_time_by_hand_is_claimed_for_drawn_layers() -> None:
     def times(name: str) -> tuple[object, object, str]:
         design = load_design(name)
-        table = press_json(schedule(build(design), press_settings(design)))
+        table = press_json(schedule(build(design), design))
         return table["hands_minutes"], table["estimated_build_minutes"], table["estimate_basis"]
 
     assert times("1dof-5mm")[:2] == (60, 105)

@@ -17,7 +17,7 @@ from sbafab.pressing.cycles import (
     press_runs,
     runs_of,
 )
-from sbafab.pressing.schedule import PressSettings, schedule
+from sbafab.pressing.schedule import schedule
 
 INCH = 25.4
 
@@ -63,7 +63,7 @@ def test_the_plate_is_turned_where_more_lie_on_it() -> None:
 
 
 def test_times_of_a_batch_are_those_of_the_paper_a_copy_and_a_cycle() -> None:
-    plan = schedule(laminate(), PressSettings())
+    plan = schedule(laminate(), load_design("1dof-5mm"))
     assert plan.total_press_minutes == 45
     times = batch_times(Runs(30, ((0.0, 0.0),) * 12), plan)
     assert (times.press, times.hands, times.total) == (3 * 45, 30 * 60, 135 + 1800)
@@ -101,7 +101,8 @@ def test_the_plate_lies_turned_where_the_places_do() -> None:
 
 def test_all_laminates_of_a_cycle_share_the_force() -> None:
     column = laminate("stack.balloons=6")
-    one, twelve = schedule(column, PressSettings()), schedule(column, PressSettings(), (12, 1))
+    design = load_design("1dof-5mm")
+    one, twelve = schedule(column, design), schedule(column, design, (12, 1))
     for single, shared in zip(one.steps, twelve.steps, strict=True):
         assert shared.force_n == single.force_n
         pad = {item.part: item for item in shared.build_up}["press pad"]
@@ -129,7 +130,7 @@ def test_a_cycle_takes_what_one_person_makes_in_eight_hours_or_what_is_ordered()
 def test_patterns_are_counted_a_cycle() -> None:
     design = load_design("1dof-5mm", ["stack.balloons=2", "order.copies=5", "order.at_once=3"])
     column = build(design)
-    said = batch_json(design, column, schedule(column, PressSettings()))
+    said = batch_json(design, column, schedule(column, design))
     assert said["cycles"] == [3, 2]
     for row in said["patterns"]:
         assert row["each"] == len(column.patterns[row["pattern"]])

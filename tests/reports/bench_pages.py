@@ -11,7 +11,7 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.design.records import Design
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
@@ -29,7 +29,7 @@ def built(template: str, *assignments: str) -> tuple[Design, Laminate]:
 
 def work_of(sheet_files: Any, template: str, *assignments: str) -> Work:
     design, laminate = built(template, *assignments)
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     fixture = "sheets/fixture.dxf" if laminate.pins else None
     underlay = "underlay.pdf" if guides(laminate) else None
     job = Job(SHA, "sbafab 1.0.0", fixture=fixture, underlay=underlay)

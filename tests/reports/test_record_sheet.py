@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.record_sheet import HISTORY_FIELDS
 from sbafab.results.recording import entries_of
 from tests.reports.bench_pages import built, page, words_of
@@ -26,7 +26,7 @@ def test_a_traveller_ends_with_the_record_page(sheet_files: Any) -> None:
     steps = [words_of(cell) for cell in tables[1].xpath("./tbody//th")]
     assert steps == [
         f"{step.step}{step.temperature_c:g} °C, {step.force_n:.0f} N, {step.minutes:g} min"
-        for step in schedule(laminate, press_settings(design)).steps
+        for step in schedule(laminate, design).steps
     ]
     blanks = section.xpath(".//tbody//input")
     cells = sum(

@@ -24,7 +24,7 @@ from sbafab.cutting.sheets import SheetFile
 from sbafab.design.records import Design
 from sbafab.geometry.region import Region
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller import units
 from sbafab.reports.traveller.bill import cut_list
@@ -57,7 +57,7 @@ def work_of(sheet_files: Any, template: str, *assignments: str, **job: Any) -> W
     design, laminate = built(template, *assignments)
     given: dict[str, Any] = {"design_sha256": SHA, "generator": "sbafab 1.0.0", **job}
     given.setdefault("fixture", "sheets/fixture.dxf" if laminate.pins else None)
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     sheets = sheet_files(laminate, design.order.quantity)
     return Work(design, laminate, plan, sheets, Job(**given))
 
@@ -208,13 +208,12 @@ def test_a_blank_stands_where_nobody_is_named(sheet_files: Any) -> None:
 PRINTS = """
 import hashlib
 from sbafab.actuators import build, load_design
-from sbafab.pressing.schedule import press_settings
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 design = load_design("3dof-15mm", ())
 laminate = build(design)
-plan = schedule(laminate, press_settings(design))
+plan = schedule(laminate, design)
 page = traveller_html(Work(design, laminate, plan, [], Job("{sha}", "sbafab 1.0.0")))
 print(hashlib.sha256(page.encode()).hexdigest())
 """

@@ -10,7 +10,7 @@ from lxml import html as lxml_html
 
 from sbafab.actuators import build, load_design
 from sbafab.laminate.burst import burst
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.acceptance import proof
 from sbafab.reports.traveller.bench import bench_html, film_classes, pressure_range
 from sbafab.reports.traveller.job import Job, Work
@@ -22,7 +22,7 @@ SHA = "0123456789abcdef" * 4
 def work_of(template: str, *changes: str) -> Work:
     design = load_design(template, changes)
     laminate = build(design)
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     return Work(design, laminate, plan, [], Job(SHA, "sbafab 1"))
 
 

@@ -16,7 +16,7 @@ from sbafab.laminate.films import Film
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import limits
 from sbafab.pressing.cycles import design_runs
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.drawing import TIMES
 from sbafab.reports.traveller.bench import bench_html
 from sbafab.reports.traveller.bill import cut_list
@@ -326,7 +326,7 @@ def test_what_good_hands_know_stands_where_it_happens(sheet_files: Any) -> None:
 
 def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
     design, laminate = built("1dof-5mm")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     job = Job(SHA, "sbafab 1.0.0", underlay="underlay.pdf")
     tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, [], job)))
     told = [re.search(r"The print shows the edges of ([^.:]*)[.:]", step) for step in steps(tree)]
@@ -348,7 +348,7 @@ def test_the_underlay_is_laid_where_it_has_a_line(sheet_files: Any) -> None:
 
 def test_spares_are_told_beside_what_is_needed(sheet_files: Any) -> None:
     design, laminate = built("3dof-15mm")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     more = {"P02": 6, "P06": 6}
     sheets = [
         replace(
@@ -367,7 +367,7 @@ def test_spares_are_told_beside_what_is_needed(sheet_files: Any) -> None:
 
 def test_the_cover_says_what_its_colours_are(sheet_files: Any) -> None:
     design, laminate = built("1dof-5mm")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     job = Job(SHA, "sbafab 1.0.0", solid_png=b"\x89PNG")
     tree = lxml_html.fromstring(traveller_html(Work(design, laminate, plan, [], job)))
     keys = [words_of(key) for key in tree.findall(".//span[@class='key']")]
@@ -451,7 +451,7 @@ def test_a_long_sheet_is_drawn_in_rows_across_the_page(sheet_files: Any) -> None
 
 def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any) -> None:
     design, laminate = built("3dof-15mm")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     tight = [finding for finding in run_deck(laminate, limits(design)) if finding.rule == "pin-fit"]
     job = Job(SHA, "sbafab 1.0.0", findings=tuple(tight))
     sheets = sheet_files(laminate)
@@ -466,7 +466,7 @@ def test_narrow_holes_are_tried_on_their_pins_before_the_press(sheet_files: Any)
 
 def test_tubes_and_leaks_are_those_of_every_copy() -> None:
     design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=3")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     tree = lxml_html.fromstring(
         traveller_html(Work(design, laminate, plan, [], Job(SHA, "sbafab 1.0.0")))
     )
@@ -483,7 +483,7 @@ def test_tubes_and_leaks_are_those_of_every_copy() -> None:
 
 def test_the_places_of_a_full_plate_are_said_as_a_grid() -> None:
     design, laminate = built("1dof-5mm", "stack.balloons=1", "order.copies=90", "order.at_once=90")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf")
     work = Work(design, laminate, plan, [], job)
     words = words_of(lxml_html.fromstring(bench_html("full", SHA, "sbafab 1.0.0", [work])))

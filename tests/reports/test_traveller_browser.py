@@ -15,7 +15,7 @@ from PIL import Image
 
 from sbafab.actuators import build, load_design
 from sbafab.assemblies.files import load_assembly
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import record_text, traveller_html
 from sbafab.runs.run import RunRequest, generate
@@ -51,7 +51,7 @@ def chromium(folder: Path, page: Path, *flags: str) -> str:
 def html(sheet_files: Any) -> str:
     design = load_design("3dof-15mm", ())
     laminate = build(design)
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     job = Job(SHA, "sbafab 1.0.0", fixture="sheets/fixture.dxf")
     return traveller_html(Work(design, laminate, plan, sheet_files(laminate), job))
 

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.bench import before_cutting
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.underlay import seams_pdf
@@ -189,7 +189,7 @@ def test_chambers_of_one_net_are_filled_by_its_first_tube(sheet_files: Any) -> N
 
 def test_a_folded_part_comes_off_the_sheet_as_one() -> None:
     design, laminate = built("folded")
-    plan = schedule(laminate, press_settings(design))
+    plan = schedule(laminate, design)
     _, held, _ = before_cutting([Work(design, laminate, plan, (), Job(SHA, "sbafab 1.0.0"))])
     # One part and one spare, of 21.3 cm2 of LDPE, 0.1 mm thick, 0.92 mg/mm3; each half weighs 98.
     assert "2 come free, the lightest of 197 mg" in held.text

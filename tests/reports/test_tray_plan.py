@@ -13,7 +13,7 @@ from lxml import html as lxml_html
 from sbafab.actuators import build, load_design
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import Runs, design_runs
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.tray_page import tray_html
 from sbafab.reports.tray_plan import tray_pdf
@@ -99,7 +99,7 @@ def test_each_place_of_a_cycle_has_its_pages_with_its_serials() -> None:
 def test_the_page_for_the_phone_counts_patterns_by_cycle() -> None:
     design = load_design("1dof-5mm", ["order.copies=9", "stack.balloons=3"])
     laminate = build(design)
-    plan = schedule(laminate, press_settings(design), design_runs(design, laminate).cycles)
+    plan = schedule(laminate, design, design_runs(design, laminate).cycles)
     text = tray_html(Work(design, laminate, plan, (), Job(SHA, "sbafab")))
     assert text is not None
     assert "<script" not in text

@@ -17,7 +17,7 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import plate_corner
 from sbafab.laminate.laminate import Laminate
 from sbafab.pressing.cycles import runs_of
-from sbafab.pressing.schedule import press_settings, schedule
+from sbafab.pressing.schedule import schedule
 from sbafab.reports.underlay import guides, leaves, underlay_pdf
 from tests.quick import few
 
@@ -204,7 +204,7 @@ def test_it_lies_in_every_step_that_counts_its_thickness(template: str, method: 
     with_lines = {number for guide in guides(laminate) for number in guide.steps}
     counted = {
         step.step
-        for step in schedule(laminate, press_settings(design)).steps
+        for step in schedule(laminate, design).steps
         if any(item.part == "underlay" for item in step.build_up)
     }
     assert counted == with_lines

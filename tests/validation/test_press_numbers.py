@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from sbafab.actuators import build, load_design
-from sbafab.pressing.schedule import Schedule, press_settings, schedule
+from sbafab.pressing.schedule import Schedule, schedule
 
 
 @pytest.fixture
 def plan() -> Schedule:
     design = load_design("3dof-15mm")
-    return schedule(build(design), press_settings(design))
+    return schedule(build(design), design)
 
 
 def test_four_steps_of_3_12_10_and_20_minutes(plan: Schedule) -> None:

@@ -253,7 +253,7 @@ def _press_words(one: DesignWork) -> str:
     copies = units.count(runs.copies, "copy", "copies")
     words = f"{design.name}, {copies}: "
     if runs.together > 1:
-        width, length = design.press.platen_width, design.press.platen_length
+        width, length = design.press.platen
         at_once = "all at once" if runs.count == 1 else f"{runs.together} at a time"
         words += (
             f"{units.count(runs.count, 'lamination')}, {at_once}, side by side within the heated "

@@ -68,7 +68,7 @@ def grid(work: Work) -> str:
 def holes(work: Work) -> list[PlateHole]:
     """Return every hole of the plate's first place; films have the diameter ``films`` there."""
     laminate, press = work.laminate, work.design.press
-    platen = press.platen_width, press.platen_length
+    platen = press.platen
     corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
     pins = _pin_holes(work.schedule)
     return [
@@ -88,9 +88,7 @@ def holes(work: Work) -> list[PlateHole]:
 def size(work: Work) -> str:
     """Return the base plate's size in words."""
     press = work.design.press
-    low_x, low_y, high_x, high_y = whole_plate(
-        work.laminate, (press.platen_width, press.platen_length), work.runs.places
-    ).bounds
+    low_x, low_y, high_x, high_y = whole_plate(work.laminate, press.platen, work.runs.places).bounds
     return units.size(high_x - low_x, high_y - low_y)
 
 

@@ -131,7 +131,7 @@ def _cycles_basis(work: Work, runs: Runs) -> str:
 
 
 def _platen(work: Work) -> tuple[float, float]:
-    return work.design.press.platen_width, work.design.press.platen_length
+    return work.design.press.platen
 
 
 def _identity(work: Work) -> tuple[Action, ...]:

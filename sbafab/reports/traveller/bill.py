@@ -86,7 +86,7 @@ def bill(work: Work) -> list[Item]:
         words = f"{wrap.glue}, between sheet and tube (ours: the paper does not say what holds it)"
         items.append(Item("Adhesive of the wrap", words, "as needed", kind="wrap"))
         items.append(replace(THREAD, kind="wrap"))
-    width, length = work.design.press.platen_width, work.design.press.platen_length
+    width, length = work.design.press.platen
     for name, what, quantity, count in base_plate.items(work):
         area = count * width * length / 1e6 if name == base_plate.RELEASE_FILM else None
         items.append(Item(name, what, quantity, count, area))
