@@ -17,7 +17,7 @@ from sbafab.search.sweep import SweepRequest, SweptDesigns
 from sbafab.search.sweep import sweep as run_sweep
 from sbafab.search.target_yield import ReachedYield
 from sbafab.search.target_yield import reach_yield as run_reach_yield
-from sbafab.search.trial import read_all
+from sbafab.search.trial import free_of, read_all
 from sbafab.search.vary import varied_keys
 
 
@@ -29,7 +29,7 @@ def find(
     most: Mapping[str, float | str] | None = None,
     best: str = "mass",
     flow_ml_min: float = 35.0,
-    free: Sequence[Free] | None = None,
+    free: str | Sequence[Free | str] | None = None,
     tries: int = FindRequest.tries,
     optuna: bool = False,
     storage: str | None = None,
@@ -40,9 +40,10 @@ def find(
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
     20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, or texts with a unit;
-    a ``time`` is with water at ``flow_ml_min``. ``free`` and all after it are the fields of
-    ``FindRequest``, such as ``sure``, a share that is the probability of each requirement;
-    ``tables`` are those of the design. ``found.best.values`` are the found keys,
+    a ``time`` is with water at ``flow_ml_min``. ``free`` are the keys to vary in place of the
+    family's own, as texts ``["chamber.diameter=8:12:0.1", "stack.balloons=6:9:1"]``, mm. What
+    follows are the fields of ``FindRequest``, such as ``sure``, a share that is the probability of
+    each requirement; ``tables`` are those of the design. ``found.best.values`` are the found keys,
     ``found.intervals`` the 90 % intervals. Raises DesignError for a quantity that it does not know,
     with those it does.
     """
@@ -50,7 +51,7 @@ def find(
     at_most = [f"{name}={value}" for name, value in (most or {}).items()]
     requirements, goal = read_all(at_least, at_most, best, flow_ml_min)
     design = load(source, *changes, **tables)
-    keys = None if free is None else tuple(free)
+    keys = None if free is None else free_of(design, free)
     return run_find(FindRequest(design, requirements, goal, keys, tries, optuna, storage, sure))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ from sbafab.cli.progress import shown_progress
 from sbafab.design.files import changed_keys, name_of, template_names
 from sbafab.errors import DesignError
 from sbafab.models.figures import FLAGS
+from sbafab.models.formulas import MOST_PRESSURE, is_near_burst
 from sbafab.output.schema_ids import FIND_SCHEMA
 from sbafab.search.find import (
     FOUND,
@@ -325,15 +327,17 @@ def print_result(result: FoundDesign, origin: str, target: Path) -> None:
     _print_more_tries(result)
     count = _counted_requirements(result)
     print_verdict(
-        f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}", target
+        f"{target} meets {count}. Next: sbafab generate {shlex.quote(str(target))}",
+        target,
     )
 
 
 def _counted_requirements(result: FoundDesign) -> str:
-    count = len(result.problem.requirements)
-    return (
-        "the requirement" if count == 1 else f"all {count} requirements" if count else "all rules"
-    )
+    rows = result.problem.requirements
+    is_sure = result.problem.sure is not None
+    is_median = not is_sure and any(row.quantity.label in result.intervals for row in rows)
+    every = "the requirement" if len(rows) == 1 else f"all {len(rows)} requirements"
+    return f"{every if rows else 'all rules'}{' in the median' if is_median else ''}"
 
 
 def _print_quantities(result: FoundDesign) -> None:
@@ -383,10 +387,7 @@ def _print_more_tries(result: FoundDesign) -> None:
 
 def _print_ends(result: FoundDesign) -> None:
     for end in result.ends:
-        span = end.high - end.low
-        low, high = end.low, end.high + span
-        if end.value <= end.low:
-            low, high = max(end.step, end.low - span), end.high
+        low, high = end.wider
         print_line(
             f"  {end.key} = {end.value:g} is at the end of its range, {end.low:g} to {end.high:g}; "
             f"widen it with --free {end.key}={low:g}:{high:g}:{end.step:g}"
@@ -398,8 +399,26 @@ def _print_miss(result: FoundDesign) -> None:
     _print_more_tries(result)
     print_failure(
         f"Search failed: none of {result.tries} designs meets all requirements; nothing was "
-        "written. Relax a requirement, or vary more keys with --free KEY=LOW:HIGH:STEP"
+        f"written. Relax a requirement{_more_pressure(result)}, or vary more keys with --free "
+        "KEY=LOW:HIGH:STEP"
     )
+
+
+def _more_pressure(result: FoundDesign) -> str:
+    """Return the advice for a missed force: the same one at more pressure; empty for others."""
+    for row in result.problem.requirements:
+        quantity, laminate = row.quantity, result.best.laminate
+        if quantity.name != "force" or not row.at_least or laminate is None:
+            continue
+        kpa = max(USEFUL_KPA, 2 * (quantity.kpa or 0.0))
+        is_allowed = kpa <= MOST_PRESSURE and not is_near_burst(laminate, kpa)
+        if is_allowed and not row.holds(result.best.judged(row)):
+            return f", ask for the force at more pressure, {replace(quantity, kpa=kpa).label}"
+    return ""
+
+
+USEFUL_KPA = 50.0
+"""Pressure that is proposed for a force, unless it was missed at half of it or more."""
 
 
 def _print_front(result: FoundDesign) -> None:

@@ -630,7 +630,7 @@ def _find() -> dict[str, Any]:
         },
         missed=array(TEXT),
         binds=array(of(Binding)),
-        range_ends=array(of(RangeEnd, "step")),
+        range_ends=array(of(RangeEnd, "step", "above")),
         without_room=array(of(Spare)),
         front=array(shown),
         on_front=COUNT,

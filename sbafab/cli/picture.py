@@ -22,8 +22,9 @@ from sbafab.cli.progress import shown_progress
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form, near_discs
+from sbafab.models.formulas import refuse_beyond_burst, refuse_pressure
 from sbafab.models.intervals import factors_of
-from sbafab.models.stack import stack
+from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.reports.inflated_picture import (
     MOVING,
     WHY,
@@ -147,7 +148,11 @@ def _draw_flat(design: Design, wish: PictureRequest, path: Path) -> None:
 def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
     laminate = build(design)
     with shown_progress(False) as progress:
-        inflated = stack(design, laminate, factors=factors_of(design), form=model_form(design))
+        pressures = wish.pressures_kpa.values()
+        refuse_pressure([*pressures])
+        refuse_beyond_burst(laminate, max(pressures))
+        most = max(MOST_PRESSURE, *pressures)
+        inflated = stack(design, laminate, most, factors_of(design), model_form(design))
         pose = write_picture(
             laminate,
             inflated,
@@ -163,10 +168,10 @@ def _draw_inflated(design: Design, wish: PictureRequest, path: Path) -> None:
         )
     for sentence in inflated.counterparts.values():
         print_wrapped(f"({sentence})")
-    pressures = ", ".join(f"{pressure:.3g}" for pressure in pose.pressures)
+    each = ", ".join(f"{pressure:.3g}" for pressure in pose.pressures)
     volumes = ", ".join(f"{volume:.0f}" for volume in pose.volumes)
     print_verdict(
-        f"{design.name} drawn: {pressures} kPa, {volumes} ul, tip {pose.height:.2f} mm high, "
+        f"{design.name} drawn: {each} kPa, {volumes} ul, tip {pose.height:.2f} mm high, "
         f"bent {pose.bend:.1f} degrees. Written to {path}",
         path,
     )

@@ -285,7 +285,7 @@ class Motion:
                 if lacks.any():
                     raise DesignError(
                         f"the chambers would need more than {self.stack.most_pressure:g} kPa; ask "
-                        "for less, or make the stack with a larger most_pressure"
+                        "for less"
                     )
                 return now.pose
             ahead = self._newton_step(missed, now, counts, least)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,11 +18,13 @@ from typing import Any
 
 import tomli_w
 
+from sbafab.actuators import build
 from sbafab.design.files import KIT, Change, design_path, kit_names, override, read_toml, shown
 from sbafab.design.kits import kit_path
 from sbafab.design.records import Design, Free, keys_of
-from sbafab.errors import DesignError, OutputError
+from sbafab.errors import DesignError, OutputError, SbafabError
 from sbafab.laminate.laminate import Laminate
+from sbafab.models.balloons import balloons_of, has_balloons
 from sbafab.models.figures import FLAGS, Flag
 from sbafab.models.intervals import uncertainty_of
 from sbafab.models.paper import Counterpart
@@ -29,9 +32,11 @@ from sbafab.process import Progress, ignore_progress
 from sbafab.rules.finding import Place
 from sbafab.search.quantities import (
     AS_DRAWN,
+    AT_PRESSURE,
     RequestedQuantity,
     Subject,
     group_of,
+    read_quantity,
     refuse_unknown_key,
     shown_interval,
     shown_value,
@@ -158,7 +163,8 @@ class FoundDesign:
     @cached_property
     def _subject(self) -> Subject:
         assert self.best.laminate is not None
-        return Subject(self.problem.design.with_(dict(self.best.values)), self.best.laminate)
+        design = self.problem.design.with_(dict(self.best.values))
+        return self.problem.subject(design, self.best.laminate)
 
     @property
     def broken_rules(self) -> list[str]:
@@ -190,7 +196,38 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
             f"the search may change no key of {request.design.name}; name one with "
             "--free KEY=LOW:HIGH:STEP"
         )
+    if not any(key.key.startswith(OF_FILMS) for key in narrowed):
+        _refuse_unknown_films(quantities, request.design)
     return tuple(narrowed)
+
+
+OF_FILMS = ("films.", "layup.")
+"""Beginnings of keys that change a design's films."""
+KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
+"""Quantities that are known or not by a design's films alone, and quick to evaluate."""
+
+
+def _refuse_unknown_films(quantities: Sequence[RequestedQuantity], design: Design) -> None:
+    """Raises DesignError for a quantity that is not known of a design's films, whatever its sizes:
+    no candidate could be evaluated.
+    """
+    try:
+        laminate = build(design)
+    except SbafabError:
+        return  # the search may start from sizes that cannot be
+    subject, form = Subject(design, laminate), design.form
+    has_modulus = all(layer.film.elastic for layer in laminate.tpe_layers)
+    for quantity in quantities:
+        is_moved = quantity.name in AT_PRESSURE or quantity.name == "time"
+        try:
+            if quantity.name in KNOWN_BY_FILM:
+                subject.value(quantity, lambda: math.nan)
+            elif quantity.share:
+                subject.value(read_quantity("reference_stroke"), lambda: math.nan)
+            if is_moved and has_balloons(form) and not has_modulus:
+                balloons_of(design, laminate)
+        except DesignError as error:
+            raise DesignError(f"{quantity.label}: {error}") from None
 
 
 def _refuse_unsure(request: FindRequest, sure: float) -> None:
@@ -294,7 +331,7 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
     widen_ranges(space)
     point, best = space.best()
     if best.refused:
-        raise DesignError(f"no design could be made: {best.refused}")
+        raise DesignError(_commonest_reason(space))
     shown, count = pareto_front(space, best) if best.holds else ([], 0)
     return FoundDesign(
         problem,
@@ -307,6 +344,15 @@ def find(request: FindRequest, progress: Progress = ignore_progress) -> FoundDes
         request.tries <= len(space.trials) < space.size,
         space.free,
     )
+
+
+def _commonest_reason(space: SearchSpace) -> str:
+    """Return why most candidates were refused, in the words of the nearest one."""
+    refused = sorted(space.trials.values(), key=lambda trial: trial.rank)
+    counts = Counter(trial.refused_at for trial in refused)
+    nearest = max(refused, key=lambda trial: counts[trial.refused_at])
+    count = counts[nearest.refused_at]
+    return f"no design could be made: {nearest.refused} (so {count} of {len(refused)} tried)"
 
 
 # The diagnosis of a search: binding constraints, tight rules, range ends, the Pareto front.
@@ -341,8 +387,8 @@ class Spare:
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """A key at the end of its range that would be better beyond: ``low`` to ``high`` in steps of
-    ``step``, mm or a number of balloons, as the key is.
+    """A key at the end of its range that would be better beyond, ``above`` or below: ``low`` to
+    ``high`` in steps of ``step``, mm or a number of balloons, as the key is.
     """
 
     key: str
@@ -350,6 +396,15 @@ class RangeEnd:
     low: float
     high: float
     step: float
+    above: bool
+
+    @property
+    def wider(self) -> tuple[float, float]:
+        """Ends of a range twice as wide, and at least a step wider, towards what is better."""
+        span = max(self.high - self.low, self.step)
+        if self.above:
+            return self.low, self.high + span
+        return max(self.low - span, min(self.step, self.low - self.step)), self.high
 
 
 def without_room(best: Trial) -> list[Spare]:
@@ -409,7 +464,8 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> list[RangeE
                 round(free.low + step * free.step, 6)
                 for step in (space.lows[axis], space.highs[axis])
             )
-            ends.append(RangeEnd(free.key, space.number(axis, point), low, high, free.step))
+            above = neighbour[axis] > space.highs[axis]
+            ends.append(RangeEnd(free.key, space.number(axis, point), low, high, free.step, above))
     return ends
 
 

@@ -71,7 +71,7 @@ from sbafab.models.paper import (
 )
 from sbafab.models.paper import STACK as ELASTIC_STACK
 from sbafab.models.pneumatics import seconds
-from sbafab.models.stack import Stack, stack
+from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 
 
 class QuantityName(NamedTuple):
@@ -358,13 +358,14 @@ class Subject:
     """A design whose quantities are evaluated; each is computed once.
 
     ``given``: factors in place of those of the design's calibration, ``origin`` the subject at the
-    latter, whose stack serves the other factors where it can.
+    latter, whose stack serves the other factors where it can. Its maps reach ``most_kpa``.
     """
 
     design: Design
     laminate: Laminate
     given: Factors | None = None
     origin: Subject | None = None
+    most_kpa: float = MOST_PRESSURE
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
@@ -468,7 +469,7 @@ class Subject:
         if factors == self.factors:
             return self
         return self._others.setdefault(
-            factors, Subject(self.design, self.laminate, factors, origin=self)
+            factors, Subject(self.design, self.laminate, factors, self, self.most_kpa)
         )
 
     def interval(
@@ -509,7 +510,7 @@ class Subject:
             )
             if moved is not None:
                 return moved
-        return stack(self.design, self.laminate, factors=self.factors)
+        return stack(self.design, self.laminate, self.most_kpa, self.factors)
 
     def _stroke(self, kpa: float) -> float:
         if isinstance(self.design.form.pockets, Slots):

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import traceback
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sbafab.actuators import build
 from sbafab.design.files import shown
 from sbafab.design.records import Design, Free, keys_of
+from sbafab.design.units import millimetres
 from sbafab.errors import BeyondError, DesignError, GeometryError
 from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.mechanisms import ASKED
 from sbafab.models.paper import WATER_FLOW
+from sbafab.models.stack import MOST_PRESSURE
 from sbafab.output.checked import Checked, limits, refuse_undoable
 from sbafab.process import Progress
 from sbafab.rules.deck import run_deck
@@ -21,6 +24,7 @@ from sbafab.search.measure import RuleMargin, margins
 from sbafab.search.quantities import (
     RequestedQuantity,
     Subject,
+    kpa_of,
     named_pressure,
     read_limit,
     read_quantity,
@@ -141,8 +145,8 @@ def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[
 
 YIELD = "registration-yield"
 IMPOSSIBLE = 1e6
-"""By how much a design that cannot be made misses: by more than any that can, and by the excess
-where its film would not stand what it is asked for."""
+"""By how much a design misses whose film would not stand what it is asked for, and by the excess:
+by more than any that does. One that cannot be made at all misses by twice as much."""
 GridPoint = tuple[int, ...]
 """A design by the step at which each free key stands."""
 
@@ -154,7 +158,8 @@ class Trial:
     ``values`` are those of the free keys, ``figures`` by quantity in its unit: mm, N, g or a share.
     ``missed`` is by what share requirements and rules are missed, all together; 0 where none is.
     ``cost``, in the unit of the goal, is the less the better; ``mass`` is in g. ``refused``
-    says why no such design can be made. ``intervals``, by quantity in its unit, are those whose
+    says why no such design can be made, ``refused_at`` is the place in the program that said so:
+    one a reason, whatever its numbers. ``intervals``, by quantity in its unit, are those whose
     ends are held against limits, where requirements are to hold with a probability. ``words``:
     number of keys, of those that are words, that differ from the starting design's.
     """
@@ -166,6 +171,7 @@ class Trial:
     cost: float = 0.0
     mass: float = 0.0
     refused: str = ""
+    refused_at: str = ""
     laminate: Laminate | None = field(default=None, repr=False, compare=False)
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     words: int = 0
@@ -222,6 +228,11 @@ class SearchProblem:
         """The quantities to evaluate: those of the requirements first, then the goal's."""
         return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
+    def subject(self, design: Design, laminate: Laminate) -> Subject:
+        """Return a candidate to evaluate, up to the highest pressure of the quantities."""
+        pressures = [kpa for each in self.quantities if (kpa := kpa_of(each)) is not None]
+        return Subject(design, laminate, most_kpa=max(MOST_PRESSURE, *pressures, 0.0))
+
 
 def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
     """Return the candidate with these values; without rules, only requirements count: quicker."""
@@ -235,13 +246,15 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
             checked = Checked(design, laminate, findings)
             if not checked.failed:
                 refuse_undoable([checked])
-        subject = Subject(design, laminate)
+        subject = problem.subject(design, laminate)
         figures = _figures(problem, subject, rules)
         intervals = {} if problem.sure is None else _intervals(problem, subject, problem.sure)
     except (DesignError, GeometryError) as error:
         message = " ".join(str(error).split())
-        excess = error.excess if isinstance(error, BeyondError) else 0.0
-        return Trial(values, missed=IMPOSSIBLE + excess, refused=message)
+        excess = error.excess if isinstance(error, BeyondError) else IMPOSSIBLE
+        return Trial(
+            values, missed=IMPOSSIBLE + excess, refused=message, refused_at=_raised_at(error)
+        )
     missed = sum(
         -min(0.0, requirement.margin(judged(requirement, figures, intervals)) + CLOSE)
         for requirement in problem.requirements
@@ -249,7 +262,13 @@ def evaluated(problem: SearchProblem, values: Mapping[str, Any], with_rules: boo
     missed += sum(_short(requirement) for requirement in (rules or {}).values())
     cost = problem.goal.cost(figures[problem.goal.quantity.label])
     mass = _mass(laminate)
-    return Trial(values, figures, rules, missed, cost, mass, "", laminate, intervals)
+    return Trial(values, figures, rules, missed, cost, mass, laminate=laminate, intervals=intervals)
+
+
+def _raised_at(error: Exception) -> str:
+    """Return the file and line that raised an error."""
+    *_, (frame, line) = traceback.walk_tb(error.__traceback__)
+    return f"{frame.f_code.co_filename}:{line}"
 
 
 def _mass(laminate: Laminate) -> float:
@@ -386,6 +405,22 @@ def read_free(
     return tuple(free.values())
 
 
+def free_of(design: Design, free: Iterable[Free | str]) -> tuple[Free, ...]:
+    """The keys that a program names, in place of the family's own: each a ``Free`` or a text, or
+    one text alone. Raises DesignError.
+    """
+    each = [free] if isinstance(free, str) else list(free) if isinstance(free, Iterable) else [free]
+    for key in each:
+        if not isinstance(key, Free | str):
+            raise DesignError(
+                f"free holds {shown(key)}; give texts KEY=LOW:HIGH:STEP, for example "
+                '["chamber.diameter=3:12:0.1"]'
+            )
+    texts = [key for key in each if isinstance(key, str)]
+    records = [key for key in each if isinstance(key, Free)]
+    return (*records, *read_free(design, texts, [key.key for key in design.free]))
+
+
 def _free_of(text: str) -> Free:
     """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` of a key that takes one of some words."""
     stepped = read_varied(text, "--free")
@@ -398,7 +433,7 @@ def _free_of(text: str) -> Free:
             f"--free {shown(text)} is not KEY=LOW:HIGH:STEP; write for example "
             "--free chamber.diameter=3:12:0.1 or --free registration.method=channel-pin,ears"
         )
-    step = numbers[1] - numbers[0] if len(numbers) > 1 else 1
+    step = numbers[1] - numbers[0] if len(numbers) > 1 else millimetres(parts[2])
     return replace(Free(stepped.key, numbers[0], numbers[-1], 1), step=round(step, 9))
 
 

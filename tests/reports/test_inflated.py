@@ -208,3 +208,18 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     assert moving.exit_code == 2
     assert "a .png or .glb shows it flat" in moving.output
     assert not (tmp_path / "shown.webp").exists()
+
+
+def test_a_picture_goes_to_the_pressures_of_predict(tmp_path: Path) -> None:
+    """A film that nobody has burst to 1000 kPa, the paper's to its burst pressure."""
+    film = ["product=TPU 85A", "thickness=0.1", "modulus=20", "poisson=0.45"]
+    tpu = [part for word in film for part in ("--set", f"films.tpe.{word}")]
+    drawn = ["--set", "stack.balloons=2", "--width", "100", "--to", str(tmp_path / "a.png")]
+    runner = CliRunner()
+    ended = runner.invoke(app, ["picture", "1dof-5mm", *tpu, *drawn, "--pressure", "300"])
+    assert ended.exit_code == 0, ended.output
+    assert "300 kPa" in ended.output
+    for more, pressure, said in ((tpu, "1200", "0 to 1000 kPa"), ([], "400", "burst pressure")):
+        ended = runner.invoke(app, ["picture", "1dof-5mm", *more, *drawn, "--pressure", pressure])
+        assert ended.exit_code == 2
+        assert said in " ".join(ended.output.split())
