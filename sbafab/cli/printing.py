@@ -191,6 +191,8 @@ def print_lines(findings: Sequence[Finding], verbose: bool = False) -> None:
         line = Text(f"{finding.rule:{wide}}  ")
         line.append(f"{finding.verdict:7}", style=COLOURS[finding.verdict])
         measured = short_figure(finding.measured, _unit(finding))
+        if finding.verdict == "pass" and finding.measured is finding.limit is None:
+            measured = "not compared"
         line.append(f"  {measured:>13}  {limit_text(finding):>14}")
         line.rstrip()
         out.print(line, soft_wrap=True)

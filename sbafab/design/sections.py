@@ -486,7 +486,8 @@ class Acceptance(Section):
     """How long it is held."""
     proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
     """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower where 60 % of the
-    estimated burst pressure is less."""
+    estimated burst pressure is less. For a film that nobody has burst these 150 kPa are left blank,
+    and any other pressure is printed as it is stated."""
     proof_seconds: float = Field(default=60.0, gt=0, le=36000)
     """How long it is held."""
     fitting: str = Field(default=FITTING, min_length=1, max_length=200)

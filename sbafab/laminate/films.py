@@ -65,6 +65,14 @@ class Film:
         """Product and thickness in one text: "Stretchlon 200, 0.038 mm"."""
         return film_name(self.product, self.thickness)
 
+    @property
+    def written(self) -> str:
+        """The material as it is written where a film is taken in hand: "TPE", with the product in
+        parentheses where that is not the paper's.
+        """
+        is_another = self.material == FIRST[0] and self.product != PAPER_PRODUCT
+        return f"{self.material} ({self.product})" if is_another else self.material
+
     def is_a(self, product: str, thickness: float) -> bool:
         """Return True for this product of this thickness in mm, within the films' tolerance."""
         return self.product == product and abs(self.thickness - thickness) <= GAUGE * thickness

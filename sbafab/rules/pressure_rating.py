@@ -67,7 +67,8 @@ RULE = Rule(
     NAME,
     check,
     Explanation(
-        "the estimated burst pressure is the working pressure times the safety factor",
+        "the estimated burst pressure is the working pressure times the safety factor; a film that "
+        "nobody has burst is not compared, and warned of where a working pressure is stated",
         "A film under too much pressure bursts, or its bonds peel, at first use or after many.",
         "Work at less pressure, take smaller pockets or a thicker film.",
         (KEY, "acceptance.safety_factor", "chamber.diameter", "films.tpe.thickness"),

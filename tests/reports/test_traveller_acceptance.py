@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import pytest
 from lxml import html as lxml_html
@@ -13,10 +14,12 @@ from sbafab.laminate.burst import burst
 from sbafab.pressing.schedule import schedule
 from sbafab.reports.traveller.acceptance import proof
 from sbafab.reports.traveller.bench import bench_html, film_classes, pressure_range
+from sbafab.reports.traveller.bill import times
 from sbafab.reports.traveller.job import Job, Work
 from sbafab.reports.traveller.page import traveller_html
 
 SHA = "0123456789abcdef" * 4
+TPU = ("films.tpe.product=TPU", "films.tpe.thickness=0.1")
 
 
 def work_of(template: str, *changes: str) -> Work:
@@ -48,6 +51,7 @@ def words_of(work: Work) -> str:
         ("radial-15mm", (), 367.0 * 2.5 / (2 * 10 / math.pi), 85.0),
         ("1dof-5mm", ("acceptance.proof_pressure_kpa=120",), 367.0, 120.0),
         ("1dof-5mm", ("films.tpe.product=TPU", "films.tpe.thickness=0.038"), None, None),
+        ("1dof-5mm", (*TPU, "acceptance.proof_pressure_kpa=60"), None, 60.0),
     ],
 )
 def test_proof_pressure_stays_well_below_the_burst(
@@ -90,6 +94,53 @@ def test_a_film_that_nobody_burst_gets_a_blank() -> None:
     words = words_of(work_of("1dof-5mm", "films.tpe.product=TPU", "films.tpe.thickness=0.038"))
     assert re.search(r"to _+ kPa, hold for 60 s", words)
     assert "Burst one actuator, write down the pressure" in words
+
+
+def test_a_stated_proof_pressure_is_printed_for_any_film() -> None:
+    words = words_of(work_of("1dof-5mm", *TPU, "acceptance.proof_pressure_kpa=60"))
+    assert "to 60 kPa, hold for 60 s" in words
+    assert "proof test 60 kPa for 60 s" in words
+
+
+@pytest.mark.parametrize(
+    ("template", "changes", "is_said"),
+    [
+        ("3dof-15mm", (), True),
+        ("1dof-10mm", (), False),
+        ("3dof-15mm", TPU, False),
+        ("radial-15mm", (), False),
+    ],
+)
+def test_what_the_papers_balloons_unfold_at_is_said_of_them_alone(
+    template: str, changes: tuple[str, ...], is_said: bool
+) -> None:
+    assert ("0.95 kPa" in words_of(work_of(template, *changes))) == is_said
+
+
+def test_another_film_is_named_where_it_is_taken_in_hand(sheet_files: Any) -> None:
+    work = work_of("1dof-5mm", *TPU)
+    sheets = sheet_files(work.laminate)
+    page = lxml_html.fromstring(
+        traveller_html(work.design, work.laminate, work.schedule, sheets, work.job)
+    )
+    words = " ".join(page.text_content().split())
+    heads = ["".join(cell.itertext()) for cell in page.xpath("//thead//th")]
+    assert heads.count("Film: TPE (TPU)") == 2
+    assert "TPE (TPU), 0.1 mm thick: lay it flat" in words
+    assert "sheets/TPE_1.dxf: TPE (TPU), " in words
+    (lot,) = page.xpath("//table[@class='record']//th[starts-with(., 'TPE')]")
+    assert " ".join(lot.itertext()) == "TPE TPU"
+    assert "TPE (" not in words_of(work_of("1dof-5mm"))
+
+
+def test_the_total_counts_what_is_known_where_press_minutes_are_not() -> None:
+    work = work_of("1dof-5mm", *TPU)
+    rows = {row.what: row.took for row in times(work)}
+    minutes = [float(rows[n].split()[0]) for n in ("Handling", "Tests")]
+    minutes += [float(rows[f"{n} the plate"].split()[0]) for n in ("Warming", "Cooling")]
+    assert rows["In the press"] == "________ min"
+    least = f"{sum(minutes) / 60:.1f}"
+    assert rows["Total, one actuator"] == f"at least {least} h and the press minutes"
 
 
 def test_every_copy_has_its_proof_test() -> None:

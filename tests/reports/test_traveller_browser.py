@@ -132,6 +132,23 @@ def test_the_browser_reads_it_as_it_was_written(html: str, tmp_path: Path) -> No
         assert shown.count(mark) == html.count(mark) > 0
 
 
+BEYOND = """<script>addEventListener("load", () => {
+  const frames = [...document.querySelectorAll("article.step")];
+  const beyond = frame => [...frame.querySelectorAll("*")].filter(part =>
+    part.getBoundingClientRect().right > frame.getBoundingClientRect().right + 0.5);
+  document.title = `${frames.length} frames, ${frames.flatMap(beyond).length} beyond`;
+});</script></body>"""
+
+
+def test_nothing_runs_over_the_frame_of_a_press_step(html: str, tmp_path: Path) -> None:
+    """Also in the wide letters of a machine without Helvetica."""
+    page = tmp_path / "page.html"
+    wide = html.replace("</head>", "<style>html { font-family: 'DejaVu Sans' }</style></head>")
+    page.write_text(wide.replace("</body>", BEYOND))
+    shown = chromium(tmp_path, page, "--window-size=1000,1400", "--dump-dom")
+    assert "<title>4 frames, 0 beyond</title>" in shown
+
+
 def test_it_prints_without_scripts(html: str, tmp_path: Path) -> None:
     page, printed = tmp_path / "page.html", tmp_path / "page.pdf"
     # Chromium prints nothing with scripts switched off as a whole; a policy stops the page's own.

@@ -6,8 +6,10 @@ import math
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 import sbafab
+from sbafab.cli import app
 from sbafab.laminate.burst import burst
 from sbafab.rules.finding import Finding
 
@@ -65,5 +67,11 @@ def test_a_stated_pressure_fails_and_an_unstated_one_warns() -> None:
 def test_a_film_that_nobody_burst_is_not_compared() -> None:
     film = {"product": "TPU", "thickness": 0.1}
     assert rating("1dof-5mm", films={"tpe": film}).verdict == "pass"
+    tpu = ["--set", "films.tpe.product=TPU", "--set", "films.tpe.thickness=0.1"]
+    lines = CliRunner().invoke(app, ["check", "1dof-5mm", *tpu]).output.splitlines()
+    (row,) = (line.split(maxsplit=2) for line in lines if line.startswith("pressure-rating"))
+    assert row[1:] == ["pass", "not compared"]
+    explained = CliRunner().invoke(app, ["explain", "pressure-rating"]).output
+    assert "not compared" in " ".join(explained.split())
     stated = rating("1dof-5mm", films={"tpe": film}, acceptance={"working_pressure_kpa": 10.0})
     assert (stated.verdict, stated.measured) == ("warn", None)

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from sbafab.design.identity import adhesive_for, cure_hours, kit_of, tube_name
-from sbafab.laminate.burst import burst
+from sbafab.design.records import Discs
+from sbafab.design.sections import Acceptance
+from sbafab.laminate.burst import RADIUS, burst
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.pressing.cycles import serial
 from sbafab.pressing.schedule import joined_words
@@ -47,6 +49,8 @@ def values(work: Work) -> dict[str, Any]:
         "is_jamming": mechanism is not None and mechanism.kind == "jamming",
         "proof": proof(work),
         "ramp": RAMP,
+        "unfolds_as_measured": design.form.pockets == Discs((2 * RADIUS,) * laminate.balloons)
+        and all(layer.film.is_the_papers for layer in laminate.tpe_layers),
         "leak_words": leak_words(work),
         "proof_words": proof_words(work),
         "wrap": design.form.wrap,
@@ -144,6 +148,8 @@ def _filled(work: Work) -> list[str]:
 
 SHARE = 0.6
 """Of the estimated burst pressure, above which nothing is proved: ours."""
+USUAL_PROOF = Acceptance().proof_pressure_kpa
+"""kPa, below the burst pressure of the paper's film; it says nothing of another film."""
 STEP = 5.0
 """kPa to which a lowered proof pressure is rounded down."""
 RAMP = 10
@@ -158,13 +164,21 @@ class Proof(NamedTuple):
 
 
 def proof(work: Work) -> Proof:
-    """Return the pressure of the proof test: the kit's, or less for what would burst near it."""
+    """Return the pressure of the proof test: the kit's, or less for what would burst near it. Of a
+    film that nobody has burst it is what the kit or the design states in place of the usual one.
+    """
     kit_pressure = work.design.acceptance.proof_pressure_kpa
     estimate = burst(work.laminate)
     forces = (
         f"the paper gives forces at {FORCE_KPA:g} kPa and burst three actuators with pockets of "
         f"5 mm at {BURST.value:g} ± {BURST.error:g} kPa"
     )
+    if estimate is None and kit_pressure != USUAL_PROOF:
+        return Proof(
+            kit_pressure,
+            f"{forces}; nobody has burst this film, and {kit_pressure:g} kPa is what "
+            "acceptance.proof_pressure_kpa states",
+        )
     if estimate is None:
         return Proof(
             None,

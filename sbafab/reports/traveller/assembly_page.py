@@ -312,7 +312,7 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
     laser = units.minutes(bill.laser_minutes(job.works[0].work))
     basis = bill.laser_basis(job.works[0].work)
     rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
-    basis = "estimate, each plate after the other; warming the press comes before"
+    basis = "estimate, each plate after the other; warming cold platens comes before"
     rows.append(bill.Time("Warming and cooling", units.minutes(waited), basis))
     return [*rows, _total_time(job, None if total is None else total + waited, cure)]
 

@@ -104,7 +104,7 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
     if film.faces is not None and film.faces[0] != film.faces[1]:
         up = f" Its {film.faces[0]} face is up, its {film.faces[1]} face down: mark the upper one."
     return Action(
-        f"{film.material}, {thin} thick: {how}{sticks}{up} No tab holds a part: {count} come free"
+        f"{film.written}, {thin} thick: {how}{sticks}{up} No tab holds a part: {count} come free"
         f"{weight}. (Our proposal, not tried.)"
     )
 

@@ -403,17 +403,21 @@ def _waits(what: str, steps: int, each: float, basis: str) -> Time:
 
 
 def total_time(work: Work) -> Time:
-    """Return the hours that one actuator takes, and what they are made of."""
+    """Return the hours that one actuator takes, and what they are made of; at least what is known
+    where the press minutes are not.
+    """
     plan = work.schedule
     each, row = waiting(work), "Total, one actuator"
-    handled = plan.estimated_build_minutes
-    if handled is None:
+    if not plan.is_timed or plan.seams:
         basis = "nobody has timed this design; its tests come when the adhesive has cured"
         return Time(row, units.hours(None), basis)
-    worked = handled + len(plan.steps) * (each.warm + each.cool)
+    pressed = plan.total_press_minutes
+    least, more = ("", "") if pressed is not None else ("at least ", " and the press minutes")
+    worked = HANDLING_MINUTES + (pressed or 0.0) + len(plan.steps) * (each.warm + each.cool)
     cures = f"{each.cure / 60:g} h for the adhesive, " if each.cure else ""
     basis = (
-        f"{worked / 60:.1f} h until its tubes are glued, {cures}{units.minutes(each.test)} of "
-        "tests; warming the press not included"
+        f"{worked / 60:.1f} h{more} until its tubes are glued, {cures}{units.minutes(each.test)} of "
+        "tests; warming cold platens not included"
     )
-    return Time(row, f"{(worked + each.cure + each.test) / 60:.1f} h", basis)
+    hours = (worked + each.cure + each.test) / 60
+    return Time(row, f"{least}{hours:.1f} h{more}", basis)

@@ -84,6 +84,9 @@ def context(work: Work) -> dict[str, Any]:
         "bill": bill.bill(work),
         **to_be_ready([work]),
         "others": other_marks,
+        "other_films": joined_words(
+            [film.written for film in films(laminate) if film.written != film.material]
+        ),
         "sheet_rows": sheet_rows(work.design, work.sheets, {work.design.name: "", **other_marks}),
         "program": work.design.sheets.program,
         "cuts": bill.cut_list(work),
@@ -181,6 +184,7 @@ class SheetRow:
     """A sheet as it stands in the cut list; ``note`` tells how a long one is drawn."""
 
     sheet: SheetFile
+    film: Film
     picture: str
     counts: str
     size: str
@@ -208,6 +212,7 @@ def sheet_rows(
         rows.append(
             SheetRow(
                 sheet,
+                films[sheet.material],
                 sheet_map(sheet, films[sheet.material], marks, f"sheet-{number}"),
                 ", ".join(counts),
                 units.size(sheet.width, sheet.length),

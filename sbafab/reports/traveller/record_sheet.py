@@ -66,13 +66,14 @@ def record_tables(
     design: Design, laminate: Laminate, schedule: Schedule
 ) -> tuple[RecordTable, ...]:
     """Return the tables of a design's record page: materials, press steps, tests."""
-    films = list(dict.fromkeys(layer.film.material for layer in laminate.layers))
+    films = {layer.film.material: layer.film for layer in laminate.layers}
     items = [*films, *([ADHESIVE] if laminate.tube_count else [])]
+    products = ["" if film.written == film.material else film.product for film in films.values()]
     glue = adhesive_for(design, laminate.glued_films) or ""
     unsorted: list[Step | SeamStep] = [*schedule.steps, *schedule.seams]
     steps = sorted(unsorted, key=lambda step: step.step)
     tables = (
-        _table("Materials", MATERIAL_FIELDS, "item", items, ["" for _ in films] + [glue]),
+        _table("Materials", MATERIAL_FIELDS, "item", items, [*products, glue]),
         _table(
             "Steps",
             PRESS_FIELDS,
