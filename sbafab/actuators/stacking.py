@@ -339,7 +339,8 @@ def check_neck(design: Design, pockets: list[Region]) -> None:
     room = min(pocket.distance_to_edge((0.0, 0.0)) for pocket in pockets)
     if ring >= room:
         largest = design.bore.diameter - 2 * (ring - room)
-        remedy = f"make the bore less than {largest:.3f}" if largest > 0 else "widen the pocket"
+        remedy = f"widen the chamber by more than {2 * (ring - room):.3f}"
+        remedy += f", or make the bore less than {largest:.3f}" if largest > 0 else ""
         raise DesignError(
             f"bore.diameter = {design.bore.diameter:g} with a neck ring of bond.width = "
             f"{design.bond.width:g} round it (outer radius {ring:.3f}) does not fit a pocket that "

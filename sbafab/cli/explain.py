@@ -15,6 +15,7 @@ from sbafab.cli.printing import print_facts, print_json
 from sbafab.output.schema_ids import EXPLAIN_SCHEMA, EXPLAINED_SCHEMA
 from sbafab.rules.explained import EXPLAINED
 
+MEASURED = "a text with its unit"
 NAMED = "NAME"
 """In a key, a name that the design file chooses, as that of a film or a shape."""
 
@@ -178,6 +179,9 @@ def _allowed(value: Mapping[str, Any]) -> str:
     """Return the choices, kinds and limits of a key."""
     choices = value.get("anyOf", (value,))
     is_length = any("mm" in choice.get("pattern", "") for choice in choices)
+    if any(choice.get("type") == "number" for choice in choices):
+        # A text that stands for a number is one with its unit.
+        choices = [{**row, "type": MEASURED} if "pattern" in row else row for row in choices]
     kinds = [_kind(choice, is_length) for choice in choices if choice.get("type") != "null"]
     return ", or ".join(dict.fromkeys(filter(None, kinds))) or "see its meaning"
 
@@ -188,8 +192,8 @@ def _kind(value: Mapping[str, Any], is_length: bool) -> str:
     kind = str(value.get("type"))
     if kind == "array":
         return "a list of them" if is_length or "items" in value else "a list"
-    if is_length and kind == "string":
-        return "a length with its unit"
+    if kind == MEASURED:
+        return "a length with its unit" if is_length else MEASURED
     words = {"boolean": "true or false", "string": "text", "integer": "a whole number"}
     words["number"] = "mm" if is_length else "a number"
     low = value.get("minimum", value.get("exclusiveMinimum"))

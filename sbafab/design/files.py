@@ -54,6 +54,10 @@ REMOVED: Mapping[str, str] = {
 """Tables, keys ("*": any name) and values of earlier design files: what was removed, what to do."""
 
 
+KEY_UNITS = {"_kpa": "kPa", "minutes": "minutes", "seconds": "s", "hours": "h", "_speed": "mm/s"}
+"""Units of numbers by the ends of their keys."""
+
+
 def listed(values: Iterable[object]) -> str:
     """Return values in quotes, separated by commas."""
     return ", ".join(f'"{value}"' for value in values)
@@ -99,7 +103,8 @@ def sentence(
         return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
     if first["type"] == "missing":
         return f"{field} is missing; add it to the {file}{more}"
-    if not where:
+    # A table is not repeated.
+    if not where or isinstance(first["input"], Mapping):
         return f"{field} {_allowed(first)}{more}"
     return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
 
@@ -152,6 +157,10 @@ def _allowed(problem: Any) -> str:
         "tuple_type": "must be a list in brackets",
         "list_type": "must be a list in brackets",
     }
+    if kind == "float_type" and isinstance(problem["input"], str):
+        key = str(problem["loc"][-1])
+        unit = next((unit for end, unit in KEY_UNITS.items() if key.endswith(end)), "")
+        return plain[kind] + (f" without its unit, in {unit}" if unit else "")
     return plain.get(kind, f"is not allowed: {problem['msg'].lower()}")
 
 

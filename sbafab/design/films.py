@@ -13,7 +13,16 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from sbafab.design.toml_table import Section
-from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
+from sbafab.design.units import (
+    CELSIUS,
+    DENSITIES,
+    MEGAPASCALS,
+    SHORTEST,
+    Length,
+    LengthOrZero,
+    Millimetres,
+    millimetres,
+)
 from sbafab.geometry.offset import Kerf
 from sbafab.laminate.films import (
     PAPER_PRODUCT,
@@ -32,6 +41,18 @@ MOST_FILMS = 20
 """Beside TPE and PTFE."""
 HOTTEST = 400.0
 """C, of any film."""
+Density = Annotated[float, Field(gt=0, le=20000), DENSITIES]
+FilmTemperature = Annotated[float, Field(gt=0, le=HOTTEST), CELSIUS]
+Modulus = Annotated[float, Field(gt=0, le=1e6), MEGAPASCALS]
+
+
+def _poisson(value: object) -> object:
+    if isinstance(value, int | float) and value >= 0.5:
+        raise ValueError("must be less than 0.5; for rubber, which keeps its volume, write 0.49")
+    return value
+
+
+PoissonRatio = Annotated[float, Field(ge=0, lt=0.5), BeforeValidator(_poisson)]
 
 
 def is_kerf(x: float, y: float) -> bool:
@@ -120,7 +141,7 @@ class FaceBonding(Section):
     """The two face materials, in either order; a film without faces has its own name for both."""
     by: BondProcess
     """press, or the tool of a seam: laser, hot-tip, ultrasonic, roller."""
-    temperature_c: float | None = Field(default=None, gt=0, le=1000)
+    temperature_c: Annotated[float, Field(gt=0, le=1000), CELSIUS] | None = None
     """C at which they bond; of a press it must not be more than its temperature."""
     after: str | None = Field(default=None, max_length=32)
     """The bond that must be made before this one."""
@@ -162,13 +183,13 @@ class TpeFilm(Section):
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = PAPER_THICKNESS
     """Thickness of the structural film; another product than the paper's must give it."""
-    density: float | None = Field(default=1122.0, gt=0, le=20000)
+    density: Density | None = 1122.0
     """kg/m3, measured (paper Sec. 3.2.1); mass and weight need it."""
-    melting_point: float | None = Field(default=120.0, gt=0, le=HOTTEST)
+    melting_point: FilmTemperature | None = 120.0
     """C; the press must be hotter."""
-    modulus: float | None = Field(default=PAPER_TPE[0], gt=0, le=1e6)
+    modulus: Modulus | None = PAPER_TPE[0]
     """MPa, Young's (paper Sec. 3.2.1); elastic models and simulators need it."""
-    poisson: float | None = Field(default=PAPER_TPE[1], ge=0, lt=0.5)
+    poisson: PoissonRatio | None = PAPER_TPE[1]
     """Poisson's ratio (paper Sec. 3.2.1), likewise."""
     faces: FilmFaces | None = None
     """What its faces are of; by default both are tpe."""
@@ -200,9 +221,9 @@ class PtfeFilm(Section):
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)] = 0.025
     """Thickness of the mask film."""
-    density: float = Field(default=2200.0, gt=0, le=20000)
+    density: Density = 2200.0
     """kg/m3, handbook value."""
-    temperature_limit: float = Field(default=260.0, gt=0, le=HOTTEST)
+    temperature_limit: FilmTemperature = 260.0
     """C; the usual limit for PTFE in lasting use."""
 
 
@@ -215,16 +236,16 @@ class OtherFilm(Section):
     """What to order."""
     thickness: Annotated[float, Millimetres(SHORTEST, 1)]
     """Its thickness."""
-    density: float | None = Field(default=None, gt=0, le=20000)
+    density: Density | None = None
     """kg/m3; mass and weight need it."""
-    melting_point: float | None = Field(default=None, gt=0, le=HOTTEST)
+    melting_point: FilmTemperature | None = None
     """C; the press must be hotter. A structural film without one stays solid in the press and
     bonds only to films that melt on it."""
-    temperature_limit: float | None = Field(default=None, gt=0, le=HOTTEST)
+    temperature_limit: FilmTemperature | None = None
     """C; the press must stay below. A mask has one."""
-    modulus: float | None = Field(default=None, gt=0, le=1e6)
+    modulus: Modulus | None = None
     """MPa, Young's; elastic models and simulators need it."""
-    poisson: float | None = Field(default=None, ge=0, lt=0.5)
+    poisson: PoissonRatio | None = None
     """Poisson's ratio, likewise."""
     faces: FilmFaces | None = None
     """What its faces are of, for instance a coating and a textile; by default the film's name."""

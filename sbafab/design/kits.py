@@ -40,7 +40,7 @@ from sbafab.design.sections import (
     Sheets,
 )
 from sbafab.design.toml_table import Section, writable
-from sbafab.design.units import Length, millimetres
+from sbafab.design.units import Length, is_measured
 from sbafab.errors import DesignError
 
 DEFAULT = "paper"
@@ -235,15 +235,11 @@ def _without_sources(
 
 
 def _is_number(value: object) -> bool:
-    """Return True if a value is a number, a length with its unit, or a list with one in it."""
+    """Return True if a value is a number, one with its unit, or a list with one in it."""
     if isinstance(value, list):
         return any(map(_is_number, value))
     if isinstance(value, str):
-        try:
-            millimetres(value)
-        except ValueError:
-            return False
-        return True
+        return is_measured(value)
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

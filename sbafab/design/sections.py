@@ -21,7 +21,7 @@ from sbafab import plugins
 from sbafab.design.films import UNCALIBRATED, KerfWidth, Sheet
 from sbafab.design.recipes import MachineName, Recipe
 from sbafab.design.toml_table import Section, writable
-from sbafab.design.units import SHORTEST, Length, LengthOrZero, Millimetres, millimetres
+from sbafab.design.units import CELSIUS, SHORTEST, Length, LengthOrZero, Millimetres, millimetres
 from sbafab.laminate.base_plate import PlateMachine
 from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, film_name
 
@@ -401,7 +401,7 @@ TimeConstant = Annotated[float | Literal["not measured"], BeforeValidator(_time_
 class Press(Section):
     """The heat press: temperature, pressure, minutes, platen."""
 
-    temperature_c: float = Field(default=135.0, gt=0, le=500)
+    temperature_c: Annotated[float, Field(gt=0, le=500), CELSIUS] = 135.0
     """C; between the TPE's melting point and the PTFE's limit."""
     pressure_kpa: float = Field(default=110.0, gt=0, le=10000)
     """On the whole platen."""

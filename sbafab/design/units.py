@@ -1,15 +1,17 @@
-"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; units of pressure
-and flow.
+"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; moduli, densities
+and temperatures likewise; units of pressure and flow.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, PlainValidator
+from pydantic_core import core_schema
 
 MILLIMETRES = {
     "um": 0.001,
@@ -36,6 +38,7 @@ MILLILITRES_PER_MINUTE = {"ml/min": 1.0, "ul/min": 0.001, "ml/s": 60.0, "l/min":
 """How many ml/min each unit is."""
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _WRITTEN = re.compile(rf"\s*([-+]?{_NUMBER})\s*([^\d\s]*)\s*")
+_MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
 
 
 def millimetres(value: object) -> float:
@@ -88,6 +91,52 @@ class Millimetres:
         number = {"type": "number", "minimum": self.least, "maximum": self.most}
         text = {"type": "string", "pattern": rf"^\s*{sign}{_NUMBER}\s*({units})?\s*$"}
         return {"anyOf": [number, text]}
+
+
+@dataclass(frozen=True, eq=False)
+class InUnit:
+    """How a number is read that a file gives alone, in the first of ``units``, or with one of them:
+    their sizes in the first. ``example`` is such a text.
+
+    To be used as ``Annotated[float, Field(gt=0), InUnit(...)]``; the JSON schema has both.
+    """
+
+    units: Mapping[str, float]
+    example: str
+
+    def read(self, value: object) -> object:
+        """Raises ValueError with a sentence that says what is allowed."""
+        if not isinstance(value, str):
+            return value
+        written = _MEASURED.fullmatch(value)
+        if written is None or (written[2] and written[2] not in self.units):
+            first, *others = self.units
+            more = f" (or {', '.join(others)})" if others else ""
+            raise ValueError(
+                f'must be a number, in {first}, or a text with its unit{more}, such as "'
+                f'{self.example}"'
+            )
+        return float(written[1]) * self.units.get(written[2], 1.0)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> Any:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, object]:
+        units = "|".join(map(re.escape, self.units))
+        text = {"type": "string", "pattern": rf"^\s*[-+]?{_NUMBER}\s*({units})?\s*$"}
+        return {"anyOf": [handler(schema), text]}
+
+
+MEGAPASCALS = InUnit({"MPa": 1.0, "kPa": 0.001, "GPa": 1000.0}, "20 MPa")
+CELSIUS = InUnit({"C": 1.0, "\u00b0C": 1.0}, "150 C")
+DENSITIES = InUnit({"kg/m3": 1.0, "g/cm3": 1000.0}, "1200 kg/m3")
+UNITS = (*MILLIMETRES, *MEGAPASCALS.units, *CELSIUS.units, *DENSITIES.units)
+
+
+def is_measured(text: str) -> bool:
+    """Return True for the text of a number, alone or with a unit that files take."""
+    written = _MEASURED.fullmatch(text)
+    return written is not None and written[2] in ("", *UNITS)
 
 
 SHORTEST, LONGEST = 0.001, 1000.0

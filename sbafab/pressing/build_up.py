@@ -187,6 +187,9 @@ def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
     )
 
 
+FEWER = "stack fewer balloons (stack.balloons)"
+
+
 def _refusal(press: Press, thickness: float, under: StackShape) -> str:
     """Return the reason why a pad cannot give the pressure, and a remedy; empty where it can."""
     estimate = pressures(press, thickness, under)
@@ -195,12 +198,13 @@ def _refusal(press: Press, thickness: float, under: StackShape) -> str:
     if estimate.plate <= 0:
         return (
             f"over a stack {under.height:.3f} mm high it does not reach the base plate, and the "
-            f"films take the whole force, {force / under.area:.0f} kPa; make it thicker or softer"
+            f"films take the whole force, {force / under.area:.0f} kPa; {FEWER}, or make it "
+            "thicker or softer"
         )
     if estimate.film > MOST_UNEVEN * press.pressure_kpa:
         return (
             f"over a stack {under.height:.3f} mm high the films would get {estimate.film:.0f} kPa; "
-            "make it thicker or softer"
+            f"{FEWER}, or make it thicker or softer"
         )
     if press.pad_material == "silicone sponge" and pressed > LARGEST_COMPRESSION:
         return (

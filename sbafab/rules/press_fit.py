@@ -1,4 +1,5 @@
-"""press-fit: the laminate fits the heated area; a warning for untested heights and press minutes.
+"""press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
+and for a film that is no elastomer.
 
 Heights are untested above ``validated_balloons``; minutes where no kit or design states them for a
 film.
@@ -14,6 +15,8 @@ from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
 NAME = "press-fit"
+STIFFEST = 1000.0
+"""MPa, Young's modulus above that of the hardest thermoplastic elastomers: ours."""
 
 
 def check(measures: Measures) -> list[Finding]:
@@ -55,15 +58,15 @@ def check(measures: Measures) -> list[Finding]:
                 remedy=remedy,
             )
         )
-    return findings + _unstated(laminate, limits.minutes_for)
+    return findings + _unstated(laminate, limits.minutes_for) + _too_stiff(laminate)
 
 
 RULE = Rule(
     NAME,
     check,
     Explanation(
-        "the laminate lies in the heated area; more than 20 balloons, and films whose minutes "
-        "nobody stated, draw a warning",
+        "the laminate lies in the heated area; more than 20 balloons, films whose minutes nobody "
+        "stated, and films stiffer than any elastomer draw a warning",
         "What lies outside the platen is not bonded; heat may not reach a tall stack's middle.",
         "Make the actuator smaller, tell press.platen_width of a larger press, stack fewer; try "
         "another film on a sample and name it in press.minutes_for.",
@@ -72,6 +75,7 @@ RULE = Rule(
             "press.platen_length",
             "rules.validated_balloons",
             "press.minutes_for",
+            "films.tpe.modulus",
         ),
     ),
     at_most=True,
@@ -87,6 +91,20 @@ def _unstated(laminate: Laminate, stated: tuple[tuple[str, float], ...]) -> list
     remedy = "try the bond on a sample, state the minutes and name the film in press.minutes_for"
     message = f"{remedy}: nobody stated press minutes for {names}, and the schedule leaves them out"
     return [Finding(NAME, "warn", None, None, "", Place(), message, remedy=remedy)]
+
+
+def _too_stiff(laminate: Laminate) -> list[Finding]:
+    """A warning for each film that melts and is stiffer than any elastomer."""
+    findings = []
+    for film in dict.fromkeys(layer.film for layer in laminate.tpe_layers):
+        modulus, _ = film.elastic or (0.0, 0.0)
+        if film.melts and modulus > STIFFEST:
+            remedy = f"check {film.table}.modulus = {modulus:g} MPa, which is no elastomer's"
+            message = f"{remedy}: those have {STIFFEST:g} MPa at most"
+            findings.append(
+                Finding(NAME, "warn", STIFFEST, modulus, "MPa", Place(), message, remedy=remedy)
+            )
+    return findings
 
 
 def _extent(box: tuple[float, float, float, float]) -> float:

@@ -136,7 +136,7 @@ def _field(key: str, rule: JsonSchema) -> Field:
     ways = rule.get("anyOf", [rule])
     kinds = [way.get("type") for way in ways]
     number = next((way for way in ways if way.get("type") in {"number", "integer"}), None)
-    is_length = number is not None and any("pattern" in way for way in ways)
+    is_length = number is not None and any("mm" in way.get("pattern", "") for way in ways)
     choices = next((way["enum"] for way in ways if "enum" in way), None)
     field: Field = {
         "key": key,

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+import sbafab
 from sbafab.actuators import build, load_design
 from sbafab.design.files import kit_names, templates_folder
 from sbafab.design.films import Films
@@ -168,6 +169,36 @@ BAD = {
         'thickness = "38 um"',
         r"films.tpe.thickness = '38 um' has no source",
     ),
+    "modulus without a source": (
+        'modulus = { value = 10.0, source = "paper, Sec. 3.2.1, MPa" }',
+        'modulus = "20 MPa"',
+        r"films.tpe.modulus = '20 MPa' has no source",
+    ),
+    "modulus in another unit": (
+        "value = 10.0",
+        'value = "1450 psi"',
+        r"modulus = '1450 psi' must be a number, in MPa, or a text with its unit \(or kPa, GPa\)",
+    ),
+    "temperature in another unit": (
+        "value = 120.0",
+        'value = "250F"',
+        r"films.tpe.melting_point = '250F' must be a number, in C, or a text",
+    ),
+    "pressure with its unit": (
+        "pressure_kpa = { value = 110.0",
+        'pressure_kpa = { value = "110 kPa"',
+        r"press.pressure_kpa = '110 kPa' must be a number without its unit, in kPa",
+    ),
+    "film that keeps its volume": (
+        "value = 0.2,",
+        "value = 0.5,",
+        r"films.tpe.poisson = 0.5 must be less than 0.5; for rubber, .* write 0.49",
+    ),
+    "another product without its thickness": (
+        'product = "Stretchlon 200"\nthickness = { value = 0.038, source = "paper, Sec. 2" }',
+        'product = "TPU"',
+        r"lab.toml: films.tpe names another product than Stretchlon 200 and no thickness",
+    ),
     "empty source": (
         'source = "paper, Sec. 3.2.1, measured"',
         'source = " "',
@@ -215,7 +246,7 @@ BAD = {
         "[press]",
         '[films.foil]\nkind = "mask"\nproduct = "foil"\n'
         'thickness = { value = 0.1, source = "x" }\ndensity = { value = 1, source = "x" }\n[press]',
-        r"films.foil = .* is a mask without temperature_limit",
+        r"films.foil is a mask without temperature_limit",
     ),
     "film that no file can be named after": (
         "[press]",
@@ -224,6 +255,24 @@ BAD = {
         r"has a film named 'a b'; a name is a small letter",
     ),
 }
+
+
+def test_moduli_temperatures_and_densities_take_units(tmp_path: Path) -> None:
+    path = write_kit(tmp_path / "lab.toml")
+    text = path.read_text()
+    for old, new in (
+        ("10.0", '"0.01 GPa"'),
+        ("120.0", '"120 \u00b0C"'),
+        ("1122.0", '"1.122 g/cm3"'),
+    ):
+        assert f"value = {old}" in text
+        text = text.replace(f"value = {old}", f'value = "{new}"', 1)
+    text = text.replace("value = 135.0", 'value = "135C"')
+    path.write_text(text, encoding="utf-8")
+    usual, design = sbafab.load("1dof-5mm"), sbafab.load("1dof-5mm", kit=str(path))
+    assert design.films == usual.films
+    assert design.press == usual.press
+    assert sbafab.load("1dof-5mm", "films.tpe.modulus=500 kPa").films.tpe.modulus == 0.5
 
 
 @pytest.mark.parametrize("case", BAD)

@@ -92,6 +92,16 @@ def test_minutes_that_nobody_stated_have_no_limit(good: Good) -> None:
     assert "nobody stated press minutes for" in warning.message
 
 
+@pytest.mark.parametrize(("modulus", "is_warned"), [("20 GPa", True), ("900 MPa", False)])
+def test_a_film_that_is_no_elastomer_is_told_with_its_modulus(
+    modulus: str, is_warned: bool, good: Good
+) -> None:
+    findings = press_fit.check(Measures(good(*ONE, f'films.tpe.modulus="{modulus}"'), LIMITS))
+    warned = [(found.measured, found.unit) for found in findings if found.verdict == "warn"]
+    assert warned == ([(20000.0, "MPa")] if is_warned else [])
+    assert not is_warned or "films.tpe.modulus = 20000 MPa" in findings[-1].remedy
+
+
 def test_holes_on_their_axes(good: Good) -> None:
     found = only(registration_nominal.check(Measures(good(*ONE), LIMITS)))
     assert (found.verdict, found.limit, found.unit) == ("pass", 0.001, "mm")
