@@ -20,6 +20,39 @@ NAMED = "NAME"
 """In a key, a name that the design file chooses, as that of a film or a shape."""
 
 
+TERMS: Mapping[str, str] = {
+    "extrapolation": (
+        "A flag of a figure: its film, diameter or number of balloons is so far from what was "
+        "measured that more than the evidence is assumed, and its interval is wide. Take it for a "
+        "first guess, and measure one actuator."
+    ),
+    "near-burst": (
+        "A flag of a figure: its pressure is above half of the estimated burst pressure, which is "
+        "of three actuators. Work at less pressure, or take smaller pockets or a thicker film."
+    ),
+    "calibration": (
+        "Values of what models do not know, such as modulus, pressed height and pocket size, "
+        "fitted to measurements; they give figures their 90 % intervals. models.calibration names "
+        'the paper\'s, "none", or a file that sbafab calibrate wrote from yours.'
+    ),
+    "press-factor": (
+        "The thickness of films after the press over that before, of those that melt in it "
+        "(--press-factor of predict). The calibration gives 0.204 for the paper's film; any other "
+        "counts as bought until you measure the folded height and give the ratio."
+    ),
+    "pocket-loss": (
+        "By how many mm the radius of a pocket comes out smaller than drawn, since molten film "
+        "creeps under the mask (--pocket-loss of predict). The calibration gives it; yours takes "
+        "its place in the elastic models."
+    ),
+    "contact-factor": (
+        "The measured blocked force over that of Eqs. 1-4 (--contact-factor of predict), 1 unless "
+        "you give it. The elastic models take no notice of it."
+    ),
+}
+"""Flags of figures, and options of predictions, each in two sentences."""
+
+
 class DesignKey(NamedTuple):
     """A key of design files, as one or several families have it; texts as a person reads them."""
 
@@ -38,7 +71,7 @@ def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[C
 @click.argument("name", required=False, shell_complete=_completed)
 @json_option
 def explain(name: str | None, as_json: bool) -> None:
-    """Explain a rule, a key of design files, or a quantity of find and predict.
+    """Explain a rule, a key of design files, a quantity of find and predict, or a flag of figures.
 
     Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
     """
@@ -49,6 +82,11 @@ def explain(name: str | None, as_json: bool) -> None:
             print_json({"schema": EXPLAIN_SCHEMA, "rule": name, **EXPLAINED[name]._asdict()})
         else:
             _print_rule(name)
+    elif (term := name.replace("_", "-")) in TERMS:
+        if as_json:
+            print_json({"schema": EXPLAIN_SCHEMA, "term": term, "meaning": TERMS[term]})
+        else:
+            print_facts((("term", term), ("meaning", TERMS[term])))
     elif not (_explain_quantity(name, as_json) or _explain_keys(name, as_json)):
         near = difflib.get_close_matches(name, explainable_names(), 1)
         hint = f"did you mean {near[0]}?" if near else "sbafab explain lists all rules"
@@ -110,11 +148,11 @@ def _explain_keys(name: str, as_json: bool) -> bool:
 
 
 def explainable_names() -> list[str]:
-    """Return the names of all rules, checks, keys and quantities."""
+    """Return the names of all rules, checks, keys, quantities and terms."""
     from sbafab.search.quantities import QUANTITIES
 
     keys = dict.fromkeys(row.key for row in design_keys())
-    return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES)]
+    return [*EXPLAINED, *keys, *(row.name for row in QUANTITIES), *TERMS]
 
 
 def design_keys(schema: Mapping[str, Any] | None = None) -> list[DesignKey]:

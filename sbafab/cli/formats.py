@@ -251,7 +251,8 @@ def _explain() -> dict[str, Any]:
     schema = {"const": ids.EXPLAIN_SCHEMA}
     rule = of(Explanation, schema=schema, rule=TEXT)
     keys = table(schema=schema, keys=array(of(DesignKey)))
-    return {"oneOf": [rule, keys, table(schema=schema, quantities=array(of(QuantityName)))]}
+    quantities = table(schema=schema, quantities=array(of(QuantityName)))
+    return {"oneOf": [rule, keys, quantities, table(schema=schema, term=TEXT, meaning=TEXT)]}
 
 
 def _explained() -> dict[str, Any]:

@@ -19,6 +19,7 @@ from sbafab.cli.check import file_states, watch_source
 from sbafab.cli.explain import design_keys
 from sbafab.cli.printing import limit_text
 from sbafab.design.files import key_paths
+from sbafab.models.figures import FLAGS
 from sbafab.rules.deck import rule_names
 from sbafab.rules.explained import AS_BUILT, BETWEEN_PARTS, EXPLAINED
 from sbafab.rules.finding import Finding, Place
@@ -181,6 +182,17 @@ def test_every_rule_and_check_is_explained(capsys: pytest.CaptureFixture[str]) -
     code, _, err = run(["explain", "mask-overhag"], capsys)
     assert code == 2
     assert "did you mean mask-overhang?" in err
+
+
+def test_flags_and_factors_are_explained_in_two_sentences(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for term in (*FLAGS, "calibration", "press-factor", "press_factor"):
+        code, out, _ = run(["explain", term, "--json"], capsys)
+        assert code == 0
+        assert len(re.findall(r"\.(?: |$)", json.loads(out)["meaning"])) == 2, term
+    _, out, _ = run(["explain", "calibration"], capsys)
+    assert "models.calibration" in out
 
 
 def test_every_key_and_quantity_is_explained(capsys: pytest.CaptureFixture[str]) -> None:

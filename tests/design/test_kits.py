@@ -266,7 +266,7 @@ def test_moduli_temperatures_and_densities_take_units(tmp_path: Path) -> None:
         ("1122.0", '"1.122 g/cm3"'),
     ):
         assert f"value = {old}" in text
-        text = text.replace(f"value = {old}", f'value = "{new}"', 1)
+        text = text.replace(f"value = {old}", f"value = {new}", 1)
     text = text.replace("value = 135.0", 'value = "135C"')
     path.write_text(text, encoding="utf-8")
     usual, design = sbafab.load("1dof-5mm"), sbafab.load("1dof-5mm", kit=str(path))
