@@ -70,7 +70,9 @@ HELP = """Find the best design that meets requirements.
 
 Without DESIGN the search starts from every family. If no design meets all requirements, the nearest
 miss is shown, no file is written, and the exit code is 1. A quantity may name its pressure P and
-height H with units, such as force@12.5mm@50kPa or force@50%@50kPa:
+height H with units, such as force@12.5mm@50kPa or, flat, force@0mm@50kPa. Without a pressure it is
+at the highest that another one names, or at 10 kPa. H in % is of the reference stroke, force@50%,
+which round pockets have of the paper's film alone:
 
 \b
 {quantities}

@@ -143,6 +143,18 @@ def test_the_total_counts_what_is_known_where_press_minutes_are_not() -> None:
     assert rows["Total, one actuator"] == f"at least {least} h and the press minutes"
 
 
+def test_another_films_bond_and_glue_are_tried_before_the_first_actuator() -> None:
+    words = bench_words(work_of("1dof-5mm", *TPU, "press.temperature_c=150"))
+    once = words[words.index("Once, before") : words.index("What may be done without")]
+    assert "Trial bond of TPU, 0.1 mm at 150 °C" in once
+    assert "Glue trial: a tube glued to scrap of TPU with ________" in once
+    thin = bench_words(work_of("1dof-5mm", "films.tpe.thickness=0.05"))
+    assert "Trial bond of Stretchlon 200, 0.05 mm at 135 °C" in thin
+    for usual in (thin, bench_words(work_of("1dof-5mm"))):
+        assert "Glue trial" not in usual
+    assert "Trial bond" not in bench_words(work_of("1dof-5mm"))
+
+
 def test_every_copy_has_its_proof_test() -> None:
     work = work_of("1dof-5mm", "order.copies=3")
     text = traveller_html(work)

@@ -9,7 +9,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from sbafab.design.identity import adhesive_for
 from sbafab.design.sections import HoldDown
+from sbafab.laminate.assembly import pressed_layers
 from sbafab.laminate.base_plate import (
     HOLE_PROCESSES,
     HoleProcess,
@@ -17,7 +19,7 @@ from sbafab.laminate.base_plate import (
     most_play,
     pin_error,
 )
-from sbafab.laminate.films import Film
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
 from sbafab.pressing.plate_heating import END, MELTING, PATIENCE, START, Heating, HeatPoint
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.html_templates import environment
@@ -320,11 +322,27 @@ def bench_html(
         "tools": [*tools(works), *further_tools],
         "program": works[0].design.sheets.program,
         "designs": [_pressed(work) for work in works],
+        **_trials(works),
         "first": None,
     }
     if pressed:
         values |= _heat_and_force(pressed)
     return environment(HERE).get_template(TEMPLATE).render(**page, **values, shapes="")
+
+
+def _trials(works: Sequence[Work]) -> dict[str, str]:
+    """Return the films, in words, whose bond and whose adhesive are to be tried: all that bond but
+    the paper's.
+    """
+    pressed = [layer.film for work in works for layer in pressed_layers(work.laminate)]
+    bonded = unstated(pressed, [(PAPER_PRODUCT, PAPER_THICKNESS)])
+    films = [film for work in works for film in work.laminate.glued_films]
+    glued = [film.product for film in films if film.product != PAPER_PRODUCT]
+    return {
+        "bonded": joined_words([film.said for film in bonded]),
+        "glued": joined_words(list(dict.fromkeys(glued))),
+        "adhesive": adhesive_for(works[0].design, works[0].laminate.glued_films) or units.BLANK,
+    }
 
 
 def _plate(work: Work) -> BasePlatePage:
