@@ -103,8 +103,8 @@ def sentence(
         return f"{short} is a list without value {first['loc'][-1] + 1}; add it{more}"
     if first["type"] == "missing":
         return f"{field} is missing; add it to the {file}{more}"
-    # A table is not repeated.
-    if not where or isinstance(first["input"], Mapping):
+    is_of_table = first["type"] == "value_error" and isinstance(first["input"], Mapping)
+    if not where or is_of_table:
         return f"{field} {_allowed(first)}{more}"
     return f"{field} = {shown(first['input'])} {_allowed(first)}{more}"
 

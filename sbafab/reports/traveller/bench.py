@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from sbafab.design.identity import adhesive_for
 from sbafab.design.sections import HoldDown
-from sbafab.laminate.assembly import pressed_layers
+from sbafab.laminate.assembly import films_without_minutes
 from sbafab.laminate.base_plate import (
     HOLE_PROCESSES,
     HoleProcess,
@@ -19,7 +19,7 @@ from sbafab.laminate.base_plate import (
     most_play,
     pin_error,
 )
-from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, Film, unstated
+from sbafab.laminate.films import PAPER_PRODUCT, PAPER_THICKNESS, Film
 from sbafab.pressing.plate_heating import END, MELTING, PATIENCE, START, Heating, HeatPoint
 from sbafab.pressing.schedule import Step, joined_words
 from sbafab.reports.html_templates import environment
@@ -334,12 +334,12 @@ def _trials(works: Sequence[Work]) -> dict[str, str]:
     """Return the films, in words, whose bond and whose adhesive are to be tried: all that bond but
     the paper's.
     """
-    pressed = [layer.film for work in works for layer in pressed_layers(work.laminate)]
-    bonded = unstated(pressed, [(PAPER_PRODUCT, PAPER_THICKNESS)])
+    papers = [(PAPER_PRODUCT, PAPER_THICKNESS)]
+    bonded = [film for work in works for film in films_without_minutes(work.laminate, papers)]
     films = [film for work in works for film in work.laminate.glued_films]
     glued = [film.product for film in films if film.product != PAPER_PRODUCT]
     return {
-        "bonded": joined_words([film.said for film in bonded]),
+        "bonded": joined_words(list(dict.fromkeys(film.said for film in bonded))),
         "glued": joined_words(list(dict.fromkeys(glued))),
         "adhesive": adhesive_for(works[0].design, works[0].laminate.glued_films) or units.BLANK,
     }

@@ -416,8 +416,8 @@ def total_time(work: Work) -> Time:
     worked = HANDLING_MINUTES + (pressed or 0.0) + len(plan.steps) * (each.warm + each.cool)
     cures = f"{each.cure / 60:g} h for the adhesive, " if each.cure else ""
     basis = (
-        f"{worked / 60:.1f} h{more} until its tubes are glued, {cures}{units.minutes(each.test)} of "
-        "tests; warming cold platens not included"
+        f"{worked / 60:.1f} h{more} until its tubes are glued, {cures}"
+        f"{units.minutes(each.test)} of tests; warming cold platens not included"
     )
     hours = (worked + each.cure + each.test) / 60
     return Time(row, f"{least}{hours:.1f} h{more}", basis)
