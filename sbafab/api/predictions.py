@@ -118,10 +118,11 @@ def stack(
 ) -> Stack:
     """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
 
-    ``most_pressure`` kPa is the most that it may be asked for. The user's own ``press_factor`` (a
-    ratio), ``pocket_loss`` in mm and ``modulus_mpa`` take the place of the calibration's;
-    ``tables`` are those of the design. Raises DesignError for pockets that are not round. Balloons
-    lengthen and tilt and carry no shear (paper, Sec. 4.4).
+    ``most_pressure`` kPa is the most that it may be asked for: for ``stack.pose((300, 300, 300))``
+    make it with ``most_pressure=300``. The user's own ``press_factor`` (a ratio), ``pocket_loss``
+    in mm and ``modulus_mpa`` take the place of the calibration's; ``tables`` are those of the
+    design. Raises DesignError for pockets that are not round. Balloons lengthen and tilt and carry
+    no shear (paper, Sec. 4.4).
     """
     design = load(source, *changes, **tables)
     own = {"press_factor": press_factor, "pocket_loss": pocket_loss, "modulus_mpa": modulus_mpa}
