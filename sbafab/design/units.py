@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, PlainValidator
-from pydantic_core import core_schema
+from pydantic import BeforeValidator, GetCoreSchemaHandler, PlainValidator
 
 MILLIMETRES = {
     "um": 0.001,
@@ -119,7 +118,7 @@ class InUnit:
         return float(written[1]) * self.units.get(written[2], 1.0)
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> Any:
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
+        return BeforeValidator(self.read).__get_pydantic_core_schema__(source, handler)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, object]:
         units = "|".join(map(re.escape, self.units))
