@@ -1,6 +1,6 @@
 """The formats of files and of what commands print with ``--json``: a JSON schema and an id each.
 
-What a document holds of a record as it is comes from the record's own types (``of``); the rest is
+Most come from the documents that are written, some from the types of records (``of``); the rest is
 written here.
 """
 
@@ -14,10 +14,12 @@ from pydantic import TypeAdapter
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cli.explain import DesignKey
-from sbafab.cutting.calibration import Value
+from sbafab.cli.kerf import KerfDocument
 from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
 from sbafab.design.laminate_file import LaminateDocument
+from sbafab.documents import Document
 from sbafab.errors import ERROR_SCHEMA
+from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
 from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
@@ -34,6 +36,8 @@ from sbafab.reports.assembly_prediction import (
     BentTouch,
     Touch,
 )
+from sbafab.reproduction.comparison import ComparisonDocument
+from sbafab.reproduction.page import ReproductionDocument
 from sbafab.results.records import HistoryEntry, LabRow, Record
 from sbafab.results.report import Comparison, Success
 from sbafab.rules.finding import Finding, Place, Verdict
@@ -190,63 +194,6 @@ def _sweep() -> dict[str, Any]:
     )
 
 
-def _kerf() -> dict[str, Any]:
-    value = of(Value)
-    maybe = {**value, "type": ["object", "null"]}
-    offsets = {
-        "type": "object",
-        "additionalProperties": value,
-        "description": "mm that each instrument reads too much; empty where it cannot be told",
-    }
-    estimate = table(kerf=value, scale=maybe, scaled=YES, offsets=offsets, count=COUNT)
-    of_axis = {**estimate, "type": ["object", "null"]}
-    return table(
-        schema={"const": ids.KERF_SCHEMA},
-        all={**estimate, "description": "kerf in mm, scale as a ratio, with 95 % half widths"},
-        x=of_axis,
-        y=of_axis,
-        difference={**maybe, "description": "kerf along x less that along y, mm"},
-        differs=YES,
-        warnings=array(TEXT),
-        remarks=array(TEXT),
-        toml={**TEXT, "description": "lines for the design file"},
-    )
-
-
-def _inspection() -> dict[str, Any]:
-    return table(
-        schema={"const": ids.INSPECTION_SCHEMA},
-        sheet=TEXT,
-        film=TEXT,
-        picture=TEXT,
-        picture_sha256=TEXT,
-        shows={"enum": ["pieces", "skeleton"]},
-        from_below=YES,
-        kerf={**of(Value), "description": "mm"},
-        kerf_in_file=TEXT,
-        scale=table(x=number(), y=number(), reference=TEXT),
-        edges=COUNT,
-        rms={**number(), "description": "mm, as all lengths"},
-        within_95=number(),
-        pixel=number(),
-        blur=number(),
-        failed=YES,
-        pieces=array(
-            table(
-                name=TEXT,
-                x=number(),
-                y=number(),
-                verdict=TEXT,
-                message=TEXT,
-                shift=number("null"),
-                turn={**number("null"), "description": "degrees"},
-                rms=number("null"),
-                largest=number("null"),
-            )
-        ),
-    )
-
-
 def _explain() -> dict[str, Any]:
     schema = {"const": ids.EXPLAIN_SCHEMA}
     rule = of(Explanation, schema=schema, rule=TEXT)
@@ -338,65 +285,6 @@ def _balloon_map() -> dict[str, Any]:
         flat_level_mm=number(),
         chamber_axes_mm=rows,
         balloons=array(balloon),
-    )
-
-
-def _reproduction() -> dict[str, Any]:
-    row = table(
-        section=TEXT,
-        figure=TEXT,
-        unit=TEXT,
-        where=TEXT,
-        paper=number("null"),
-        error=number("null"),
-        predicted=number("null"),
-        model=TEXT,
-        why=TEXT,
-    )
-    calibrated = table(
-        calibration=TEXT,
-        held_out=table(points=number(), inside=number()),
-        discrepancy={
-            "type": "object",
-            "additionalProperties": number(),
-            "description": "relative standard deviation that the models miss, by group",
-        },
-        curves=array(_compared_curve()),
-    )
-    found = table(schema={"const": ids.REPRODUCTION_SCHEMA}, rows=array(row), calibrated=calibrated)
-    return and_perhaps(found, folder=TEXT)
-
-
-def _compared_curve() -> dict[str, Any]:
-    ends = {"type": ["array", "null"], "items": number(), "minItems": 2, "maxItems": 2}
-    point = table(
-        x=number("null"),
-        measured=number(),
-        error={**number("null"), "description": "standard error"},
-        model={**ends, "description": "least and largest over the assumptions"},
-        deviation={**ends, "description": "model minus measured"},
-        interval={**ends, "description": "90 % interval of the measured value"},
-        within={"type": ["boolean", "null"]},
-    )
-    return table(
-        **dict.fromkeys(("source", "curve", "quantity", "unit", "place", "x_name"), TEXT),
-        comparable=YES,
-        reason=TEXT,
-        unknown=array(TEXT),
-        model=TEXT,
-        assumptions=array(TEXT),
-        no_model=TEXT,
-        points=array(point),
-    )
-
-
-def _comparison() -> dict[str, Any]:
-    source = table(id=TEXT, citation=TEXT, doi=TEXT, missing=array(TEXT))
-    return table(
-        schema={"const": ids.COMPARISON_SCHEMA},
-        calibration={**TEXT, "description": "name of the models' calibration, or none"},
-        sources=array(source),
-        curves=array(_compared_curve()),
     )
 
 
@@ -690,6 +578,10 @@ class Format(NamedTuple):
     body: Callable[[], dict[str, Any]]
 
 
+def _document(document: type[Document], about: str) -> Format:
+    return Format(document.SCHEMA, about, document.json_schema)
+
+
 FORMATS: Mapping[str, Format] = {
     "design": Format(ids.DESIGN_SCHEMA, "design and assembly files (TOML)", _design),
     "checks": Format(CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints", _checks),
@@ -736,19 +628,13 @@ FORMATS: Mapping[str, Format] = {
         "what `predict --json` prints of an assembly",
         _assembly_predict,
     ),
-    "reproduction": Format(
-        ids.REPRODUCTION_SCHEMA,
-        "`reproduction.json`, and what `reproduce --json` prints",
-        _reproduction,
+    "reproduction": _document(
+        ReproductionDocument, "`reproduction.json`, and what `reproduce --json` prints"
     ),
-    "comparison": Format(
-        ids.COMPARISON_SCHEMA, "what `reproduce SOURCE --json` prints", _comparison
-    ),
+    "comparison": _document(ComparisonDocument, "what `reproduce SOURCE --json` prints"),
     "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
-    "inspection": Format(
-        ids.INSPECTION_SCHEMA, "what `inspect` writes, and prints with `--json`", _inspection
-    ),
-    "kerf": Format(ids.KERF_SCHEMA, "what `kerf --json` prints", _kerf),
+    "inspection": _document(InspectionDocument, "what `inspect` writes, and prints with `--json`"),
+    "kerf": _document(KerfDocument, "what `kerf --json` prints"),
     "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain NAME --json` prints", _explain),
     "explained": Format(
         ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained

@@ -76,7 +76,7 @@ def inspect(  # noqa: PLR0913, PLR0917 - one an option
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
     # An extra that may be missing, checked above.
     from sbafab.inspection.cut_sheet import read_cut_sheet
-    from sbafab.inspection.inspection import inspect_picture
+    from sbafab.inspection.inspection import InspectionDocument, inspect_picture
     from sbafab.inspection.picture import read_picture
 
     cut = read_cut_sheet(folder, sheet)
@@ -85,7 +85,7 @@ def inspect(  # noqa: PLR0913, PLR0917 - one an option
     inspection = inspect_picture(seen, cut, reference, photo, paper == "dark")
     paths = write_inspection(inspection, out)
     if as_json:
-        print_json({**inspection.as_dict(), "files": [str(path) for path in paths]})
+        print_json({**InspectionDocument.of(inspection), "files": [str(path) for path in paths]})
     else:
         print_inspection(inspection, paths)
     if inspection.failed:
@@ -114,12 +114,12 @@ def _reference(
 
 def write_inspection(inspection: Inspection, out: Path) -> list[Path]:
     """Write picture, result, entry and table of sizes; return their paths."""
-    from sbafab.inspection.inspection import drawing, history, sizes_csv
+    from sbafab.inspection.inspection import InspectionDocument, drawing, history, sizes_csv
     from sbafab.output.swap import replace_text
 
     out.mkdir(parents=True, exist_ok=True)
     stem = f"{inspection.sheet.name.replace('/', '_')}-{inspection.picture.path.stem}"
-    result = json.dumps(inspection.as_dict(), indent=1, ensure_ascii=False) + "\n"
+    result = json.dumps(InspectionDocument.of(inspection), indent=1, ensure_ascii=False) + "\n"
     texts = {
         ".json": result,
         "_history.json": json.dumps(history(inspection), indent=1, ensure_ascii=False) + "\n",

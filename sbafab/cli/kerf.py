@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -18,11 +18,36 @@ from sbafab.cutting.calibration import (
     read_measurements,
 )
 from sbafab.design.films import FILM_NAME, is_kerf
+from sbafab.documents import Document, at
 from sbafab.errors import DesignError
-from sbafab.output.schema_ids import KERF_SCHEMA
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+
+class KerfEstimate(Document):
+    """Of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
+
+    kerf: Value
+    scale: Value | None
+    scaled: bool = at("is_scaled")
+    offsets: Mapping[str, Value]
+    """mm that each instrument reads too much; empty where it cannot be told"""
+    count: int
+
+
+class KerfDocument(Document):
+    """What ``kerf --json`` prints."""
+
+    SCHEMA = "sbafab/kerf@1"
+
+    all: KerfEstimate = at("overall")
+    x: KerfEstimate | None
+    y: KerfEstimate | None
+    difference: Value | None
+    """kerf along x less that along y, mm"""
+    differs: bool
+    warnings: list[str]
+    remarks: list[str]
+    toml: str
+    """lines for the design file"""
 
 
 @click.command()
@@ -81,19 +106,8 @@ def kerf(
     ]
     block = _toml_block(*_place_in_design(material), widths, warnings)
     if as_json:
-        print_json(
-            {
-                "schema": KERF_SCHEMA,
-                "all": _as_dict(calibration.overall),
-                "x": _as_dict(calibration.x),
-                "y": _as_dict(calibration.y),
-                "difference": calibration.difference and calibration.difference._asdict(),
-                "differs": calibration.differs,
-                "warnings": warnings,
-                "remarks": remarks,
-                "toml": block,
-            }
-        )
+        sentences = {"warnings": warnings, "remarks": remarks, "toml": block}
+        print_json(KerfDocument.of(calibration, **sentences))
         return
     for name, estimate in (
         ("all", calibration.overall),
@@ -128,18 +142,6 @@ def _film(name: str) -> str:
 def _place_in_design(film: str) -> tuple[str, str]:
     """Return table and key of a film's kerf in a design file."""
     return ("[laser]", f"kerf_{film}") if film in ("tpe", "ptfe") else (f"[films.{film}]", "kerf")
-
-
-def _as_dict(estimate: Estimate | None) -> dict[str, object] | None:
-    if estimate is None:
-        return None
-    return {
-        "kerf": estimate.kerf._asdict(),
-        "scale": estimate.scale and estimate.scale._asdict(),
-        "scaled": estimate.is_scaled,
-        "offsets": {name: offset._asdict() for name, offset in estimate.offsets.items()},
-        "count": estimate.count,
-    }
 
 
 Widths = tuple["Estimate"] | tuple["Estimate", "Estimate"]

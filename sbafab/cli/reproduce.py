@@ -13,8 +13,12 @@ from sbafab.evidence.files import shipped_evidence
 from sbafab.models.calibrated import load_calibration
 from sbafab.reproduction import page
 from sbafab.reproduction.calibrated import PAPER, TITLE
-from sbafab.reproduction.comparison import as_json as as_document
-from sbafab.reproduction.comparison import compare, compare_calibrated, table_lines
+from sbafab.reproduction.comparison import (
+    ComparisonDocument,
+    compare,
+    compare_calibrated,
+    table_lines,
+)
 from sbafab.results.evidence import load_source
 
 if TYPE_CHECKING:
@@ -83,7 +87,7 @@ def _print_comparison(source: str, name: str, as_json: bool) -> None:
         )
     ]
     if as_json:
-        print_json(as_document(evidences, curves, name))
+        print_json(ComparisonDocument.of(None, calibration=name, sources=evidences, curves=curves))
         return
     for evidence in evidences:
         click.echo(evidence.citation + (f", doi:{evidence.doi}" if evidence.doi else ""))

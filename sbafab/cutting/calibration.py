@@ -15,7 +15,7 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from statistics import median
@@ -94,7 +94,8 @@ class Measurement:
         return f"{place}the {self.kind} along {self.axis}, {sizes},"
 
 
-class Value(NamedTuple):
+@dataclass(frozen=True)
+class Value:
     """A value, its standard uncertainty and the half width of its 95 % interval.
 
     ``value``, ``uncertainty`` and ``half_width`` are mm of a kerf; a scale's are a ratio.
@@ -291,7 +292,7 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
     scale = fitted[places["scale"]] if "scale" in places else None
     return Estimate(
         kerf=fitted[0],
-        scale=None if scale is None else scale._replace(value=1 + scale.value),
+        scale=None if scale is None else replace(scale, value=1 + scale.value),
         offsets=dict(zip(instruments, fitted[1:], strict=False)) if "offsets" in places else {},
         count=count,
         degrees=degrees,

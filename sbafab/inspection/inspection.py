@@ -10,21 +10,21 @@ import base64
 import io
 import math
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from typing import Any
 
 import numpy as np
 
 from sbafab.cutting.calibration import COLUMNS, INSTRUMENT, Value, student_t
+from sbafab.documents import Document, at
 from sbafab.errors import DesignError
 from sbafab.inspection.cut_sheet import DrawnSheet
 from sbafab.inspection.edges import EdgeFit, fitted
 from sbafab.inspection.picture import ScanPicture, outlines
 from sbafab.inspection.pieces import PieceFinding, piece_findings
-from sbafab.inspection.registration import SMALLEST, Location, PointArray, locate
+from sbafab.inspection.registration import SMALLEST, Content, Location, PointArray, locate
 from sbafab.inspection.scale import Reference, Scale, scale_of
-from sbafab.output.schema_ids import INSPECTION_SCHEMA
 from sbafab.spreadsheet import csv_text
 
 FEWEST = 100
@@ -66,27 +66,33 @@ class Inspection:
         """True if a piece is missing, wrong, or not seen well enough to tell."""
         return any(piece.verdict not in HARMLESS for piece in self.pieces)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the inspection for JSON; lengths in mm."""
-        return {
-            "schema": INSPECTION_SCHEMA,
-            "sheet": self.sheet.name,
-            "film": self.sheet.film,
-            "picture": self.picture.path.name,
-            "picture_sha256": self.picture.sha256,
-            "shows": self.location.content,
-            "from_below": self.location.from_below,
-            "kerf": self.kerf._asdict(),
-            "kerf_in_file": self.sheet.kerf,
-            "scale": self.scale._asdict(),
-            "edges": int((self.fit.weights > 0).sum()),
-            "rms": self.rms,
-            "within_95": self.within_95,
-            "pixel": self.pixel,
-            "blur": self.fit.blur,
-            "failed": self.failed,
-            "pieces": [asdict(piece) for piece in self.pieces],
-        }
+    @property
+    def edges(self) -> int:
+        """Number of places on edges that were measured."""
+        return int((self.fit.weights > 0).sum())
+
+
+class InspectionDocument(Document):
+    """An inspection; lengths in mm."""
+
+    SCHEMA = "sbafab/inspection@1"
+
+    sheet: str = at("sheet.name")
+    film: str = at("sheet.film")
+    picture: str = at("picture.path.name")
+    picture_sha256: str = at("picture.sha256")
+    shows: Content = at("location.content")
+    from_below: bool = at("location.from_below")
+    kerf: Value
+    kerf_in_file: str = at("sheet.kerf")
+    scale: Scale
+    edges: int
+    rms: float
+    within_95: float
+    pixel: float
+    blur: float = at("fit.blur")
+    failed: bool
+    pieces: list[PieceFinding]
 
 
 def inspect_picture(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -31,7 +30,8 @@ SEARCH = 0.45
 """mm round a drawn edge in which it is looked for."""
 
 
-class Scale(NamedTuple):
+@dataclass(frozen=True)
+class Scale:
     """True over drawn lengths along x and y, and what tells it."""
 
     x: float

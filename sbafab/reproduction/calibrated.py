@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from sbafab.documents import Document, at
 from sbafab.evidence.files import load_evidence
 from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import ModelCalibration, load_calibration
@@ -12,8 +13,8 @@ from sbafab.models.unknowns import UNKNOWNS
 from sbafab.reproduction.comparison import (
     ComparedCurve,
     ComparedPoint,
+    CurveDocument,
     compare_calibrated,
-    curve_as_json,
     span,
 )
 
@@ -133,12 +134,18 @@ def sentences(paper: CalibratedPaper) -> Iterator[str]:
     yield NOT_ADOPTED
 
 
-def as_json(paper: CalibratedPaper) -> dict[str, Any]:
-    """Return the section for programs."""
-    calibration = paper.calibration
-    return {
-        "calibration": calibration.name,
-        "held_out": {"points": calibration.points, "inside": calibration.inside},
-        "discrepancy": dict(calibration.discrepancy),
-        "curves": [curve_as_json(compared) for compared in paper.curves],
-    }
+class HeldOut(Document):
+    """Measured values that the calibration was not fitted to, and how many lay in its intervals."""
+
+    points: int
+    inside: int
+
+
+class CalibratedDocument(Document):
+    """The section for programs."""
+
+    calibration: str = at("calibration.name")
+    held_out: HeldOut = at("calibration")
+    discrepancy: dict[str, float] = at("calibration.discrepancy")
+    """relative standard deviation that the models miss, by group"""
+    curves: list[CurveDocument]

@@ -5,14 +5,13 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
 from sbafab.calibration.model_values import NoModel, model_values
+from sbafab.documents import Document, Short, at
 from sbafab.evidence.records import Evidence, MeasuredCurve
 from sbafab.models.calibrated import Ends, ModelCalibration
 from sbafab.models.figures import Factors
-from sbafab.output.schema_ids import COMPARISON_SCHEMA
 
 Intervals = Callable[[MeasuredCurve], Sequence[Ends | None] | None]
 """Intervals of a prediction at the points of a curve; None where there are none."""
@@ -173,60 +172,58 @@ def _wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
-def as_json(
-    evidences: Sequence[Evidence], curves: Sequence[ComparedCurve], calibration: str
-) -> dict[str, Any]:
-    """Return the comparison for programs; ``calibration`` is its name."""
-    return {
-        "schema": COMPARISON_SCHEMA,
-        "calibration": calibration,
-        "sources": [
-            {
-                "id": evidence.id,
-                "citation": evidence.citation,
-                "doi": evidence.doi,
-                "missing": list(evidence.missing),
-            }
-            for evidence in evidences
-        ],
-        "curves": [curve_as_json(compared) for compared in curves],
-    }
+ShortEnds = tuple[Short, Short] | None
 
 
-def curve_as_json(compared: ComparedCurve) -> dict[str, Any]:
-    """Return a curve with its points for programs."""
-    curve = compared.curve
-    return {
-        "source": compared.source,
-        "curve": curve.id,
-        "quantity": curve.quantity,
-        "unit": curve.y_unit,
-        "place": curve.place,
-        "x_name": curve.x_name,
-        "comparable": curve.comparable,
-        "reason": curve.reason,
-        "unknown": list(curve.unknown),
-        "model": compared.model,
-        "assumptions": list(compared.assumptions),
-        "no_model": compared.reason,
-        "points": [
-            {
-                "x": point.x,
-                "measured": point.measured,
-                "error": _rounded(point.error),
-                "model": _ends(point.model),
-                "deviation": _ends(point.deviation),
-                "interval": _ends(point.interval),
-                "within": point.is_within,
-            }
-            for point in compared.points
-        ],
-    }
+class PointDocument(Document):
+    """A measured value beside the model's."""
+
+    x: float | None
+    measured: float
+    error: Short | None
+    """standard error"""
+    model: ShortEnds
+    """least and largest over the assumptions"""
+    deviation: ShortEnds
+    """model minus measured"""
+    interval: ShortEnds
+    """90 % interval of the measured value"""
+    within: bool | None = at("is_within")
 
 
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.7g}")
+class CurveDocument(Document):
+    """A curve with its points."""
+
+    source: str
+    curve: str = at("curve.id")
+    quantity: str = at("curve.quantity")
+    unit: str = at("curve.y_unit")
+    place: str = at("curve.place")
+    x_name: str = at("curve.x_name")
+    comparable: bool = at("curve.comparable")
+    reason: str = at("curve.reason")
+    unknown: list[str] = at("curve.unknown")
+    model: str
+    assumptions: list[str]
+    no_model: str = at("reason")
+    points: list[PointDocument]
 
 
-def _ends(ends: Ends | None) -> list[float] | None:
-    return None if ends is None else [float(f"{end:.7g}") for end in ends]
+class SourceDocument(Document):
+    """What a source is, and what of it is not had."""
+
+    id: str
+    citation: str
+    doi: str
+    missing: list[str]
+
+
+class ComparisonDocument(Document):
+    """Curves of sources beside the models."""
+
+    SCHEMA = "sbafab/comparison@1"
+
+    calibration: str
+    """name of the models' calibration, or none"""
+    sources: list[SourceDocument]
+    curves: list[CurveDocument]

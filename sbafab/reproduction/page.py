@@ -6,12 +6,12 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sbafab.documents import Document, Number, Short, at
 from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
-from sbafab.output.schema_ids import REPRODUCTION_SCHEMA
 from sbafab.reports.charts import relation_svg
 from sbafab.reproduction import calibrated, rows
-from sbafab.reproduction.calibrated import CalibratedPaper
+from sbafab.reproduction.calibrated import CalibratedDocument, CalibratedPaper
 from sbafab.reproduction.rows import Row, predicted, table
 
 HEAD = """# The paper's figures beside the predictions
@@ -117,24 +117,31 @@ def reproduce(folder: Path) -> tuple[dict[str, list[Row]], CalibratedPaper]:
     return sections, by_calibration
 
 
+class RowDocument(Document):
+    """A figure of the paper beside the prediction."""
+
+    section: str
+    figure: str
+    unit: str = at("measured.unit")
+    where: str = at("measured.where")
+    paper: Number | None
+    error: Number | None
+    predicted: Short | None
+    model: str
+    why: str
+
+
+class ReproductionDocument(Document):
+    """The contents of ``reproduction.json``."""
+
+    SCHEMA = "sbafab/reproduction@1"
+
+    rows: list[RowDocument]
+    calibrated: CalibratedDocument
+    folder: str = ""
+
+
 def as_json(sections: dict[str, list[Row]], by_calibration: CalibratedPaper) -> dict[str, Any]:
     """Return the contents of ``reproduction.json``."""
-    return {
-        "schema": REPRODUCTION_SCHEMA,
-        "rows": [
-            {
-                "section": section,
-                "figure": row.figure,
-                "unit": row.measured.unit,
-                "where": row.measured.where,
-                "paper": row.measured.value if row.measured.unit else None,
-                "error": row.measured.error or None,
-                "predicted": None if row.predicted is None else float(f"{row.predicted:.7g}"),
-                "model": row.model,
-                "why": row.why,
-            }
-            for section, rows in sections.items()
-            for row in rows
-        ],
-        "calibrated": calibrated.as_json(by_calibration),
-    }
+    rows = [RowDocument.read(row, section=name) for name, rows in sections.items() for row in rows]
+    return ReproductionDocument.of(None, rows=rows, calibrated=by_calibration)

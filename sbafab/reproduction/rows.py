@@ -33,6 +33,16 @@ class Row(NamedTuple):
     model: str
     why: str
 
+    @property
+    def paper(self) -> float | None:
+        """The paper's value; None where it is a word."""
+        return self.measured.value if self.measured.unit else None
+
+    @property
+    def error(self) -> float | None:
+        """The paper's error; None where it gives none."""
+        return self.measured.error or None
+
 
 def exact(value: float, unit: str, where: str) -> paper.Measured:
     return paper.Measured(value, 0.0, unit, where)

@@ -1,0 +1,65 @@
+"""Documents for programs: JSON, and its published schema, from one statement of the fields."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import AfterValidator, AliasPath, BaseModel, ConfigDict, Field, WithJsonSchema
+
+
+class Document(BaseModel):
+    """A document, or a table of one: its keys are the fields, which their docstrings describe.
+
+    A key with a default may be missing.
+    """
+
+    model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True, defer_build=True)
+
+    SCHEMA: ClassVar[str] = ""
+    """Id of a document that is written by itself."""
+
+    @classmethod
+    def read(cls, record: object, **more: object) -> Self:
+        """Return the document of a record: its attributes by name, and ``more``."""
+        return cls.model_validate(_Joined(record, more))
+
+    @classmethod
+    def of(cls, record: object, **more: object) -> dict[str, Any]:
+        """Return the document of a record as JSON."""
+        keys = cls.read(record, **more).model_dump(mode="json", exclude_unset=True)
+        return {"schema": cls.SCHEMA, **keys} if cls.SCHEMA else keys
+
+    @classmethod
+    def json_schema(cls) -> dict[str, Any]:
+        """Return the JSON schema, in which the id comes first."""
+        body = cls.model_json_schema(mode="serialization")
+        body["properties"] = {"schema": {"const": cls.SCHEMA}, **body["properties"]}
+        return {**body, "required": ["schema", *body["required"]]}
+
+
+class _Joined:
+    """A record with more attributes."""
+
+    def __init__(self, record: object, more: dict[str, object]) -> None:
+        self._record = record
+        self.__dict__.update(more)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._record, name)
+
+
+def at(path: str) -> Any:
+    """Return a field that stands elsewhere in the record: a dotted path of attributes."""
+    return Field(validation_alias=AliasPath(*path.split(".")))
+
+
+Number = Annotated[int | float, WithJsonSchema({"type": "number"})]
+"""A number as it stands in the record: 6 is not written as 6.0."""
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.7g}")
+
+
+Short = Annotated[float, AfterValidator(_short)]
+"""A number to seven digits."""
