@@ -63,7 +63,7 @@ def rows() -> Iterator[dict[str, Any]]:
                 break
             parts = plan_design(check(design), ("cut",)).parts
             for film in materials_of(parts):
-                stock = replace(stocks(design)[film], most=1000)
+                stock = stocks(design)[film].model_copy(update={"most": 1000})
                 entry = {"design": name, "copies": copies, "film": film}
                 yield entry | measured(of_material(parts, film), stock)
 

@@ -468,8 +468,12 @@ def _layout_problems(sheet_claim: SheetClaim, drawing: ReadBack, stock: Stock) -
     """Return problems of frame, parting cut, engraving, borders, gaps and pins."""
     problems = []
     pins = tuple((pin.x, pin.y, pin.diameter) for pin in sheet_claim.pins)
-    laid = Stock(
-        sheet_claim.width, sheet_claim.length, sheet_claim.border, sheet_claim.spacing, pins
+    laid = Stock.model_construct(
+        width=sheet_claim.width,
+        length=sheet_claim.length,
+        border=sheet_claim.border,
+        spacing=sheet_claim.spacing,
+        pins=pins,
     )
     parting = (
         (((0.0, sheet_claim.length), (sheet_claim.width, sheet_claim.length)),)

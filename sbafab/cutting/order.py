@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
+from sbafab.design.sections import Laser
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
 from sbafab.geometry.region import Region
@@ -21,16 +21,6 @@ FEW = 20
 """Contours up to which looking at every stretch costs less than fetching numpy."""
 SHORTER = 1e-6
 """mm by which a path has to become shorter to be turned round."""
-
-
-@dataclass(frozen=True)
-class Machine:
-    """The assumptions of the estimate of cutting time: mm/s, seconds and mm."""
-
-    cut_speed: float
-    travel_speed: float
-    pierce_seconds: float
-    heat_distance: float
 
 
 def cutting_order(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
@@ -51,15 +41,13 @@ def travel(contours: Iterable[Contour]) -> float:
     return sum(math.dist(a, b) for a, b in pairwise(stops))
 
 
-def cutting_minutes(cuts: int, cut_length: float, moved: float, machine: Machine) -> float:
+def cutting_minutes(cuts: int, cut_length: float, moved: float, laser: Laser) -> float:
     """Return the minutes that cuts and travel (mm) take.
 
     Engraving and the way to the cut that frees a roll's sheet are left out.
     """
     seconds = (
-        cut_length / machine.cut_speed
-        + moved / machine.travel_speed
-        + cuts * machine.pierce_seconds
+        cut_length / laser.cut_speed + moved / laser.travel_speed + cuts * laser.pierce_seconds
     )
     return seconds / 60
 

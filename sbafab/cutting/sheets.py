@@ -33,7 +33,7 @@ from sbafab.cutting.machine_files import (
     read_machine_file,
     verify_machine_file,
 )
-from sbafab.cutting.order import Machine, cutting_minutes, cutting_order, travel
+from sbafab.cutting.order import cutting_minutes, cutting_order, travel
 from sbafab.cutting.properties import (
     CUT_INNER,
     CUT_OUTER,
@@ -46,6 +46,7 @@ from sbafab.cutting.properties import (
     sheet_properties,
 )
 from sbafab.cutting.verify import check_surroundings, verify_file
+from sbafab.design.sections import Laser
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour
 from sbafab.geometry.edges import Bounds, Point
@@ -106,7 +107,7 @@ def write_sheets(
     nests: Sequence[Nest],
     folder: Path,
     settings: CutSettings,
-    machine: Machine,
+    laser: Laser,
     labelled: bool = True,
     progress: Counted | None = None,
     marked: bool = False,
@@ -123,7 +124,7 @@ def write_sheets(
     for nest in nests:
         for sheet in range(nest.sheets):
             marks = index_marks(nest, sheet) if marked else None
-            written.append(_write_sheet(nest, sheet, folder, settings, machine, labelled, marks))
+            written.append(_write_sheet(nest, sheet, folder, settings, laser, labelled, marks))
             if progress is not None:
                 progress(len(written), total)
     return written
@@ -134,13 +135,13 @@ def _write_sheet(
     sheet: int,
     folder: Path,
     settings: CutSettings,
-    machine: Machine,
+    laser: Laser,
     labelled: bool,
     marks: Sequence[IndexMark] | None,
 ) -> SheetFile:
     placements = nest.on_sheet(sheet)
     region = Region(tuple(c for p in placements for c in nest.region(p).contours))
-    contours = cutting_order(region, machine.heat_distance)
+    contours = cutting_order(region, laser.heat_distance)
     width, length = nest.stock.width, nest.length(sheet)
     around = _surroundings(nest, sheet, (width, length), settings, labelled)
     label_state: LabelState = "engraved" if around.engraved else "no room" if labelled else "off"
@@ -183,7 +184,7 @@ def _write_sheet(
         cut_length=cut_length,
         travel=moved,
         unsorted_travel=travel((*region.holes, *region.outers)),
-        minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, machine),
+        minutes=cutting_minutes(len(contours) + len(partings), cut_length, moved, laser),
         label=label_state,
         index_marks=None if marks is None else len(marks),
         machine_file=machine_file,

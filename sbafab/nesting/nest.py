@@ -6,7 +6,6 @@ import hashlib
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple
 from typing import Any
 
 from sbafab.laminate.films import Material, in_order
@@ -22,6 +21,8 @@ from sbafab.nesting.records import (
     too_many,
 )
 
+NESTED_BY = ("width", "length", "border", "spacing", "pins", "most", "roll", "turns")
+"""What of a film sheet the places of its parts depend on."""
 PLACES = "sheets/nest.json"
 """File of the placements in an output folder, which a later run takes over."""
 
@@ -139,7 +140,7 @@ def _key(nests: Iterable[tuple[Stock, Sequence[NestPart], int]]) -> str:
             "bottom-left, lattices, pairs of lattices, arrangements"
             if takes_lattices(parts, stock, sheets)
             else "bottom-left",
-            astuple(stock),
+            tuple(getattr(stock, key) for key in NESTED_BY),
             [(p.design, p.pattern, p.piece, p.material, p.region.key, p.count) for p in parts],
         )
         for stock, parts, sheets in nests

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from sbafab.design.films import Sheet
 from sbafab.errors import DesignError, TooLargeError
 from sbafab.geometry.edges import Bounds, Point, unit
 from sbafab.geometry.region import Region
@@ -41,23 +42,11 @@ class NestPart:
         return f"{self.pattern}.{self.piece}"
 
 
-@dataclass(frozen=True)
-class Stock:
-    """Film to cut from, as it lies on the machine.
-
-    A roll's ``length`` is the most that is unrolled for one sheet. Parts stay inside ``border``,
-    their paths ``spacing`` apart, and as far from ``pins``, which hold the sheet down: centre x, y
-    and diameter. ``most`` sheets may be used. Parts may be turned by ``turns``: a path that is
-    compensated for different kerfs along x and along y keeps its axes.
+class Stock(Sheet):
+    """Film to cut from, and the ``turns`` that parts may take on it: a path that is compensated for
+    different kerfs along x and along y keeps its axes.
     """
 
-    width: float
-    length: float
-    border: float
-    spacing: float
-    pins: tuple[tuple[float, float, float], ...] = ()
-    most: int = 20
-    roll: bool = False
     turns: tuple[Turn, ...] = TURNS
 
     @property

@@ -44,7 +44,6 @@ from sbafab.output.checked import (
     hole_notes,
     kerf_widths,
     limits,
-    machine,
 )
 from sbafab.output.manifest import as_json
 from sbafab.output.schema_ids import PREDICTION_SCHEMA, SIMULATE_SCHEMA
@@ -211,7 +210,7 @@ def write_nested_sheets(
     label = design.sheets.label
     sheet_progress = partial(progress, "sheets")
     marked = bool(design.sheets.index_marks)
-    sheets = write_sheets(nests, folder, settings, machine(design), label, sheet_progress, marked)
+    sheets = write_sheets(nests, folder, settings, design.laser, label, sheet_progress, marked)
     write_text(folder / PLACES, json.dumps(as_dict(nests), indent=1) + "\n")
     return sheets
 

@@ -11,7 +11,6 @@ from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
 from sbafab.cutting.entries import Entries
 from sbafab.cutting.kerf import compensated_paths
-from sbafab.cutting.order import Machine
 from sbafab.cutting.properties import TRUE_ARCS, Curves, CutSettings, Recipes
 from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
@@ -190,20 +189,15 @@ def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
     return dowels.hole_notes(laminate.pins, holes, design.registration.plate_made_by)
 
 
-def machine(design: Design) -> Machine:
-    laser = design.laser
-    return Machine(
-        cut_speed=laser.cut_speed,
-        travel_speed=laser.travel_speed,
-        pierce_seconds=laser.pierce_seconds,
-        heat_distance=laser.heat_distance,
-    )
-
-
 def stocks(design: Design) -> dict[Material, Stock]:
     """Return the film sheets by material."""
     sheets = _sheets(design)
-    return {name: _stock(sheets[name][1], kerf) for name, kerf in _kerfs(design).items()}
+    return {
+        name: Stock.model_construct(
+            **dict(sheets[name][1]), turns=(0, 2) if isinstance(kerf, tuple) else TURNS
+        )
+        for name, kerf in _kerfs(design).items()
+    }
 
 
 def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
@@ -235,19 +229,6 @@ def entries(design: Design) -> dict[Material, Entries]:
             key=key,
         )
     return found
-
-
-def _stock(sheet: Sheet, kerf: object) -> Stock:
-    return Stock(
-        width=sheet.width,
-        length=sheet.length,
-        border=sheet.border,
-        spacing=sheet.spacing,
-        pins=sheet.pins,
-        most=sheet.most,
-        roll=sheet.roll,
-        turns=(0, 2) if isinstance(kerf, tuple) else TURNS,
-    )
 
 
 # The plan of a design: computed before anything is written.

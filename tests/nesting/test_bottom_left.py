@@ -37,7 +37,7 @@ def shapely_of(region: Region) -> Polygon:
 def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -> None:
     """A row of n squares of 10 mm takes 10 n + spacing (n - 1); by area, none can be added."""
     usable = 10 * a_row + spacing * (a_row - 1)
-    stock = Stock(usable + 20, usable + 20, 10, spacing)
+    stock = Stock(width=usable + 20, length=usable + 20, spacing=spacing)
     square = rectangle((3.0, 4.0), (13.0, 14.0))
     assert nested([part(square, a_row**2)], stock).sheets == 1
     assert nested([part(square, a_row**2 + 1)], stock).sheets == 2
@@ -45,14 +45,14 @@ def test_squares_fill_the_grid_they_fit_in_exactly(spacing: float, a_row: int) -
 
 @pytest.mark.parametrize(("usable", "column"), [(54.0, 5), (53.9, 4), (43.0, 4), (42.9, 3)])
 def test_a_column_holds_as_many_squares_as_its_length(usable: float, column: int) -> None:
-    stock = Stock(10 + 20, usable + 20, 10, 1.0)
+    stock = Stock(width=10 + 20, length=usable + 20)
     result = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 2 * column)], stock)
     assert [len(result.on_sheet(sheet)) for sheet in range(result.sheets)] == [column, column]
 
 
 def test_discs_in_a_row_touch_the_spacing() -> None:
     """Diameter 8 at spacing 2: ten need 98 mm of length in a channel as wide as one."""
-    stock = Stock(8 + 2 * 5, 98 + 2 * 5, 5, 2.0)
+    stock = Stock(width=8 + 2 * 5, length=98 + 2 * 5, border=5, spacing=2.0)
     result = nested([part(disc((0.0, 0.0), 4.0), 10)], stock)
     assert result.sheets == 1
     heights = sorted(result.region(place).bounds[1] for place in result.placements)
@@ -65,39 +65,39 @@ def test_discs_lie_closer_than_in_squares() -> None:
     # The grid may cost every row two of its cells of 0.1 mm.
     length = 10 + (rows - 1) * (pitch * math.sqrt(3) / 2 + 0.2)
     width = 10 + (a_row - 0.5) * pitch + 0.5
-    stock = Stock(width + 10, length + 10, 5, 1.0)
+    stock = Stock(width=width + 10, length=length + 10, border=5)
     assert length < 10 + (rows - 1) * pitch
     assert nested([part(disc((0.0, 0.0), 5.0), rows * a_row)], stock).sheets == 1
 
 
 def test_no_part_goes_into_a_hole_which_is_cut_before_it() -> None:
     frame = rectangle((0.0, 0.0), (40.0, 40.0)) - rectangle((5.0, 5.0), (35.0, 35.0))
-    stock = Stock(60, 60, 10, 1.0)
+    stock = Stock(width=60, length=60)
     result = nested([part(frame, 1), part(disc((0.0, 0.0), 14.0), 1, "P02")], stock)
     assert result.sheets == 2
 
 
 def test_only_turns_that_the_stock_allows_are_used() -> None:
-    upright = Stock(60, 200, 10, 1.0, turns=(0, 2))
+    upright = Stock(width=60, length=200, turns=(0, 2))
     result = nested([part(rectangle((0.0, 0.0), (39.0, 5.0)), 12)], upright)
     assert {place.turn % 2 for place in result.placements} == {0}
 
 
 def test_a_part_is_turned_where_only_that_fits() -> None:
-    stock = Stock(40, 80, 5, 1.0)
+    stock = Stock(width=40, length=80, border=5)
     result = nested([part(rectangle((0.0, 0.0), (69.97, 29.98)), 1)], stock)
     assert [place.turn % 2 for place in result.placements] == [1]
 
 
 def test_a_part_as_large_as_the_usable_area_is_nested() -> None:
-    stock = Stock(52.437, 61.291, 10, 1.0)
+    stock = Stock(width=52.437, length=61.291)
     whole = rectangle((1.0, 1.0), (33.437, 42.291))
     assert nested([part(whole, 2)], stock).sheets == 2
 
 
 def test_parts_keep_clear_of_pins() -> None:
     pins = ((20.0, 20.0, 6.0), (50.0, 61.0, 3.0))
-    stock = Stock(80, 80, 5, 1.5, pins=pins)
+    stock = Stock(width=80, length=80, border=5, spacing=1.5, pins=pins)
     result = nested([part(rectangle((0.0, 0.0), (11.0, 9.0)), 30)], stock)
     assert result.sheets == 1
     for x, y, diameter in pins:
@@ -108,20 +108,20 @@ def test_parts_keep_clear_of_pins() -> None:
 
 def test_a_roll_is_cut_off_after_its_parts() -> None:
     """Twelve squares of 10 mm, four across: three rows and two spacings between borders."""
-    stock = Stock(63, 5000, 10, 1.0, roll=True)
+    stock = Stock(width=63, length=5000, roll=True)
     result = nested([part(rectangle((0.0, 0.0), (10.0, 10.0)), 12)], stock)
     assert result.sheets == 1
     assert result.length(0) == pytest.approx(10 + 3 * 10 + 2 * 1 + 10)
 
 
 def test_sheets_have_their_whole_length() -> None:
-    result = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(60, 70, 10, 1.0))
+    result = nested([part(disc((0.0, 0.0), 5.0), 1)], Stock(width=60, length=70))
     assert result.length(0) == 70
 
 
 def test_the_same_parts_are_nested_alike() -> None:
     parts = [part(polygon([(0.0, 0.0), (9.0, 1.0), (3.0, 7.0)]), 9), part(disc((1.0, 2.0), 3.0), 7)]
-    stock = Stock(70, 60, 5, 0.8)
+    stock = Stock(width=70, length=60, border=5, spacing=0.8)
     assert nested(parts, stock).placements == nested(parts, stock).placements
 
 
@@ -141,7 +141,7 @@ regions = st.one_of(
 def test_shapely_agrees_that_random_parts_are_apart(
     chosen: list[tuple[Region, int]], spacing: float
 ) -> None:
-    stock = Stock(45.0, 50.0, 4.0, spacing, pins=((22.0, 25.0, 2.0),))
+    stock = Stock(width=45.0, length=50.0, border=4.0, spacing=spacing, pins=((22.0, 25.0, 2.0),))
     result = nested(
         [part(region, count, f"P{i}") for i, (region, count) in enumerate(chosen)], stock
     )
@@ -160,6 +160,6 @@ def test_forty_lobed_plates_and_39_separators_lie_on_one_sheet(
     lobed_plates: list[NestPart],
 ) -> None:
     """On the 132.4 mm square that a border of 10 mm leaves of the press's heated area."""
-    result = nested(lobed_plates, Stock(152.4, 152.4, 10, 1.0))
+    result = nested(lobed_plates, Stock())
     assert len(result.placements) == 79
     assert result.sheets == 1

@@ -17,7 +17,7 @@ from sbafab.nesting.check import check_nest, check_placed, edge_distance, least_
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock
 
 SQUARE = rectangle((0.0, 0.0), (10.0, 10.0))
-STOCK = Stock(60, 60, 5, 1.0, pins=((50.0, 50.0, 4.0),), most=2)
+STOCK = Stock(width=60, length=60, border=5, pins=((50.0, 50.0, 4.0),), most=2)
 
 
 def nest_of(*shifts: tuple[float, float, int], count: int | None = None) -> Nest:

@@ -92,7 +92,7 @@ def test_the_commonest_plate_lies_closer_than_bottom_left_puts_it() -> None:
     walls = max(
         (layers for layers in laminate.patterns.values() if layers[0].role == "wall"), key=len
     )
-    stock = Stock(152.4, 152.4, 10, 1.23)
+    stock = Stock(spacing=1.23)
     part = NestPart("3dof", "P05", 1, "TPE", walls[0].profile, 210)
     (result,) = nest([part], {"TPE": stock})
     check_nest(result)
@@ -148,7 +148,7 @@ BITTEN = rectangle((0.0, 0.0), (6.0, 9.0)) - disc((6.0, 4.5), 2.4)
 def test_parts_round_lattices_and_pins_are_apart(
     shapes: tuple[Region, ...], spacing: float
 ) -> None:
-    stock = Stock(64.0, 58.0, 4.0, spacing, pins=((31.0, 22.0, 2.5),))
+    stock = Stock(width=64.0, length=58.0, border=4.0, spacing=spacing, pins=((31.0, 22.0, 2.5),))
     parts = [
         NestPart("demo", f"P{i}", 1, "TPE", shape, count)
         for i, (shape, count) in enumerate(zip(shapes, (70, 14, 5), strict=True))

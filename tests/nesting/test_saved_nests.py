@@ -17,7 +17,10 @@ PARTS = (
     NestPart("demo", "P02", 1, "PTFE", disc((0.0, 0.0), 3.3), 5),
     NestPart("demo", "P03", 1, "TPE", disc((1.0, 0.0), 4.1), 3),
 )
-STOCKS = {"TPE": Stock(40, 40, 5, 1.0), "PTFE": Stock(50, 40, 5, 0.7)}
+STOCKS = {
+    "TPE": Stock(width=40, length=40, border=5),
+    "PTFE": Stock(width=50, length=40, border=5, spacing=0.7),
+}
 
 
 @pytest.fixture
@@ -43,7 +46,7 @@ def test_other_parts_are_nested_anew(saved: Any, parts: tuple[NestPart, ...]) ->
 
 
 def test_another_stock_is_nested_anew(saved: Any) -> None:
-    stocks = {**STOCKS, "PTFE": replace(STOCKS["PTFE"], spacing=0.8)}
+    stocks = {**STOCKS, "PTFE": STOCKS["PTFE"].model_copy(update={"spacing": 0.8})}
     assert from_dict(saved, PARTS, stocks) is None
 
 

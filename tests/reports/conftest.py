@@ -12,7 +12,7 @@ from sbafab.laminate.films import Material
 from sbafab.laminate.laminate import Laminate
 from sbafab.nesting.records import Nest, NestPart, Placement, Stock, Turn
 
-STOCK = Stock(152.4, 152.4, 10.0, 1.0, pins=((5.0, 5.0, 4.0),))
+STOCK = Stock(pins=((5.0, 5.0, 4.0),))
 MATERIALS: tuple[Material, ...] = ("TPE", "PTFE")
 TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
 
