@@ -26,7 +26,7 @@ GROUPS = {
     },
     "Check": {
         "check": "Run the rules on a design or on an output folder.",
-        "explain": "Explain a rule, a key of design files, or a quantity of find and predict.",
+        "explain": "Explain a rule, a key of design files, a quantity, or a flag of figures.",
         "compare": "Compare two designs: what differs, what each reaches.",
     },
     "Make": {

@@ -71,7 +71,7 @@ def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[C
 @click.argument("name", required=False, shell_complete=_completed)
 @json_option
 def explain(name: str | None, as_json: bool) -> None:
-    """Explain a rule, a key of design files, a quantity of find and predict, or a flag of figures.
+    """Explain a rule, a key of design files, a quantity, or a flag of figures.
 
     Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
     """
