@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, AliasPath, BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    AliasPath,
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    WithJsonSchema,
+)
 
 
 class Document(BaseModel):
@@ -29,12 +37,12 @@ class Document(BaseModel):
         keys = cls.read(record, **more).model_dump(mode="json", exclude_unset=True)
         return {"schema": cls.SCHEMA, **keys} if cls.SCHEMA else keys
 
-    @classmethod
-    def json_schema(cls) -> dict[str, Any]:
-        """Return the JSON schema, in which the id comes first."""
-        body = cls.model_json_schema(mode="serialization")
-        body["properties"] = {"schema": {"const": cls.SCHEMA}, **body["properties"]}
-        return {**body, "required": ["schema", *body["required"]]}
+
+def json_schema(record: type, identity: str) -> dict[str, Any]:
+    """Return the JSON schema of a record or document that is written below its id."""
+    body = TypeAdapter(record).json_schema(mode="serialization")
+    body["properties"] = {"schema": {"const": identity}, **body["properties"]}
+    return {**body, "required": ["schema", *body["required"]]}
 
 
 class _Joined:
@@ -49,8 +57,10 @@ class _Joined:
 
 
 def at(path: str) -> Any:
-    """Return a field that stands elsewhere in the record: a dotted path of attributes."""
-    return Field(validation_alias=AliasPath(*path.split(".")))
+    """Return a field that stands elsewhere in the record: a dotted path to it."""
+    first, *rest = path.split(".")
+    places = (int(name) if name.isdigit() else name for name in rest)
+    return Field(validation_alias=AliasPath(first, *places))
 
 
 Number = Annotated[int | float, WithJsonSchema({"type": "number"})]

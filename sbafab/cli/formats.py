@@ -17,12 +17,13 @@ from sbafab.cli.explain import DesignKey
 from sbafab.cli.kerf import KerfDocument
 from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
 from sbafab.design.laminate_file import LaminateDocument
-from sbafab.documents import Document
+from sbafab.documents import json_schema
 from sbafab.errors import ERROR_SCHEMA
 from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
 from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.models.map_files import MapDocument
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
@@ -30,16 +31,11 @@ from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
 from sbafab.pressing.schedule_files import PRESS_SCHEMA
-from sbafab.reports.assembly_prediction import (
-    AssemblyFigure,
-    AssemblyPrediction,
-    BentTouch,
-    Touch,
-)
+from sbafab.reports.assembly_prediction import AssemblyPrediction
 from sbafab.reproduction.comparison import ComparisonDocument
 from sbafab.reproduction.page import ReproductionDocument
 from sbafab.results.records import HistoryEntry, LabRow, Record
-from sbafab.results.report import Comparison, Success
+from sbafab.results.report import ReportDocument
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.rule import Explanation
 from sbafab.search.find import Binding, RangeEnd, Spare
@@ -96,7 +92,6 @@ def finding() -> dict[str, Any]:
 
 YES = {"type": "boolean"}
 PATHS = {**array(TEXT), "description": "what lies in the folder"}
-SHARE = {"passed": COUNT, "tested": COUNT, "share": number(), "low": number(), "high": number()}
 
 
 def _run() -> dict[str, Any]:
@@ -170,17 +165,6 @@ def _history() -> dict[str, Any]:
     return table(schema={"const": ids.HISTORY_SCHEMA}, devices=array(device))
 
 
-def _report() -> dict[str, Any]:
-    promised = {**number("null"), "description": "by registration-yield; null of several designs"}
-    return table(
-        schema={"const": ids.REPORT_SCHEMA},
-        records=COUNT,
-        actuators=COUNT,
-        success=array(of(Success, "share", **SHARE, promised=promised)),
-        measured=array(of(Comparison)),
-    )
-
-
 def _sweep() -> dict[str, Any]:
     counts = {"type": "object", "additionalProperties": COUNT}
     return table(
@@ -242,49 +226,6 @@ def _simulate() -> dict[str, Any]:
         rate={**number(), "description": "sofa, mujoco"},
         states={**array(and_perhaps(table(**moment), **loads)), "description": "in order of time"},
         stopped={"type": ["string", "null"], "description": "why it ended early, if it did"},
-    )
-
-
-def _assembly_predict() -> dict[str, Any]:
-    measured = {
-        **TEXT,
-        "description": "what the paper measured of one actuator, where the model is off by more "
-        "than a quarter of it",
-    }
-    volume = {**number(), "description": "mm3"}
-    bend = {**number(), "description": "degrees"}
-    return of(
-        AssemblyPrediction,
-        schema={"const": ids.ASSEMBLY_PREDICT_SCHEMA},
-        figures=array(of(AssemblyFigure, measured=measured)),
-        touches=array(of(Touch, volume=volume)),
-        bent_touches=array(of(BentTouch, volume=volume, bend=bend)),
-    )
-
-
-def _balloon_map() -> dict[str, Any]:
-    rows = array(array(number()))
-    grid = {
-        **array(array(number("null"))),
-        "description": "a row a pressure, a column a height; null where the map does not hold",
-    }
-    sizes = ("pocket_radius_mm", "neck_radius_mm", "bore_radius_mm", "film_mm", "modulus_kpa")
-    balloon = table(
-        **dict.fromkeys((*sizes, "poisson"), number()),
-        pressure=array(number()),
-        height=array(number()),
-        force=grid,
-        volume=grid,
-        potential=grid,
-    )
-    return table(
-        schema={"const": ids.MAP_SCHEMA},
-        design=TEXT,
-        units={"type": "object", "additionalProperties": TEXT},
-        levels={**array(COUNT), "description": "which of the balloons stands there, from 1"},
-        flat_level_mm=number(),
-        chamber_axes_mm=rows,
-        balloons=array(balloon),
     )
 
 
@@ -571,15 +512,11 @@ def _compare() -> dict[str, Any]:
 
 
 class Format(NamedTuple):
-    """A format: the id that stands in the files, what it describes, and what makes its schema."""
+    """A format: the id in its files, what it describes, and what its schema comes from."""
 
     identity: str
     about: str
-    body: Callable[[], dict[str, Any]]
-
-
-def _document(document: type[Document], about: str) -> Format:
-    return Format(document.SCHEMA, about, document.json_schema)
+    body: type | Callable[[], dict[str, Any]]
 
 
 FORMATS: Mapping[str, Format] = {
@@ -616,7 +553,7 @@ FORMATS: Mapping[str, Format] = {
     "nested": Format(ids.NESTED_SCHEMA, "what `nest --json` prints", _nested),
     "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
     "history": Format(ids.HISTORY_SCHEMA, "what `record --export FILE.json` writes", _history),
-    "report": Format(ids.REPORT_SCHEMA, "what `record --report --json` prints", _report),
+    "report": Format(ReportDocument.SCHEMA, "what `record --report --json` prints", ReportDocument),
     "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
     "simulate": Format(
         ids.SIMULATE_SCHEMA,
@@ -626,15 +563,23 @@ FORMATS: Mapping[str, Format] = {
     "assembly-predict": Format(
         ids.ASSEMBLY_PREDICT_SCHEMA,
         "what `predict --json` prints of an assembly",
-        _assembly_predict,
+        AssemblyPrediction,
     ),
-    "reproduction": _document(
-        ReproductionDocument, "`reproduction.json`, and what `reproduce --json` prints"
+    "reproduction": Format(
+        ReproductionDocument.SCHEMA,
+        "`reproduction.json`, and what `reproduce --json` prints",
+        ReproductionDocument,
     ),
-    "comparison": _document(ComparisonDocument, "what `reproduce SOURCE --json` prints"),
-    "balloon-map": Format(ids.MAP_SCHEMA, "what `map --to FILE.json` writes", _balloon_map),
-    "inspection": _document(InspectionDocument, "what `inspect` writes, and prints with `--json`"),
-    "kerf": _document(KerfDocument, "what `kerf --json` prints"),
+    "comparison": Format(
+        ComparisonDocument.SCHEMA, "what `reproduce SOURCE --json` prints", ComparisonDocument
+    ),
+    "balloon-map": Format(MapDocument.SCHEMA, "what `map --to FILE.json` writes", MapDocument),
+    "inspection": Format(
+        InspectionDocument.SCHEMA,
+        "what `inspect` writes, and prints with `--json`",
+        InspectionDocument,
+    ),
+    "kerf": Format(KerfDocument.SCHEMA, "what `kerf --json` prints", KerfDocument),
     "explain": Format(ids.EXPLAIN_SCHEMA, "what `explain NAME --json` prints", _explain),
     "explained": Format(
         ids.EXPLAINED_SCHEMA, "what `explain --json` prints of all rules", _explained
@@ -652,4 +597,5 @@ def schema_of(name: str) -> dict[str, Any]:
     """Return the JSON schema of a format in ``FORMATS``."""
     form = FORMATS[name]
     head = {"$schema": DIALECT, "$id": f"urn:{form.identity.replace('/', ':')}"}
-    return {**head, **form.body()}
+    body = form.body
+    return {**head, **(json_schema(body, form.identity) if isinstance(body, type) else body())}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -50,7 +51,7 @@ from sbafab.models.prediction import predict as predicted
 from sbafab.models.sensitivities import SensitivityRow, sensitivity_table
 from sbafab.output.artefacts import prediction_json
 from sbafab.output.schema_ids import ASSEMBLY_PREDICT_SCHEMA
-from sbafab.reports.assembly_prediction import AssemblyPrediction, as_json, predict_assembly
+from sbafab.reports.assembly_prediction import AssemblyPrediction, predict_assembly
 from sbafab.runs.run import RunRequest, generate
 
 if TYPE_CHECKING:
@@ -223,7 +224,7 @@ def _predict_assembly(
 ) -> None:
     prediction = predict_assembly(assemble(assembly), pressure_kpa, load_g)
     if request.as_json:
-        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **as_json(prediction)})
+        print_json({"schema": ASSEMBLY_PREDICT_SCHEMA, **asdict(prediction)})
     else:
         print_assembly_prediction(prediction)
     if prediction.touches:

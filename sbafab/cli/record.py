@@ -12,10 +12,10 @@ import click
 from sbafab.cli.options import LENGTH, PRESSURE, Command, json_option, set_option
 from sbafab.cli.printing import print_json, print_table, print_verdict
 from sbafab.errors import DesignError
-from sbafab.output.schema_ids import RECORDS_SCHEMA, REPORT_SCHEMA
+from sbafab.output.schema_ids import RECORDS_SCHEMA
 from sbafab.results import recording
 from sbafab.results.records import ERRORS, HistoryEntry, LabRow, Record, columns, row_of
-from sbafab.results.report import Report, report, success_svg
+from sbafab.results.report import Report, ReportDocument, report, success_svg
 from sbafab.results.store import Contents, Lab
 
 MEASUREMENTS: tuple[tuple[str, str, Any, str, str], ...] = (
@@ -322,9 +322,9 @@ FITTED = ("stroke_mm", "force_n", "height_mm")
 
 def print_report(report: Report, as_json: bool) -> None:
     """Print success, measured against predicted values, advice, and last the counts."""
-    document = report.as_dict()
+    document = ReportDocument.of(report)
     if as_json:
-        print_json({"schema": REPORT_SCHEMA, **document})
+        print_json(document)
         return
     for name, title in TITLES.items():
         rows = [{k: v for k, v in row.items() if k not in NOT_PRINTED} for row in document[name]]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sbafab.documents import Document, Number, Short, at
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
 from sbafab.models.joint_chain import urdf_text
 from sbafab.models.map_range import holds_at, map_range
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from sbafab.models.film_elements import Array
     from sbafab.models.stack import Stack
 
-SCHEMA = "sbafab/balloon-map@1"
 POINTS = 31
 COLUMNS = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potential_uj")
 FORMATS = ("csv", "json", "py", "urdf")
@@ -63,49 +63,74 @@ def _csv(stack: Stack, points: int) -> str:
     return csv_text(rows)
 
 
+class BalloonSizes(Document):
+    """Sizes of a balloon, and its film."""
+
+    pocket_radius_mm: Number = at("balloon.pocket")
+    neck_radius_mm: Number = at("balloon.neck")
+    bore_radius_mm: Number = at("balloon.bore")
+    film_mm: Number = at("balloon.thickness")
+    modulus_kpa: Number = at("balloon.modulus")
+    poisson: Number = at("balloon.poisson")
+
+
+Grid = list[list[Short | None]]
+
+
+class MappedBalloon(BalloonSizes):
+    """A balloon over pressures and heights: rows of the tables are by pressure, columns by height;
+    null where the map does not hold.
+    """
+
+    pressure: list[Short]
+    height: list[Short]
+    force: Grid
+    volume: Grid
+    potential: Grid
+
+
+class MapDocument(Document):
+    """The balloons of a design."""
+
+    SCHEMA = "sbafab/balloon-map@1"
+
+    design: str
+    units: dict[str, str]
+    levels: list[int]
+    """which of the balloons stands there, from 1"""
+    flat_level_mm: Short = at("pitch")
+    chamber_axes_mm: list[list[Short]]
+    balloons: list[MappedBalloon]
+
+
 def _record(name: str, stack: Stack, points: int) -> dict[str, Any]:
-    return {
-        "schema": SCHEMA,
-        "design": name,
-        "units": {"pressure": "kPa", "height": "mm", "force": "mN", "volume": "ul"},
-        "levels": [int(kind) + 1 for kind in stack.levels],
-        "flat_level_mm": _short(stack.pitch),
-        "chamber_axes_mm": [[_short(x) for x in axis] for axis in stack.axes.tolist()],
-        "balloons": [_balloon(balloon, points) for balloon in stack.maps],
-    }
+    return MapDocument.of(
+        stack,
+        design=name,
+        units={"pressure": "kPa", "height": "mm", "force": "mN", "volume": "ul"},
+        levels=[int(kind) + 1 for kind in stack.levels],
+        chamber_axes_mm=stack.axes.tolist(),
+        balloons=[_balloon(balloon, points) for balloon in stack.maps],
+    )
 
 
-def _balloon(balloon: BalloonMap, points: int) -> dict[str, Any]:
+def _balloon(balloon: BalloonMap, points: int) -> MappedBalloon:
     pressures, heights = _grid(balloon, points)
     p, h = np.meshgrid(pressures, heights, indexing="ij")
     holds = holds_at(balloon, p.ravel(), h.ravel()).reshape(p.shape)
-    return {
-        **_dimensions(balloon),
-        "pressure": [_short(value) for value in pressures.tolist()],
-        "height": [_short(value) for value in heights.tolist()],
-        "force": _rows(balloon.force(p, h), holds),
-        "volume": _rows(balloon.volume(p, h), holds),
-        "potential": _rows(balloon.potential(p, h), holds),
-    }
-
-
-def _dimensions(balloon: BalloonMap) -> dict[str, float]:
-    film = balloon.balloon
-    return {
-        "pocket_radius_mm": film.pocket,
-        "neck_radius_mm": film.neck,
-        "bore_radius_mm": film.bore,
-        "film_mm": film.thickness,
-        "modulus_kpa": film.modulus,
-        "poisson": film.poisson,
-    }
+    return MappedBalloon.read(
+        balloon,
+        pressure=pressures.tolist(),
+        height=heights.tolist(),
+        force=_rows(balloon.force(p, h), holds),
+        volume=_rows(balloon.volume(p, h), holds),
+        potential=_rows(balloon.potential(p, h), holds),
+    )
 
 
 def _rows(values: Array, holds: NDArray[np.bool_]) -> list[list[float | None]]:
     rows = zip(values.tolist(), holds.tolist(), strict=True)
-    return [
-        [_short(value) if here else None for value, here in zip(*row, strict=True)] for row in rows
-    ]
+    return [[value if here else None for value, here in zip(*row, strict=True)] for row in rows]
 
 
 def _short(value: float) -> float:
@@ -244,7 +269,7 @@ def _cells(balloon: BalloonMap) -> dict[str, list[float] | list[str]]:
 def _python(name: str, stack: Stack) -> str:
     balloons = [
         {
-            **_dimensions(balloon),
+            **BalloonSizes.of(balloon),
             "most_pressure": balloon.most_pressure,
             "most_height": balloon.most_height,
             "scale_pressure": balloon.scale_pressure,

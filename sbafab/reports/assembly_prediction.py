@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -58,7 +59,8 @@ class Clearance(NamedTuple):
     gap: float
 
 
-class BentTouch(NamedTuple):
+@dataclass(frozen=True)
+class BentTouch:
     """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
 
     It meets it from about ``from_kpa`` on, bent by ``bend`` degrees; ``measured`` is the paper's
@@ -258,7 +260,8 @@ PAPERS = ("aperture", "brace", "standing")
 """The assemblies that the paper built: figures of others stand beside nothing."""
 
 
-class AssemblyFigure(NamedTuple):
+@dataclass(frozen=True)
+class AssemblyFigure:
     """One figure of a part: value in ``unit``, model, and what the paper says, if it does.
 
     ``measured`` is what it measured of a single actuator, where the model is off by more than a
@@ -274,7 +277,8 @@ class AssemblyFigure(NamedTuple):
     measured: str = ""
 
 
-class Touch(NamedTuple):
+@dataclass(frozen=True)
+class Touch:
     """Two parts that share ``volume`` mm3 when the first one is inflated."""
 
     part: str
@@ -282,7 +286,8 @@ class Touch(NamedTuple):
     volume: float
 
 
-class AssemblyPrediction(NamedTuple):
+@dataclass(frozen=True)
+class AssemblyPrediction:
     """Figures at ``pressure_kpa``; ``touches`` are parts in each other's way when all stand up
     straight, ``bent_touches`` what arms meet when bent; ``left_out`` says what no model reaches,
     ``near_burst`` which parts are above half of their estimated burst pressure.
@@ -294,8 +299,8 @@ class AssemblyPrediction(NamedTuple):
     figures: tuple[AssemblyFigure, ...]
     touches: tuple[Touch, ...]
     left_out: tuple[str, ...]
-    bent_touches: tuple[BentTouch, ...] = ()
-    near_burst: tuple[str, ...] = ()
+    bent_touches: tuple[BentTouch, ...]
+    near_burst: tuple[str, ...]
 
     def met(self) -> list[str]:
         """Sentences on what inflated parts meet, and what would mend it."""
@@ -399,7 +404,7 @@ def predict_assembly(
         else:
             left_out.append(f"{placed.name}: no model knows the form of a drawn pocket outline")
     if assembled.assembly.name not in PAPERS:
-        figures = [figure._replace(paper="") for figure in figures]
+        figures = [replace(figure, paper="") for figure in figures]
     return AssemblyPrediction(
         assembled.assembly.name,
         pressure_kpa,
@@ -412,16 +417,6 @@ def predict_assembly(
     )
 
 
-def as_json(prediction: AssemblyPrediction) -> dict[str, object]:
-    """Return the prediction as a record for programs."""
-    return {
-        **prediction._asdict(),
-        "figures": [figure._asdict() for figure in prediction.figures],
-        "touches": [touch._asdict() for touch in prediction.touches],
-        "bent_touches": [touch._asdict() for touch in prediction.bent_touches],
-    }
-
-
 def _arm(
     placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
@@ -432,7 +427,7 @@ def _arm(
         form = placed.made.design.form
         of_papers = is_the_papers_3dof(form, placed.made.laminate)
         beside = counterpart(form, name, model, calibration, of_papers)
-        yield figure._replace(measured=beside.sentence() if beside else "")
+        yield replace(figure, measured=beside.sentence() if beside else "")
 
 
 def _as_predicted(name: str, pressure: float) -> tuple[str, str]:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import accumulate
 from statistics import fmean, stdev
-from typing import Any, Literal
+from typing import Literal
 
 from sbafab.cutting.calibration import student_t
+from sbafab.documents import Document, at
 from sbafab.errors import DesignError
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.results.builds import Build
@@ -70,13 +71,6 @@ class Success:
     passed_later: int
     promised: float | None = None
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the row for JSON, with the 95 % interval of the share."""
-        (low, high), share = self.share.interval, self.share.value
-        shown = {"by": self.by, "name": self.name, "passed": self.share.good}
-        shown |= {"tested": self.share.builds, "share": share, "low": low, "high": high}
-        return {**shown, "promised": self.promised, "passed_later": self.passed_later}
-
 
 @dataclass(frozen=True)
 class Comparison:
@@ -108,14 +102,31 @@ class Report:
     success: tuple[Success, ...]
     comparisons: tuple[Comparison, ...]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the report for JSON; every value has its unit beside it or is a share."""
-        return {
-            "records": self.records,
-            "actuators": self.items,
-            "success": [row.as_dict() for row in self.success],
-            "measured": [asdict(row) for row in self.comparisons],
-        }
+
+class SuccessDocument(Document):
+    """A share of actuators that passed, with its 95 % interval."""
+
+    by: By
+    name: str
+    passed: int = at("share.good")
+    tested: int = at("share.builds")
+    share: float = at("share.value")
+    low: float = at("share.interval.0")
+    high: float = at("share.interval.1")
+    promised: float | None
+    """by registration-yield; null of several designs"""
+    passed_later: int
+
+
+class ReportDocument(Document):
+    """A report; every value has its unit beside it or is a share."""
+
+    SCHEMA = "sbafab/report@1"
+
+    records: int
+    actuators: int = at("items")
+    success: list[SuccessDocument]
+    measured: list[Comparison] = at("comparisons")
 
 
 def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import jsonschema
@@ -93,12 +94,11 @@ def test_what_is_predicted_of_an_assembly_is_of_its_schema() -> None:
         BentTouch,
         Touch,
     )
-    from sbafab.reports.assembly_prediction import as_json as told
 
     figure = AssemblyFigure("arm", "height, flat", 1.14, "mm", "elastic stack")
     touch, bent = Touch("arm", "cup", 0.1), BentTouch("arm", "cup", "chamber1", 0.1, 5.0, 80.0)
-    found = AssemblyPrediction("one", 10.0, 1.2, (figure,), (touch,), ("x: why",), (bent,))
-    document = json.loads(json.dumps({"schema": ASSEMBLY_PREDICT_SCHEMA, **told(found)}))
+    found = AssemblyPrediction("one", 10.0, 1.2, (figure,), (touch,), ("x: why",), (bent,), ())
+    document = json.loads(json.dumps({"schema": ASSEMBLY_PREDICT_SCHEMA, **asdict(found)}))
     hold("assembly-predict", document)
 
 
