@@ -167,6 +167,26 @@ def test_three_copies_share_a_lamination(standing: Run) -> None:
     assert "45 min in the press instead of 135" in page
 
 
+def test_the_total_counts_what_is_known_where_press_minutes_are_not(
+    aperture: Run, tmp_path: Path
+) -> None:
+    """Of a film that they were not stated for: the rest of a total is as it was."""
+    film = [f"parts.arm.set.films.tpe.{key}" for key in ("product=TPU", "thickness=0.038")]
+    other = generate(RunRequest(load_assembly("aperture", [*BRACE, *film]), tmp_path, ("press",)))
+    hours = [
+        re.search(
+            r"Total, without joining(at least )?([0-9.]+) h( and the press minutes)?",
+            lxml_html.parse(run.folder / "traveller.html").getroot().text_content(),
+        )
+        for run in (aperture, other)
+    ]
+    assert [bool(each and each[1] and each[3]) for each in hours] == [False, True]
+    known, least = (float(each[2]) for each in hours if each)
+    plans = map(json.loads, (p.read_text("utf-8") for p in aperture.folder.rglob("press.json")))
+    minutes = sum(plan["total_press_minutes"] for plan in plans)
+    assert known - least == pytest.approx(minutes / 60, abs=0.11)
+
+
 def test_a_failed_check_leaves_findings_and_nothing_to_cut(tmp_path: Path) -> None:
     run = generate(RunRequest(load_assembly("aperture", [*BRACE, *OFF]), tmp_path))
     assert run.failed

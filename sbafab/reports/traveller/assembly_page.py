@@ -293,14 +293,15 @@ def _not_together(job: AssemblyJob) -> str:
 
 def _times(job: AssemblyJob) -> list[bill.Time]:
     rows: list[bill.Time] = []
-    total: float | None = 0.0
-    waited = cure = 0.0
+    worked = waited = cure = 0.0
+    is_known = True
     for design in job.works:
         plan, runs = design.work.schedule, design.runs
         pressed = units.product(runs.count, plan.total_press_minutes)
         handled = runs.copies * HANDLING_MINUTES
         whole = None if pressed is None else pressed + handled
-        total = None if total is None or whole is None else total + whole
+        worked += handled + (pressed or 0.0)
+        is_known &= pressed is not None
         made_of = (
             f"{units.count(runs.count, 'lamination')} of {units.plain(plan.total_press_minutes)} "
             f"min; {handled:g} min of handling: cutting, lay-up, pins, tubes"
@@ -314,19 +315,21 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
     rows.append(bill.Time("Laser (within making)", laser, f"{basis}; all sheets"))
     basis = "estimate, each plate after the other; warming cold platens comes before"
     rows.append(bill.Time("Warming and cooling", units.minutes(waited), basis))
-    return [*rows, _total_time(job, None if total is None else total + waited, cure)]
+    return [*rows, _total_time(job, worked + waited, cure, is_known)]
 
 
-def _total_time(job: AssemblyJob, worked: float | None, cure: float) -> bill.Time:
-    """Return the hours until all actuators can be tested, and what comes after."""
-    hours = units.hours(None) if worked is None else f"{worked / 60:.1f} h"
+def _total_time(job: AssemblyJob, worked: float, cure: float, is_known: bool) -> bill.Time:
+    """Return the hours until all actuators can be tested, and what comes after; at least what is
+    known where press minutes are not.
+    """
+    least, more = ("", "") if is_known else ("at least ", " and the press minutes")
     joints = sum(placed.part.on is not None for placed in job.assembled.parts)
     basis = (
-        f"{hours} until all tubes are glued; {cure / 60:g} h for their adhesive, "
+        f"{worked / 60:.1f} h{more} until all tubes are glued; {cure / 60:g} h for their adhesive, "
         f"then the tests; then {units.count(joints, 'joint')}, each cured as its package says "
         "before the next"
     )
-    took = units.hours(None) if worked is None else f"{(worked + cure) / 60:.1f} h"
+    took = f"{least}{(worked + cure) / 60:.1f} h{more}"
     return bill.Time("Total, without joining", took, basis)
 
 
