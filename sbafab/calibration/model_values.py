@@ -27,6 +27,7 @@ from sbafab.models.formulas import modulus, second_moments, usual_pressures
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line
 from sbafab.models.prediction import plate_of, predict
+from sbafab.models.quantity import ANYWHERE, Quantity, chamber_count
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Plate, Pose, Stack, stack
 from sbafab.models.unknowns import UNKNOWNS
@@ -181,17 +182,16 @@ class ModelledActuator:
         """The name of the elastic stack with its factors."""
         return elastic.calibrated(elastic.FORCE, self.factors).name
 
-    def figure(self, name: str) -> Figure:
-        """Return the prediction's figure of a name. Raises DesignError where it has none."""
+    def figure(self, quantity: Quantity) -> Figure:
+        """Return the prediction's figure of a quantity. Raises DesignError where it has none."""
         pressures = usual_pressures(self.design.form)[-1:]
         request = PredictionRequest(pressures, calibration=self.factors)
         prediction = predict(self.design, request, self.laminate, quick=True)
         for figure in prediction.figures:
-            if figure.name == name:
+            if figure.quantity is quantity:
                 return figure
-        raise DesignError(
-            next((item.reason for item in prediction.left_out if item.name == name), f"no {name}")
-        )
+        reasons = (item.reason for item in prediction.left_out if quantity in item.quantities)
+        raise DesignError(next(reasons, f"no {quantity.named(ANYWHERE)}"))
 
 
 def _by_pressure(
@@ -345,7 +345,7 @@ def _chamber_counts(of: ModelledActuator, curve: MeasuredCurve) -> list[int]:
 
 def _chambers(count: int, counts: list[int]) -> str:
     """Return the assumption that so many chambers are pressurised; "" where the source says so."""
-    return elastic.chamber_count(count) if len(counts) > 1 else ""
+    return chamber_count(count) if len(counts) > 1 else ""
 
 
 # Strokes, heights and bends.
@@ -564,9 +564,11 @@ def _moduli(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel
     return ModelValues(f"{of.name}, chambers shut", _by_pressure(curve, at))
 
 
-def _sizes(name: str) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]:
+def _sizes(
+    quantity: Quantity,
+) -> Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoModel]:
     def answer(of: ModelledActuator, curve: MeasuredCurve) -> ModelValues | NoModel:
-        figure = of.figure(name)
+        figure = of.figure(quantity)
         return ModelValues(figure.model.name, {"": (figure.value,) * len(curve.y)})
 
     return answer
@@ -578,16 +580,16 @@ ANSWERS: dict[str, Callable[[ModelledActuator, MeasuredCurve], ModelValues | NoM
     "height_mm": _strokes,
     "balloon_stroke_mm": _balloon_strokes,
     "bend_deg": _bends,
-    "flat_height_mm": _sizes("folded height"),
+    "flat_height_mm": _sizes(Quantity.FOLDED_HEIGHT),
     "energy_mj": _energies,
     "loss_mj": _losses,
     "loss_share": _loss_shares,
     "time_s": _times,
     "modulus_kpa": _moduli,
-    "burst_kpa": _sizes("burst pressure"),
-    "deflated_diameter_mm": _sizes("deflated diameter"),
-    "inflated_diameter_mm": _sizes("inflated diameter"),
-    "folded_diameter_mm": _sizes("folded diameter"),
-    "mass_g": _sizes("mass"),
+    "burst_kpa": _sizes(Quantity.BURST),
+    "deflated_diameter_mm": _sizes(Quantity.DEFLATED_DIAMETER),
+    "inflated_diameter_mm": _sizes(Quantity.INFLATED_DIAMETER),
+    "folded_diameter_mm": _sizes(Quantity.FOLDED_DIAMETER),
+    "mass_g": _sizes(Quantity.MASS),
 }
 """Functions that answer by quantity; the others are in WITHOUT_MODEL."""

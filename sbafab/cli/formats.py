@@ -22,8 +22,9 @@ from sbafab.errors import ERROR_SCHEMA
 from sbafab.inspection.inspection import InspectionDocument
 from sbafab.laminate.joints import PortKind
 from sbafab.laminate.netlist import SCHEMA as NETS_SCHEMA
-from sbafab.models.figures import FLAGS, Factors, LeftOut, Points, PredictionRequest, VerdictLine
+from sbafab.models.figures import FLAGS, Factors, Points, PredictionRequest, VerdictLine
 from sbafab.models.map_files import MapDocument
+from sbafab.models.quantity import ModelId, Quantity
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
 from sbafab.output.checked import CHECKS_SCHEMA
@@ -361,11 +362,20 @@ def _predict() -> dict[str, Any]:
         "type": ["array", "null"],
         "description": "bounds of a drawn pocket that is taken for a disc",
     }
+    quantity = {"enum": [quantity.key for quantity in Quantity]}
+    at = {
+        "type": "object",
+        "additionalProperties": {"type": ["number", "string"]},
+        "description": "conditions that it holds at, those that it depends on",
+    }
     figure = table(
+        quantity=quantity,
+        at=at,
         group=TEXT,
         name=TEXT,
         value=number(),
         unit=TEXT,
+        model_id={"enum": list(ModelId)},
         model=TEXT,
         trust=TEXT,
         design_with=design_with,
@@ -393,12 +403,11 @@ def _predict() -> dict[str, Any]:
         asked=asked,
         verdict=array(of(VerdictLine)),
         figures=array(figure),
-        left_out=array(of(LeftOut)),
+        left_out=array(table(name=TEXT, reason=TEXT, quantities=array(quantity))),
         relations=array(relation),
     )
     moved = of(SensitivityRow)
-    folder = {"type": ["string", "null"], "description": "null where nothing was written"}
-    return and_perhaps(found, failed=array(TEXT), folder=folder, sensitivity=array(moved))
+    return and_perhaps(found, failed=array(TEXT), folder=TEXT, sensitivity=array(moved))
 
 
 def _counterpart() -> dict[str, Any]:

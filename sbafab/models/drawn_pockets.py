@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 from sbafab.design.outline import read_outline
 from sbafab.design.records import Design, Discs, Drawn, Form
-from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest, Relation
+from sbafab.models.figures import BY_DISC, Figure, LeftOut, Model, PredictionRequest, Relation
 from sbafab.models.formulas import force
 from sbafab.models.kinematics import Actuator
+from sbafab.models.quantity import Conditions, ModelId, Quantity
 
 ROUNDNESS = 1.2
 """Largest ratio of the farthest to the nearest distance of a nearly round pocket's edge from its
@@ -25,7 +26,6 @@ axis: its stroke, in proportion to the diameter, is then known to some 10 % eith
 """
 EXACT_GROUPS = ("size", "inlet")
 """Groups of figures that are computed for the drawn pocket itself."""
-BY_DISC = "disc of equal area"
 
 
 class NearDiscs(NamedTuple):
@@ -90,11 +90,7 @@ def bounded(
     A figure that one of the bounds lacks is left out.
     """
     values_of = [
-        {
-            (figure.name, figure.model.name): figure.value
-            for figure in bound
-            if isinstance(figure, Figure)
-        }
+        {figure.key: figure.value for figure in bound if isinstance(figure, Figure)}
         for bound in bounds
     ]
     for figure in figures:
@@ -105,10 +101,11 @@ def bounded(
         ):
             yield figure
             continue
-        ends = [values.get((figure.name, figure.model.name)) for values in values_of]
+        ends = [values.get(figure.key) for values in values_of]
         values = [figure.value, *(end for end in ends if end is not None)]
         if None in ends:
-            yield LeftOut(figure.name, "a disc within or round the drawn pocket has none")
+            reason = "a disc within or round the drawn pocket has none"
+            yield LeftOut(figure.name, reason, (figure.quantity,))
             continue
         between = min(values), max(values)
         yield replace(figure, model=by_disc(figure.model, discs), between=between)
@@ -118,7 +115,7 @@ def by_disc(model: Model, discs: NearDiscs) -> Model:
     """Return a model as applied to a disc in place of the drawn pocket."""
     return replace(
         model,
-        name=f"{model.name}, {BY_DISC}",
+        by_disc=True,
         trust=f"{model.trust}; the drawn pocket taken for a disc of d = {discs.equal:.4g} mm, "
         f"bounds by the discs within and round it, {discs.inner:.4g} and {discs.outer:.4g} mm, "
         "where a wider pocket rises more and pushes harder",
@@ -138,7 +135,7 @@ def relation_by_disc(relation: Relation, discs: NearDiscs) -> Relation:
 
 
 FLAT_PLATES = Model(
-    "pressure x pocket area",
+    ModelId.FLAT_PLATES,
     "statics of a stiff plate",
     "an upper bound, for plates that lie flat on the whole pocket: the paper's 3-DoF actuator "
     "reached 0.83 of it at 100 kPa",
@@ -152,7 +149,5 @@ def flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figu
         return
     area = actuator.form.pushing * read_outline(drawing).area
     for pressure in request.pressures_kpa:
-        name = f"blocked force at {pressure:g} kPa, flat, at most"
-        yield Figure(
-            "force", name, float(force(pressure, area)), "N", FLAT_PLATES, pressure_kpa=pressure
-        )
+        value = float(force(pressure, area))
+        yield Figure(Quantity.FORCE_BOUND, value, FLAT_PLATES, Conditions(kpa=pressure))

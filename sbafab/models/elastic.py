@@ -20,7 +20,6 @@ from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import (
-    OF_CALIBRATION,
     Factors,
     Figure,
     LeftOut,
@@ -31,6 +30,7 @@ from sbafab.models.figures import (
 )
 from sbafab.models.kinematics import Actuator
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
+from sbafab.models.quantity import Conditions, ModelId, Quantity, chamber_count
 from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(
-    "elastic balloon",
+    ModelId.ELASTIC_BALLOON,
     "membrane of revolution, the film's modulus",
     "one balloon to 10 kPa: within 1.2 % of an axisymmetric mesh; of a solid one that ripples, "
     "d = 5 to 15 within 3 %, d = 20 within 5 %, but d = 10 is 6 to 19 % low where a lone one's rim "
@@ -61,18 +61,14 @@ CALIBRATED_TRUST = (
 def calibrated(model: Model, factors: Factors) -> Model:
     """Return a model with its calibration factors in its name, unless they are the defaults."""
     if factors.calibration:
-        name = f"{model.name}{OF_CALIBRATION}{factors.calibration}"
-        return replace(model, name=name, trust=CALIBRATED_TRUST)
-    factor_names = []
-    if factors.press_factor != 1:
-        factor_names.append(f"press factor {factors.press_factor:.3g}")
-    if factors.pocket_loss:
-        factor_names.append(f"pocket loss {factors.pocket_loss:g} mm")
-    if factors.modulus_mpa is not None:
-        factor_names.append(f"E = {factors.modulus_mpa:g} MPa")
-    return (
-        replace(model, name=f"{model.name}, {', '.join(factor_names)}") if factor_names else model
-    )
+        return replace(model, calibration=factors.calibration, trust=CALIBRATED_TRUST)
+    given = {
+        "press_factor": factors.press_factor if factors.press_factor != 1 else None,
+        "pocket_loss": factors.pocket_loss or None,
+        "modulus_mpa": factors.modulus_mpa,
+    }
+    named = tuple((factor, value) for factor, value in given.items() if value is not None)
+    return replace(model, factors=named)
 
 
 def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
@@ -84,33 +80,27 @@ def free_strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
             balloons_of(actuator.design, actuator.laminate, request.factors, actuator.form)
         )
     except DesignError as error:
-        yield LeftOut("free stroke, elastic balloon", str(error))
+        yield LeftOut("free stroke, elastic balloon", str(error), (Quantity.FREE_STROKE,))
         return
     model = calibrated(ELASTIC, request.factors)
     together = _inflated(kinds, request.pressures_kpa)
     for row, pressure in enumerate(request.pressures_kpa):
-        at = f"at {pressure:g} kPa"
+        at = Conditions(kpa=pressure)
         try:
             rise = free_rise(kinds, pressure, together[row] if together else None)
         except DesignError as error:
-            yield LeftOut(f"free stroke {at}, elastic balloon", str(error))
+            name = f"{Quantity.FREE_STROKE.named(at)}, elastic balloon"
+            yield LeftOut(name, str(error), (Quantity.FREE_STROKE,))
             continue
         height = actuator.thickness + rise.stroke
         volume = rise.volume / actuator.balloons
-        yield Figure("stroke", f"free stroke {at}", rise.stroke, "mm", model, pressure_kpa=pressure)
-        yield Figure("stroke", f"free height {at}", height, "mm", model, pressure_kpa=pressure)
-        yield Figure("stroke", f"volume a balloon {at}", volume, "ul", model, pressure_kpa=pressure)
+        yield Figure(Quantity.FREE_STROKE, rise.stroke, model, at)
+        yield Figure(Quantity.FREE_HEIGHT, height, model, at)
+        yield Figure(Quantity.BALLOON_VOLUME, volume, model, at)
         work = rise.energy * actuator.form.stacks / 1000
-        yield Figure(
-            "actuation",
-            f"pneumatic input work {at}, free",
-            work,
-            "mJ",
-            model,
-            pressure_kpa=pressure,
-        )
+        yield Figure(Quantity.FREE_WORK, work, model, at)
     if request.factors.loss_share:
-        yield Figure("actuation", paper.LOST_WORK, 100 * request.factors.loss_share, "%", model)
+        yield Figure(Quantity.LOST_WORK, 100 * request.factors.loss_share, model)
 
 
 def _inflated(kinds: Iterable[Balloon], pressures: Sequence[float]) -> list[Inflated] | None:
@@ -188,13 +178,13 @@ PROBE_FORCE = 1e-5
 """Lateral force in N on the tip with which its stiffness is probed."""
 SOURCE = "membrane of revolution between plates, the film's modulus"
 FORCE = Model(
-    "elastic stack",
+    ModelId.ELASTIC_STACK,
     SOURCE,
     "no shear between plates; films of constant modulus to 100 kPa. The paper's 3-DoF at 100 kPa "
     "has 0.9, 0.8 and 0.6 of it, its 1-DoF less",
 )
 BEND = Model(
-    "elastic stack",
+    ModelId.ELASTIC_STACK,
     SOURCE,
     "rigid plates that tilt, balloons that push by the gap at their ring, rims that touch on the "
     "inner side. The 3-DoF at 5 kPa has 86 deg with two chambers, 105 with one, where shells in "
@@ -202,24 +192,24 @@ BEND = Model(
     "that it does not give",
 )
 CONTACT = Model(
-    "elastic stack",
+    ModelId.ELASTIC_STACK,
     SOURCE,
     "films as wide as their meridians in balance; 0 is touching, which the stack then allows for",
 )
 TIME = Model(
-    "elastic stack in time",
+    ModelId.STACK_IN_TIME,
     f"Poiseuille or Blasius in {TUBE_LENGTH:g} mm of tube to each chamber",
     "the paper gives no length, and this one makes its 0.92 s come out; the sensor is taken to sit "
     "at the pump; no lag of valve and pump",
 )
 AT_PRESSURE = Model(
-    "elastic stack",
+    ModelId.ELASTIC_STACK,
     SOURCE,
     "no shear between plates; the paper's moduli would make it 15 times as firm, at a pressure "
     "that it does not give",
 )
 CHAMBERS_SHUT = Model(
-    "elastic stack, chambers shut",
+    ModelId.STACK_SHUT,
     SOURCE,
     "the air that is in the chambers stays in, tubes left out; no shear between plates",
 )
@@ -317,21 +307,20 @@ def _forces(
         if checks_films:
             longer = held_stretch(kinds, [pressure] * len(strokes), strokes)
         for share, stroke, strain in zip(shares, strokes, longer.tolist(), strict=True):
-            at = "flat" if share == 0 else f"at {100 * share:g} % of the reference stroke"
-            name = f"blocked force at {pressure:g} kPa, {at}"
+            quantity, at = Quantity.BLOCKED_FORCE, Conditions(kpa=pressure, share=share)
             try:
                 refuse_stretched(strain)
                 value = float(blocked_force(stack, pressure, stroke))
             except DesignError as error:
-                yield LeftOut(f"{name}, elastic stack", str(error)), None
+                name = f"{quantity.named(at)}, elastic stack"
+                yield LeftOut(name, str(error), (quantity,)), None
                 continue
             model = calibrated(FORCE, request.factors)
             pose = _level_pose(stack, pressure, stroke)
             if pose and not pose.stable:
                 model = replace(model, trust=f"{BUCKLES}; {model.trust}")
             value *= actuator.form.pushing
-            figure = Figure("force", name, value, "N", model, pressure_kpa=pressure)
-            yield replace(figure, quantity="flat_force") if share == 0 else figure, pose
+            yield Figure(quantity, value, model, at), pose
 
 
 def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
@@ -351,31 +340,24 @@ def _pressures(
     return (pressure,) * chambers + (rest,) * (stack.chambers - chambers)
 
 
-def chamber_count(number: int) -> str:
-    """Return a number of chambers in words."""
-    return "one chamber" if number == 1 else f"{number} chambers"
-
-
 def _bends(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
-    bent: list[tuple[float, str, Pose]] = []
+    bent: list[tuple[Conditions, Pose]] = []
     for pressure, chambers in product(request.pressures_kpa, range(1, stack.chambers)):
-        where = f"{pressure:g} kPa in {chamber_count(chambers)}, the others empty"
+        at = Conditions(kpa=pressure, chambers=chambers)
         try:
-            pose = stack.pose(_pressures(stack, chambers, pressure))
-            bent.append((pressure, where, pose))
+            bent.append((at, stack.pose(_pressures(stack, chambers, pressure))))
         except DesignError as error:
-            yield LeftOut(f"bend at {where}", str(error)), None
-    rooms = chamber_clearances(stack, [pose for _, _, pose in bent])
+            yield LeftOut(Quantity.BEND.named(at), str(error), (Quantity.BEND,)), None
+    rooms = chamber_clearances(stack, [pose for _, pose in bent])
     bends, contacts = (calibrated(model, request.factors) for model in (BEND, CONTACT))
-    for (pressure, where, pose), room in zip(bent, rooms.tolist(), strict=True):
-        aside = float(np.hypot(*pose.tip[:2]))
-        for name, value, unit, model in (
-            (f"bend at {where}", pose.bend, "deg", bends),
-            (f"room between rims on the inner side, {where}", rim_gap(stack, pose), "mm", contacts),
-            (f"clearance between chambers, {where}", room, "mm", contacts),
-            (f"lateral tip displacement at {where}", aside, "mm", bends),
+    for (at, pose), room in zip(bent, rooms.tolist(), strict=True):
+        for quantity, value, model in (
+            (Quantity.BEND, pose.bend, bends),
+            (Quantity.RIM_ROOM, rim_gap(stack, pose), contacts),
+            (Quantity.CHAMBER_CLEARANCE, room, contacts),
+            (Quantity.ASIDE, float(np.hypot(*pose.tip[:2])), bends),
         ):
-            yield Figure("bending", name, value, unit, model, pressure_kpa=pressure), pose
+            yield Figure(quantity, value, model, at), pose
 
 
 def pose_bent_by(stack: Stack, chambers: int, angle: float) -> Pose | None:
@@ -416,18 +398,20 @@ def _bent_forces(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem
     pressure = max(request.pressures_kpa)
     for chambers in range(1, min(stack.chambers, 3)):
         for angle in ANGLES:
-            name = f"force at {pressure:g} kPa in {chamber_count(chambers)}, bent by {angle:g} deg"
+            quantity = Quantity.BENT_FORCE
+            at = Conditions(kpa=pressure, chambers=chambers, angle=angle)
             pose = pose_bent_by(stack, chambers, angle)
             if pose is None or pose.pressures[0] > pressure:
-                yield LeftOut(name, "it does not bend so far"), None
+                reason = "it does not bend so far"
+                yield LeftOut(quantity.named(at), reason, (quantity,)), None
                 continue
             plate = Plate(_three(pose.tip), _three(pose.frames[1][-1][:, 2]))
             try:
                 pressed = stack.pose(_pressures(stack, chambers, pressure), plate=plate, near=pose)
             except DesignError as error:
-                yield LeftOut(name, str(error)), None
+                yield LeftOut(quantity.named(at), str(error), (quantity,)), None
                 continue
-            yield Figure("force", name, pressed.force, "N", model, pressure_kpa=pressure), pressed
+            yield Figure(quantity, pressed.force, model, at), pressed
 
 
 def _three(values: Array) -> tuple[float, float, float]:
@@ -467,51 +451,34 @@ def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> floa
 
 def _times(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     model = calibrated(TIME, request.factors)
-    until = f"{paper.FULL_KPA:g} kPa at the pump"
-    name = f"time to {until}, water at {request.flow_ml_min:g} ml/min in all"
+    at = Conditions(kpa=paper.FULL_KPA, flow=request.flow_ml_min)
     try:
         time, pose = time_to_fill(stack, request.flow_ml_min, paper.FULL_KPA)
     except DesignError as error:
-        yield LeftOut(name, str(error)), None
+        quantity = Quantity.WATER_TIME
+        yield LeftOut(quantity.named(at), str(error), (quantity,)), None
         return
-    yield (
-        Figure(
-            "actuation",
-            name,
-            time + request.factors.water_delay,
-            "s",
-            model,
-            pressure_kpa=paper.FULL_KPA,
-        ),
-        pose,
-    )
-    name = f"height when the water's pump shows {paper.FULL_KPA:g} kPa"
-    yield Figure("actuation", name, pose.height, "mm", model, pressure_kpa=paper.FULL_KPA), pose
+    yield Figure(Quantity.WATER_TIME, time + request.factors.water_delay, model, at), pose
+    at = Conditions(kpa=paper.FULL_KPA)
+    yield Figure(Quantity.WATER_HEIGHT, pose.height, model, at), pose
 
 
 def _stiffness(request: PredictionRequest, stack: Stack) -> Iterator[PosedItem]:
     for pressure in request.pressures_kpa[:1]:
-        name = f"lateral tip stiffness at {pressure:g} kPa"
+        at = Conditions(kpa=pressure)
+        held, shut = (calibrated(each, request.factors) for each in (AT_PRESSURE, CHAMBERS_SHUT))
         try:
             start = stack.pose((pressure,) * stack.chambers)
             aside = (PROBE_FORCE, 0.0, 0.0)
             pushed = stack.pose(start.pressures, aside, near=start)
-            yield _tip_stiffness(f"{name}, pressure held", pushed, AT_PRESSURE, request), start
-            shut, _ = shut_stiffness(stack, pressure)
-            model = calibrated(CHAMBERS_SHUT, request.factors)
-            yield (
-                Figure(
-                    "stiffness",
-                    f"{name}, chambers shut",
-                    shut,
-                    "N/mm",
-                    model,
-                    pressure_kpa=pressure,
-                ),
-                start,
-            )
+            stiffness = PROBE_FORCE / float(pushed.tip[0])
+            yield Figure(Quantity.HELD_STIFFNESS, stiffness, held, at), start
+            stiffness, _ = shut_stiffness(stack, pressure)
+            yield Figure(Quantity.SHUT_STIFFNESS, stiffness, shut, at), start
         except DesignError as error:
-            yield LeftOut(name, str(error)), None
+            both = (Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS)
+            name = f"lateral tip stiffness at {pressure:g} kPa"
+            yield LeftOut(name, str(error), both), None
 
 
 def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
@@ -523,12 +490,6 @@ def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
     shut = Motion(stack, Line(AIR, length=1e-3), {"tip_load": aside}, start)
     shut.step(1.0, flows=(0.0,) * stack.chambers)
     return PROBE_FORCE / float(shut.pose.tip[0]), start.height
-
-
-def _tip_stiffness(name: str, pose: Pose, model: Model, request: PredictionRequest) -> Figure:
-    value = PROBE_FORCE / float(pose.tip[0])
-    model = calibrated(model, request.factors)
-    return Figure("stiffness", name, value, "N/mm", model, pressure_kpa=pose.pressures[0])
 
 
 def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:

@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from sbafab.errors import DesignError
 from sbafab.laminate.assembly import folded_height
 from sbafab.models import paper, printed
-from sbafab.models.paper import EQ_4, Counterpart, is_calibrated
+from sbafab.models.paper import Counterpart
+from sbafab.models.quantity import (
+    ANYWHERE,
+    FACTOR_WORDS,
+    OF_STACK,
+    Conditions,
+    FigureKey,
+    ModelId,
+    Quantity,
+)
 from sbafab.notebook import data_frame, table_html
 
 if TYPE_CHECKING:
@@ -23,6 +32,8 @@ if TYPE_CHECKING:
     from sbafab.laminate.assembly import FoldedHeight
     from sbafab.laminate.laminate import Laminate
 
+BY_DISC = "disc of equal area"
+"""In the name of a model of discs that is applied to a drawn pocket."""
 MEASURED = "measured (paper)"
 """Stands for a model's name."""
 Flag = Literal["extrapolation", "near-burst"]
@@ -33,59 +44,98 @@ FLAGS: Mapping[Flag, str] = {
     NEAR_BURST: "above half of the estimated burst pressure",
 }
 """What a figure's flags say."""
-FigureQuantity = Literal["reference_stroke", "flat_force", "folded_height", "mass", "burst"]
-"""What a lab measures of a built actuator: of ``flat_force`` at a figure's pressure."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity."""
+    """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity.
 
-    name: str
+    ``factors`` are those that a user measured, by field of ``Factors``; ``calibration`` is the name
+    of the one that the model is calibrated by. ``by_disc``: a drawn pocket is taken for a disc.
+    """
+
+    id: ModelId
     source: str
     trust: str
+    factors: tuple[tuple[str, float], ...] = ()
+    calibration: str = ""
+    by_disc: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name in words, with calibration or factors."""
+        parts = [self.id.words]
+        parts += [f"calibration {self.calibration}"] if self.calibration else []
+        parts += [FACTOR_WORDS[factor].format(value) for factor, value in self.factors]
+        parts += [BY_DISC] if self.by_disc else []
+        return ", ".join(parts)
 
     @property
     def title(self) -> str:
         """Name and source in one."""
         return f"{self.name} ({self.source})" if self.source else self.name
 
-    def times(self, quantity: str, factor: float) -> Model:
-        """Return the model with a calibration factor in its name, unless that is 1."""
-        return self if factor == 1 else replace(self, name=f"{self.name} x {quantity} {factor:g}")
+    def times(self, factor: str, value: float) -> Model:
+        """Return the model with a factor (a field of ``Factors``), unless that is 1."""
+        return self if value == 1 else replace(self, factors=(*self.factors, (factor, value)))
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One predicted number: ``value`` in ``unit``, in its ``group``.
+    """One predicted number: the ``value`` of a ``quantity``, in its unit, ``at`` its conditions.
 
     ``other``: another model gives the same quantity, and that one is to design with.
     ``measured``: the paper's measurement, where the model is off by more than a quarter of it.
-    The value lies ``between`` two of the same ``unit``, where a drawn pocket is taken for a disc.
-    What would be measured lies in the ``interval``, in the same ``unit``, with a probability of
-    90 %, where a calibration says so. It is at ``pressure_kpa`` (gauge, a vacuum below 0), if at
-    any. ``flags`` say what it is not to be trusted for. ``quantity`` names what a lab measures.
+    The value lies ``between`` two of the same unit, where a drawn pocket is taken for a disc.
+    What would be measured lies in the ``interval``, in the same unit, with a probability of 90 %,
+    where a calibration says so. ``flags`` say what it is not to be trusted for.
     """
 
-    group: str
-    name: str
+    quantity: Quantity
     value: float
-    unit: str
     model: Model
+    at: Conditions = ANYWHERE
     other: bool = False
     measured: Counterpart | None = None
     between: tuple[float, float] | None = None
     interval: tuple[float, float] | None = None
-    pressure_kpa: float | None = None
     flags: tuple[Flag, ...] = ()
-    quantity: FigureQuantity | None = None
+
+    @property
+    def name(self) -> str:
+        """Quantity and conditions in words."""
+        return self.quantity.named(self.at)
+
+    @property
+    def key(self) -> FigureKey:
+        """What tells it from all others."""
+        return FigureKey(self.quantity, self.at, self.model.id)
+
+    @property
+    def group(self) -> str:
+        """The heading that it stands under."""
+        return self.quantity.group
+
+    @property
+    def unit(self) -> str:
+        """The unit of the value."""
+        return self.quantity.unit
+
+    @property
+    def pressure_kpa(self) -> float | None:
+        """The gauge pressure that it is at, if at any; a vacuum is below 0."""
+        return self.at.kpa
+
+    def is_of(self, quantity: Quantity, at: Conditions | None = None) -> bool:
+        """Return True for a figure of a quantity, at conditions that meet ``at``."""
+        return self.quantity is quantity and (at is None or self.at.meet(at))
 
     @property
     def counterpart(self) -> str:
         """The measured counterpart as a clause; empty where there is none."""
         if self.measured is None:
             return ""
-        return self.measured.sentence(is_calibrated(self.model.name))
+        return self.measured.sentence(bool(self.model.factors))
 
     @property
     def range(self) -> str:
@@ -109,14 +159,17 @@ class Figure:
 
     def as_dict(self) -> dict[str, Any]:
         return {
+            "quantity": self.quantity.key,
+            "at": self.at.as_dict(),
             "group": self.group,
             "name": self.name,
             "value": _rounded(self.value),
             "unit": self.unit,
+            "model_id": self.model.id,
             "model": self.model.title,
             "trust": self.model.trust,
             "design_with": not self.other,
-            "measured": self.measured and self.measured.as_dict(is_calibrated(self.model.name)),
+            "measured": self.measured and self.measured.as_dict(bool(self.model.factors)),
             "between": self.between and [_rounded(end) for end in self.between],
             "interval": self.interval and [_rounded(end) for end in self.interval],
             "pressure_kpa": self.pressure_kpa,
@@ -227,10 +280,20 @@ class Relation:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A figure that is not given, and the reason."""
+    """What is not given, in words, and the reason; with the ``quantities`` if they are certain
+    ones.
+    """
 
     name: str
     reason: str
+    quantities: tuple[Quantity, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "reason": self.reason,
+            "quantities": [quantity.key for quantity in self.quantities],
+        }
 
 
 @dataclass(frozen=True)
@@ -310,26 +373,40 @@ class Prediction:
     relations: tuple[Relation, ...]
     left_out: tuple[LeftOut, ...]
 
-    def value(self, name: str, model: str = "") -> float:
-        """Return the value, in its figure's unit, of this name by the model whose title begins so.
+    def figure(self, quantity: Quantity | str, model: str = "", **at: Any) -> Figure:
+        """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
+        figures apart), by a model (its id), or by the one to design with.
 
-        Raises KeyError where there is none, or where several models give one and none is named.
+        Raises DesignError where there is none, or several.
         """
-        named = [figure for figure in self.figures if figure.name == name]
-        matching = [figure for figure in named if figure.model.title.startswith(model)]
-        if not named:
-            raise KeyError(_unknown("figure", name, [figure.name for figure in self.figures]))
-        if len(matching) != 1:
-            titles = ", ".join(repr(figure.model.title) for figure in matching or named)
-            raise KeyError(f"{name!r} is given by {titles}; name one of these models")
-        return matching[0].value
+        sought = Quantity.of(quantity) if isinstance(quantity, str) else quantity
+        named = [figure for figure in self.figures if figure.is_of(sought, Conditions(**at))]
+        matching = [figure for figure in named if model in ("", figure.model.id)]
+        if len(matching) > 1:
+            matching = [figure for figure in matching if not figure.other]
+        if len(matching) == 1:
+            return matching[0]
+        every = named or [figure for figure in self.figures if figure.quantity is sought]
+        reasons = [left.reason for left in self.left_out if sought in left.quantities]
+        why = "; ".join(f"{figure.at.as_dict()} by {figure.model.id}" for figure in every)
+        why = f"there are {why}" if why else (reasons or ["it is not predicted"])[0]
+        by = f" by {model}" if model else ""
+        raise DesignError(f"{sought.key} at {at}{by} is not one figure: {why}")
+
+    def value(self, quantity: Quantity | str, model: str = "", **at: Any) -> float:
+        """Return the value of ``figure``, in its unit: ``value("blocked_force", kpa=100,
+        share=0.25, model="elastic-stack")``.
+        """
+        return self.figure(quantity, model, **at).value
 
     def relation(self, name: str) -> Relation:
-        """Return the curves of this name, such as "force". Raises KeyError where there are none."""
+        """Return the curves of this name, such as "force". Raises DesignError without any."""
         for relation in self.relations:
             if relation.name == name:
                 return relation
-        raise KeyError(_unknown("relation", name, [relation.name for relation in self.relations]))
+        names = [relation.name for relation in self.relations]
+        near = difflib.get_close_matches(name, names, 3) or names
+        raise DesignError(f"no relation is named {name!r}; did you mean {' or '.join(near)}?")
 
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
@@ -391,16 +468,9 @@ class Prediction:
             },
             "verdict": [line._asdict() for line in self.verdict],
             "figures": [figure.as_dict() for figure in self.figures],
-            "left_out": [{"name": item.name, "reason": item.reason} for item in self.left_out],
+            "left_out": [item.as_dict() for item in self.left_out],
             "relations": [relation.as_dict() for relation in self.relations],
         }
-
-
-def _unknown(kind: str, name: str, names: Sequence[str]) -> str:
-    """Return the message that nothing has this name, with the nearest names, each once."""
-    near = difflib.get_close_matches(name, list(dict.fromkeys(names)), 3)
-    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
-    return f"no {kind} is named {name!r}{hint}"
 
 
 def _rounded(value: float) -> float:
@@ -415,21 +485,24 @@ def _rounded(value: float) -> float:
 
 
 LEFT_OUT = "left out"
-STROKES = ("reference stroke", "free stroke at ", "reached diameter", "free contraction")
-CALIBRATED_STROKES = ("free stroke at ", "reference stroke", "reached diameter", "free contraction")
-BENDS = ("bend at ", "bend with one chamber", "free bend")
-BURST = "burst pressure"
-"""Name of a figure."""
-PULLS = ("pull", "moment", "load")
-"""Beginnings of the names of drawn mechanisms' forces."""
+STROKES = (
+    Quantity.REFERENCE_STROKE,
+    Quantity.FREE_STROKE,
+    Quantity.REACHED_DIAMETER,
+    Quantity.CONTRACTION,
+)
+CALIBRATED_STROKES = (STROKES[1], STROKES[0], *STROKES[2:])
+BENDS = (Quantity.BEND, Quantity.REFERENCE_BEND, Quantity.FREE_BEND)
+BLOCKED = (Quantity.BLOCKED_FORCE, Quantity.FORCE_BOUND)
+LOADS = (Quantity.WRINKLING_LOAD, Quantity.COLLAPSE_LOAD, Quantity.SLIP_LOAD)
+PULLS = ((Quantity.PULL,), (Quantity.MOMENT,), LOADS)
+"""Forces of drawn mechanisms."""
 RADIUS = 2.5
 """Pocket radius in mm of the actuators whose forces were measured."""
 INTERVAL_NOTE = (
     "in parentheses the 90 % interval: from the calibration's uncertainty, and from what the model "
     "missed of the measured curves"
 )
-SCALED = "the paper's height, scaled"
-"""Model of the reference stroke of round pockets."""
 SCALED_NOTE = (
     "what the paper measured of one actuator of d = 5, in proportion to d, at a pressure that it "
     "does not give: what shares of the stroke are of, not the most that it rises"
@@ -463,36 +536,31 @@ def _main_figures(prediction: Prediction) -> Iterator[tuple[str, Figure]]:
     """Yield the main figures with their quantities, each by the model to design with."""
     to_design_with = [figure for figure in prediction.figures if not figure.other]
     is_calibrated = any(figure.interval is not None for figure in to_design_with)
-    for begins in CALIBRATED_STROKES if is_calibrated else STROKES:
-        yield from (("stroke", item) for item in _first(to_design_with, begins))
-    for begins in BENDS:
-        bend = _first(to_design_with, begins)
-        if bend:
-            yield "bend", bend[0]
-            break
-    blocked = [
-        item
-        for item in to_design_with
-        if item.name.startswith("blocked force") and ", flat" in item.name
-    ]
-    blocked = [item for item in blocked if not item.name.endswith("at most")] or blocked
-    yield from (("force", item) for item in _strongest(blocked))
-    for begins in PULLS:
-        pulls = [item for item in to_design_with if item.name.startswith(begins)]
+    for quantity in CALIBRATED_STROKES if is_calibrated else STROKES:
+        yield from (("stroke", item) for item in _of(to_design_with, quantity)[:1])
+    yield from (("bend", item) for item in _of(to_design_with, *BENDS)[:1])
+    flat = [item for item in _of(to_design_with, *BLOCKED) if not item.at.share]
+    yield from (("force", item) for item in _strongest(flat))
+    for quantities in PULLS:
         # Where the film does not stand the highest pressure, at the most it stands.
-        for item in _strongest(pulls):
-            yield "moment" if item.unit == "N mm" else "force", item
-    yield from (("burst", item) for item in _first(to_design_with, BURST))
+        for item in _strongest(_of(to_design_with, *quantities)):
+            yield "moment" if item.quantity is Quantity.MOMENT else "force", item
+    yield from (("burst", item) for item in _of(to_design_with, Quantity.BURST)[:1])
+
+
+def _of(figures: Sequence[Figure], *quantities: Quantity) -> list[Figure]:
+    """Return the figures of the first of the quantities that has any."""
+    for quantity in quantities:
+        found = [figure for figure in figures if figure.quantity is quantity]
+        if found:
+            return found
+    return []
 
 
 def _strongest(figures: list[Figure]) -> list[Figure]:
     """Return the first figure at the highest pressure, or the largest vacuum; none of none."""
-    highest = max((abs(figure.pressure_kpa or 0.0) for figure in figures), default=0.0)
-    return [f for f in figures if abs(f.pressure_kpa or 0.0) == highest][:1]
-
-
-def _first(figures: list[Figure], begins: str) -> list[Figure]:
-    return [figure for figure in figures if figure.name.startswith(begins)][:1]
+    highest = max((abs(figure.at.kpa or 0.0) for figure in figures), default=0.0)
+    return [f for f in figures if abs(f.at.kpa or 0.0) == highest][:1]
 
 
 def _shown(figure: Figure) -> str:
@@ -506,11 +574,11 @@ def _note(figure: Figure) -> str:
     """Return flags and counterpart, else the interval of measurements, else the validity."""
     if figure.measured or figure.between or figure.flags:
         return figure.aside
-    if figure.interval is not None and figure.name != BURST:
+    if figure.interval is not None and figure.quantity is not Quantity.BURST:
         return INTERVAL_NOTE
-    if figure.model.name == SCALED:
+    if figure.model.id is ModelId.SCALED_HEIGHT:
         return SCALED_NOTE
-    if figure.model.name.startswith(EQ_4):
+    if figure.model.id is ModelId.WORK_ON_EQ_4:
         low, high = eq_4_ratios()
         return (
             f"{low * figure.value:.3g} to {high * figure.value:.3g} N by the paper's six forces at "
@@ -534,31 +602,24 @@ def eq_4_ratios() -> tuple[float, float]:
 # Choice of the figure to design with where several models give one quantity.
 
 
-STACK = "elastic stack"
-REACHED = "lens of two arcs"
-WIDEST = "cylinder of unstretched film"
 SUPERSEDED = (
     # An upper bound: it says 140 degrees where the paper measured 81 and the stack says 69 to 83.
-    ("bending", "constant curvature", STACK),
+    ("bending", (ModelId.CONSTANT_CURVATURE,), OF_STACK),
     # The modulus was measured, at a pressure that nobody knows; the stack's is a tenth of it.
-    ("stiffness", STACK, "3 E I / l^3"),
+    ("stiffness", OF_STACK, (ModelId.CANTILEVER,)),
     # No air drives a balloon to the cylinder that its film could be: short ones stay far below it.
-    ("size", WIDEST, REACHED),
+    ("size", (ModelId.CYLINDER,), (ModelId.LENS,)),
 )
-"""(group, superseded model, preferred model); models by the beginnings of their names."""
-OF_CALIBRATION = ", calibration "
-"""Before a calibration's name, in that of a model."""
-FREE_SUFFIX = ", free"
-"""End of the name of the elastic balloon's work; the upper bound's lacks it."""
+"""(group, superseded models, preferred models)."""
 
 
 def chosen(
-    figures: Iterable[Figure], to_come: tuple[str, ...] = (), is_calibrated: bool = False
+    figures: Iterable[Figure], to_come: tuple[ModelId, ...] = (), is_calibrated: bool = False
 ) -> tuple[Figure, ...]:
     """Return the figures with those marked as ``other`` that are not to be designed with.
 
-    ``to_come`` are beginnings of models whose figures are left out for now; if calibrated ones, all
-    blocked forces are marked. Of one name the first with an interval is chosen, which comes from a
+    ``to_come`` are models whose figures are left out for now; if calibrated ones, all blocked
+    forces are marked. Of one name the first with an interval is chosen, which comes from a
     calibrated model. Without a calibration it is the first: the paper's Eq. 4, whose force is
     nearest to the six that the paper measured at 100 kPa (0.76 to 1.24 times it; 0.74 to 1.65 times
     Eqs. 1-3, 0.47 to 0.86 times the elastic stack).
@@ -569,26 +630,26 @@ def chosen(
         replace(
             figure,
             other=figure.other
-            or (forces_to_come and figure.name.startswith("blocked force"))
+            or (forces_to_come and figure.quantity in BLOCKED)
             or _is_superseded(figure, candidates, to_come),
         )
         for figure in candidates
     )
 
 
-def _is_superseded(subject: Figure, figures: Sequence[Figure], to_come: tuple[str, ...]) -> bool:
-    group_figures = [figure for figure in figures if figure.group == subject.group]
-    named = [figure for figure in group_figures if figure.name == subject.name]
-    preferred = next((figure for figure in named if figure.interval is not None), named[0])
+def _is_superseded(
+    subject: Figure, figures: Sequence[Figure], to_come: tuple[ModelId, ...]
+) -> bool:
+    same = [f for f in figures if f.quantity is subject.quantity and f.at == subject.at]
+    preferred = next((figure for figure in same if figure.interval is not None), same[0])
     if preferred is not subject:
         return True
-    if any(figure.name == subject.name + FREE_SUFFIX for figure in group_figures):
-        return True
+    if subject.quantity is Quantity.WORK_BOUND:
+        return any(figure.is_of(Quantity.FREE_WORK, subject.at) for figure in figures)
+    given = {figure.model.id for figure in figures if figure.group == subject.group}
     return any(
         subject.group == group
-        and subject.model.name.startswith(behind)
-        and (
-            first in to_come or any(figure.model.name.startswith(first) for figure in group_figures)
-        )
+        and subject.model.id in behind
+        and not given.union(to_come).isdisjoint(first)
         for group, behind, first in SUPERSEDED
     )

@@ -22,7 +22,8 @@ from sbafab.laminate.laminate import (
 from sbafab.models.figures import USUAL_PRESSURES, Factors
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest
-from sbafab.models.paper import BALLOONS, FLAT_HEIGHT_OF_FILMS, FOLDED_HEIGHT, counterpart
+from sbafab.models.paper import BALLOONS, counterpart
+from sbafab.models.quantity import ANYWHERE, ModelId, Quantity
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -288,6 +289,7 @@ def size_phrases(
     height = f"folded height {folded.height:.3f} mm"
     row = None
     if factors.press_factor == 1 and is_the_papers_3dof(form, laminate):
-        row = counterpart(form, FOLDED_HEIGHT, FLAT_HEIGHT_OF_FILMS, of_papers=True)
+        height_of = Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS
+        row = counterpart(form, *height_of, of_papers=True)
     remark = row.brief if row else f"({folded.remark})" if folded.remark else ""
     return (*phrases, f"{height} {remark}".rstrip())

@@ -23,7 +23,8 @@ from sbafab.models.calibrated import (
     load_calibration,
 )
 from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, Flag, LeftOut
-from sbafab.models.paper import BALLOON, BALLOONS, FLAT_HEIGHT_OF_FILMS, LOST_WORK, STACK
+from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
+from sbafab.models.quantity import FigureKey, Quantity
 from sbafab.models.unknowns import UNKNOWNS
 
 if TYPE_CHECKING:
@@ -38,7 +39,6 @@ MODULUS_RATIO, LOSS = (
     next(n for n, unknown in enumerate(UNKNOWNS) if unknown.field == field)
     for field in ("modulus_ratio", "loss_share")
 )
-DELAYS = {"water": "water_delay", "air": "air_delay"}
 
 
 def calibration_of(design: Design) -> ModelCalibration | None:
@@ -234,19 +234,19 @@ class Uncertainty:
         ``evaluated`` gives the same figures with other factors. A figure that one of them lacks has
         no interval.
         """
-        moved: list[tuple[float, dict[tuple[str, str], float]]] = []
+        moved: list[tuple[float, dict[FigureKey, float]]] = []
         for change, factors in self.shifted():
-            values = {} if change == 0 else _by_name(evaluated(factors))
+            values = {} if change == 0 else _by_key(evaluated(factors))
             moved.append((change, values))
         return [self._bounded(item, moved) if isinstance(item, Figure) else item for item in items]
 
     def _bounded(
-        self, figure: Figure, moved: Sequence[tuple[float, Mapping[tuple[str, str], float]]]
+        self, figure: Figure, moved: Sequence[tuple[float, Mapping[FigureKey, float]]]
     ) -> Figure:
         group = discrepancy_group(figure)
         if group is None:
             return figure
-        key = figure.name, _kind(figure)
+        key = figure.key
         values = [figure.value if change == 0 else each.get(key) for change, each in moved]
         present = [value for value in values if value is not None]
         if len(present) < len(values) or not all(map(math.isfinite, present)):
@@ -258,8 +258,10 @@ class Uncertainty:
             group,
             figure.value,
             pairs,
-            self._term_slopes(figure.value / (100 if figure.unit == "%" else 1), _term(figure)),
-            may_be_negative=figure.name.startswith(CLEARANCES),
+            self._term_slopes(
+                figure.value / (100 if figure.unit == "%" else 1), TERMS.get(figure.quantity, "")
+            ),
+            may_be_negative=figure.quantity in CLEARANCES,
         )
         flags = (*figure.flags, *flags_at(self.farther(group)))
         return replace(figure, interval=interval, flags=flags)
@@ -301,15 +303,9 @@ class Uncertainty:
         ]
 
 
-CLEARANCES = ("room between rims", "clearance between chambers")
-
-
-def _term(figure: Figure) -> str:
-    """Return the field of the unknown that a figure has as a term; "" without one."""
-    if figure.name == LOST_WORK:
-        return "loss_share"
-    fluid = next((name for name in DELAYS if name in figure.name), "")
-    return DELAYS[fluid] if fluid and figure.unit == "s" else ""
+CLEARANCES = (Quantity.RIM_ROOM, Quantity.CHAMBER_CLEARANCE)
+TERMS = {Quantity.LOST_WORK: "loss_share", Quantity.WATER_TIME: "water_delay"}
+"""Fields of the unknowns that figures have as a term."""
 
 
 def _slope(value: float, moved: float, change: float, is_log: bool) -> float:
@@ -329,26 +325,17 @@ def _is_log(value: float, moved: Sequence[float]) -> bool:
 LOG_RANGE = 3.0
 
 
-def _kind(figure: Figure) -> str:
-    """Return the model of a figure without its factors."""
-    return next((name for name in KINDS if figure.model.name.startswith(name)), "")
-
-
-KINDS = (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS)
-
-
-def _by_name(items: Items) -> dict[tuple[str, str], float]:
-    return {(item.name, _kind(item)): item.value for item in items if isinstance(item, Figure)}
+def _by_key(items: Items) -> dict[FigureKey, float]:
+    return {item.key: item.value for item in items if isinstance(item, Figure)}
 
 
 def discrepancy_group(figure: Figure) -> str | None:
     """Return the group of a figure's discrepancy; None where no calibrated model gives it."""
-    kind = _kind(figure)
-    if not kind:
+    if figure.model.id not in CALIBRATED_MODELS:
         return None
-    if kind == FLAT_HEIGHT_OF_FILMS:
+    if figure.quantity is Quantity.FOLDED_HEIGHT:
         return FLAT
-    if figure.name == LOST_WORK:
+    if figure.quantity is Quantity.LOST_WORK:
         return "loss"
     return GROUP_BY_UNIT.get(figure.unit, "motion")
 

@@ -24,6 +24,7 @@ from sbafab.models import lens, parabola, printed
 from sbafab.models.figures import Factors, Model
 from sbafab.models.paper import FULL_SHARE, VALID, VALID_RADIUS
 from sbafab.models.parabola import within
+from sbafab.models.quantity import ModelId
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -91,7 +92,7 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
         )
 
     by_eq_4 = scaled(
-        Model(printed.MODEL, "Sec. 3.1, h the stroke of one balloon", _eq_4_trust(max(radii))),
+        Model(ModelId.EQ_4, "Sec. 3.1, h the stroke of one balloon", _eq_4_trust(max(radii))),
         lambda v: printed.stroke(v, 1.0),
         lambda h: printed.volume(h, 1.0),
         lambda h: printed.rate(h, 1.0),
@@ -99,7 +100,7 @@ def round_stack(radii: Sequence[float]) -> tuple[Kinematics, Kinematics]:
     )
     by_eqs_1_to_3 = scaled(
         Model(
-            parabola.MODEL,
+            ModelId.EQS_1_TO_3,
             "Sec. 3.1, solved for two halves",
             "geometric regime only: films that do not stretch, wrinkle or have a neck ring; "
             "3/4 of Eq. 4's volume and force at small strokes",
@@ -130,7 +131,7 @@ def slot_stack(width: float, run: float, balloons: int) -> tuple[Kinematics]:
     """Return the lens of two arcs for oblong pockets of a width and straight run (mm)."""
     most = lens.fullest(width, run)
     model = Model(
-        lens.MODEL,
+        ModelId.LENS_STROKE,
         "films of constant length, ends as spherical caps",
         "geometric regime only; the paper measured no oblong balloon but the inflated diameter",
     )

@@ -22,6 +22,7 @@ from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.models import pouch
 from sbafab.models.figures import Figure, LeftOut, Model, PredictionRequest
 from sbafab.models.formulas import force
+from sbafab.models.quantity import Conditions, ModelId, Quantity
 
 NOT_CALIBRATED = "not calibrated: no interval"
 SHARES = (0.1, 0.2, 0.3)
@@ -145,7 +146,7 @@ def mechanism_figures(
     """Yield the figures of a mechanism, chamber by chamber, and those left out with the reason."""
     several = len(laminate.chambers) > 1
     for chamber in laminate.chambers:
-        of = f" of {chamber.name}" if several else ""
+        of = chamber.name if several else ""
         pockets = pockets_of(laminate, chamber, mechanism.direction)
         if not pockets:
             yield LeftOut(
@@ -160,12 +161,19 @@ def mechanism_figures(
         yield from FIGURES[mechanism.kind](filled)
 
 
-def _not_straight(pocket: MeasuredPocket, name: str, of: str) -> LeftOut:
+def _not_straight(
+    pocket: MeasuredPocket, name: str, of: str, quantities: tuple[Quantity, ...]
+) -> LeftOut:
     return LeftOut(
-        f"{name}{of}",
+        f"{name}{_of(of)}",
         f"the model is of straight seams, and the pocket fills {100 * pocket.share:.0f} % of the "
         f"rectangle round it, less than {100 * RECTANGULAR:g} %",
+        quantities,
     )
+
+
+def _of(chamber: str) -> str:
+    return f" of {chamber}" if chamber else ""
 
 
 class Limit(NamedTuple):
@@ -197,24 +205,31 @@ def _plate_bend(laminate: Laminate, length: float) -> Limit:
 
 
 def _while_it_holds(
-    name: Callable[[float], str],
+    quantity: Quantity,
+    at: Conditions,
+    model: Model,
     limit: Limit,
     pressures: Sequence[float],
-    figure: Callable[[float], Figure],
+    value: Callable[[float], float],
 ) -> Iterator[Figure | LeftOut]:
-    """Yield a figure at each pressure up to the limit, and at the limit if that is below all."""
+    """Yield a figure at each pressure up to the limit, and at the limit if that is below all;
+    ``value`` gives it by the pressure.
+    """
     most = limit.most
     for pressure in pressures:
+        here = at._replace(kpa=pressure)
         if pressure <= most:
-            yield figure(pressure)
+            yield Figure(quantity, value(pressure), model, here)
         else:
             yield LeftOut(
-                name(pressure),
+                quantity.named(here),
                 f"{limit.beyond}: the model holds to {most:.3g} kPa, and further with "
                 f"{limit.remedy}",
+                (quantity,),
             )
     if pressures and most < min(pressures):
-        yield figure(float(f"{most * 0.999:.3g}"))
+        last = float(f"{most * 0.999:.3g}")
+        yield Figure(quantity, value(last), model, at._replace(kpa=last))
 
 
 def _stretch_note(stiffness: float | None) -> str:
@@ -227,45 +242,45 @@ def _motor(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     of = filled.of
     pocket = filled.pockets[0]
     if not pocket.is_rectangular:
-        yield _not_straight(pocket, "contraction and pull", of)
+        quantities = Quantity.CONTRACTION, Quantity.PULL
+        yield _not_straight(pocket, "contraction and pull", of, quantities)
         return
     series, beside = filled.rows
     length, width = pocket.length, pocket.width
     model = Model(
-        pouch.MOTOR,
+        ModelId.POUCH_MOTOR,
         "Niiyama et al., Soft Robotics 2 (2015) 59",
         f"two arcs of constant length, {length:.4g} long and {width:.4g} mm wide: contraction 0 to "
         f"36.3 %; seams do not hold it back, {_stretch_note(pocket.film_stiffness)}; "
         f"{NOT_CALIBRATED}",
     )
     most = pouch.LARGEST_CONTRACTION
-    yield Figure("stroke", f"free contraction{of}", series * length * most, "mm", model)
-    yield Figure("stroke", f"free contraction{of}, share", 100 * most, "%", model)
+    at = Conditions(of=of)
+    yield Figure(Quantity.CONTRACTION, series * length * most, model, at)
+    yield Figure(Quantity.CONTRACTION_SHARE, 100 * most, model, at)
     for share in SHARES:
         angle = float(pouch.half_angle(share))
         limit = _stretch(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
 
-        def name(pressure: float, share: float = share) -> str:
-            return f"pull{of} at {pressure:g} kPa, {100 * share:g} % shorter"
+        def pull(pressure: float, share: float = share) -> float:
+            return beside * float(pouch.pull(pressure, share, length, width))
 
-        def figure(pressure: float, share: float = share) -> Figure:
-            value = beside * float(pouch.pull(pressure, share, length, width))
-            return Figure("force", name(pressure, share), value, "N", model, pressure_kpa=pressure)
-
-        yield from _while_it_holds(name, limit, filled.pressures, figure)
+        shorter = at._replace(share=share)
+        yield from _while_it_holds(Quantity.PULL, shorter, model, limit, filled.pressures, pull)
     content = len(filled.pockets) * float(pouch.volume(most, length, width))
-    yield Figure("actuation", f"volume at free contraction{of}", content, "ul", model)
+    yield Figure(Quantity.CONTRACTION_VOLUME, content, model, at)
 
 
 def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     of = filled.of
     pocket = filled.pockets[0]
     if not pocket.is_rectangular:
-        yield _not_straight(pocket, "bend and moment", of)
+        quantities = Quantity.FREE_BEND, Quantity.MOMENT
+        yield _not_straight(pocket, "bend and moment", of, quantities)
         return
     length, width = pocket.length, pocket.width
     model = Model(
-        pouch.HINGE,
+        ModelId.POUCH_HINGE,
         "statics of an arc over two stiff plates; the angular pouch motor of Niiyama et al., Soft "
         "Robotics 2 (2015) 59",
         f"a pouch {length:.4g} long and {width:.4g} mm wide, its joint in the middle: 0 to "
@@ -274,31 +289,28 @@ def _hinge(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     )
     count = len(filled.pockets)
     each = math.degrees(pouch.free_bend())
-    joints = f", {count} hinges" if count > 1 else ""
-    yield Figure("bending", f"free bend{of}{joints}", count * each, "deg", model)
+    at = Conditions(of=of, hinges=count if count > 1 else None)
+    yield Figure(Quantity.FREE_BEND, count * each, model, at)
     angle = float(pouch.half_angle(1 - math.cos(pouch.free_bend() / 4)))
     limit = _stretch(pocket.film_stiffness, float(pouch.tension(1.0, angle, length)))
     plates = _plate_bend(filled.laminate, length)
     if plates.most < LEAST_PLATE_KPA:
         yield LeftOut(
-            f"moment{of}",
+            f"moment{_of(of)}",
             "it has no stiff plate: the stiffest of its films would itself bend by more than "
             f"{math.degrees(MOST_TURN):.0f} deg over half the pouch at {plates.most:.2g} kPa; lay "
             "a thicker or stiffer layer under it",
+            (Quantity.MOMENT,),
         )
         return
     limit = min(limit, plates)
-    for share, at in ((0.0, "straight"), (0.5, "half bent")):
+    for share in (0.0, 0.5):
 
-        def name(pressure: float, at: str = at) -> str:
-            return f"moment{of} at {pressure:g} kPa, {at}"
+        def moment(pressure: float, share: float = share) -> float:
+            return float(pouch.moment(pressure, share * pouch.free_bend(), length, width))
 
-        def figure(pressure: float, share: float = share, at: str = at) -> Figure:
-            bend = share * pouch.free_bend()
-            value = float(pouch.moment(pressure, bend, length, width))
-            return Figure("force", name(pressure, at), value, "N mm", model, pressure_kpa=pressure)
-
-        yield from _while_it_holds(name, limit, filled.pressures, figure)
+        bent = Conditions(of=of, share=share)
+        yield from _while_it_holds(Quantity.MOMENT, bent, model, limit, filled.pressures, moment)
 
 
 def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
@@ -311,34 +323,26 @@ def _beam(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
             f"{length:.4g} mm is less than {pouch.SLENDER:g} times the inflated diameter, "
             f"{across:.3g} mm: no beam"
         )
-        yield LeftOut(f"inflated beam{of}", reason)
+        yield LeftOut(f"inflated beam{_of(of)}", reason)
         return
     model = Model(
-        pouch.BEAM,
+        ModelId.INFLATED_BEAM,
         "Comer and Levy, AIAA J. 1 (1963) 1652",
         f"a tube {length:.4g} long of flat width {width:.4g} mm, held at one end, its load at the "
         f"other; {_stretch_note(pocket.film_stiffness)}; {NOT_CALIBRATED}",
     )
-    yield Figure("size", f"inflated diameter of a beam{of}", across, "mm", model)
+    at = Conditions(of=of)
+    yield Figure(Quantity.BEAM_DIAMETER, across, model, at)
     limit = _stretch(pocket.film_stiffness, pouch.hoop_tension(1.0, width))
-    loads = (
-        ("load that wrinkles", pouch.wrinkling_moment),
-        ("load that collapses", pouch.collapse_moment),
-    )
-    for words, law in loads:
+    for quantity, law in (
+        (Quantity.WRINKLING_LOAD, pouch.wrinkling_moment),
+        (Quantity.COLLAPSE_LOAD, pouch.collapse_moment),
+    ):
 
-        def name(pressure: float, words: str = words) -> str:
-            return f"{words} a beam{of} at {pressure:g} kPa"
+        def load(pressure: float, law: Callable[[float, float], float] = law) -> float:
+            return law(pressure, width) / length
 
-        def figure(
-            pressure: float,
-            words: str = words,
-            law: Callable[[float, float], float] = law,
-        ) -> Figure:
-            value = law(pressure, width) / length
-            return Figure("force", name(pressure, words), value, "N", model, pressure_kpa=pressure)
-
-        yield from _while_it_holds(name, limit, filled.pressures, figure)
+        yield from _while_it_holds(quantity, at, model, limit, filled.pressures, load)
 
 
 def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
@@ -348,39 +352,38 @@ def _jammed(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     films = {sheet.film for sheet in sheets}
     if len(films) != 1 or len(sheets) < 2:
         yield LeftOut(
-            f"stiffness{of}", f"jamming needs two sheets of one film; it has {len(sheets)}"
+            f"stiffness{_of(of)}", f"jamming needs two sheets of one film; it has {len(sheets)}"
         )
         return
     (film,) = films
     assert filled.mechanism.friction is not None
     count, width, length, thick = len(sheets), pocket.width, pocket.length, film.thickness
     model = Model(
-        pouch.JAMMING,
+        ModelId.LAMINAR_JAMMING,
         "Narang, Vlassak and Howe, Adv. Funct. Mater. 28 (2018) 1707136",
         f"{count} sheets of {thick:g} mm as one cantilever {length:.4g} x {width:.4g} mm until "
         f"they slip, friction {filled.mechanism.friction:g} as given; the bag's films not "
         f"counted; {NOT_CALIBRATED}",
     )
-    ratio = float(count**2)
-    yield Figure("stiffness", f"jammed over loose stiffness{of}", ratio, "", model)
+    at = Conditions(of=of)
+    yield Figure(Quantity.JAMMING_RATIO, float(count**2), model, at)
     if film.elastic is None:
-        yield LeftOut(f"bending stiffness{of}", f"the modulus of {film.material} is not known")
+        reason = f"the modulus of {film.material} is not known"
+        both = Quantity.LOOSE_STIFFNESS, Quantity.JAMMED_STIFFNESS
+        yield LeftOut(f"bending stiffness{_of(of)}", reason, both)
     else:
-        modulus = film.elastic[0]
-        for words, law in (
-            ("loose", pouch.loose_stiffness),
-            ("jammed", pouch.jammed_stiffness),
+        for quantity, law in (
+            (Quantity.LOOSE_STIFFNESS, pouch.loose_stiffness),
+            (Quantity.JAMMED_STIFFNESS, pouch.jammed_stiffness),
         ):
-            value = law(modulus, width, thick, count)
-            yield Figure("stiffness", f"bending stiffness{of}, {words}", value, "N mm2", model)
+            yield Figure(quantity, law(film.elastic[0], width, thick, count), model, at)
     for pressure in filled.pressures:
-        name = f"load that slips{of} at {pressure:g} kPa"
         value = pouch.slip_force(-pressure, filled.mechanism.friction, width, thick, count)
-        yield Figure("force", name, value, "N", model, pressure_kpa=pressure)
+        yield Figure(Quantity.SLIP_LOAD, value, model, at._replace(kpa=pressure))
 
 
 PUSH = Model(
-    "pressure x pocket area; textile pouches pushed with 0.18 of it at 230 kPa",
+    ModelId.TEXTILE_POUCHES,
     "statics of a stiff plate",
     "an upper bound, for a plate that lies flat on the whole pocket and for a wall without "
     "stiffness. Pouches of coated textile, 8 mm at 1 mm gaps, pushed with 2.1 N at 230 kPa (arXiv "
@@ -391,11 +394,10 @@ PUSH = Model(
 
 def _push(filled: FilledChamber) -> Iterator[Figure | LeftOut]:
     of = filled.of
-    each = " a pouch" if len(filled.pockets) > 1 else ""
+    each = "pouch" if len(filled.pockets) > 1 else ""
     for pressure in filled.pressures:
-        name = f"blocked force{of}{each} at {pressure:g} kPa, flat, at most"
         value = float(force(pressure, filled.pockets[0].area))
-        yield Figure("force", name, value, "N", PUSH, pressure_kpa=pressure)
+        yield Figure(Quantity.FORCE_BOUND, value, PUSH, Conditions(pressure, of=of, each=each))
 
 
 FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | LeftOut]]] = {
@@ -408,25 +410,21 @@ FIGURES: Mapping[MechanismKind, Callable[[FilledChamber], Iterator[Figure | Left
 
 
 class MechanismQuantity(NamedTuple):
-    """A quantity that people ask of a mechanism: its unit, whether it takes a pressure, and the
-    figure of ``predict`` that it is, by how the figure's name begins and ends.
-    """
+    """A quantity that people ask of a mechanism, and the figure of ``predict`` that it is."""
 
-    unit: str
-    takes_pressure: bool
     kind: MechanismKind
-    begins: str
-    ends: str
+    figure: Quantity
+    share: float | None = None
 
 
 ASKED: Mapping[str, MechanismQuantity] = {
-    "contraction": MechanismQuantity("mm", False, "pouch-motor", "free contraction", ""),
-    "pull": MechanismQuantity("N", True, "pouch-motor", "pull", "10 % shorter"),
-    "free_bend": MechanismQuantity("deg", False, "hinge", "free bend", ""),
-    "moment": MechanismQuantity("N mm", True, "hinge", "moment", "straight"),
-    "load": MechanismQuantity("N", True, "beam", "load that wrinkles", ""),
-    "slip": MechanismQuantity("N", True, "jamming", "load that slips", ""),
-    "push": MechanismQuantity("N", True, "push", "blocked force", "at most"),
+    "contraction": MechanismQuantity("pouch-motor", Quantity.CONTRACTION),
+    "pull": MechanismQuantity("pouch-motor", Quantity.PULL, 0.1),
+    "free_bend": MechanismQuantity("hinge", Quantity.FREE_BEND),
+    "moment": MechanismQuantity("hinge", Quantity.MOMENT, 0.0),
+    "load": MechanismQuantity("beam", Quantity.WRINKLING_LOAD),
+    "slip": MechanismQuantity("jamming", Quantity.SLIP_LOAD),
+    "push": MechanismQuantity("push", Quantity.FORCE_BOUND),
 }
 """By the names that requirements use."""
 
@@ -446,13 +444,9 @@ def mechanism_value(
     values = []
     for item in mechanism_figures(mechanism, laminate, PredictionRequest((kpa,))):
         if isinstance(item, LeftOut):
-            if item.name.startswith((asked.begins, "what chamber", "contraction and", "bend and")):
+            if not item.quantities or asked.figure in item.quantities:
                 raise DesignError(f"{item.name}: {item.reason}")
-        elif (
-            item.unit == asked.unit
-            and item.name.startswith(asked.begins)
-            and item.name.endswith(asked.ends)
-        ):
+        elif item.is_of(asked.figure, Conditions(share=asked.share)):
             values.append(item.value)
     if not values:
         raise DesignError(f"no model gives {quantity} of this design at {kpa:g} kPa")

@@ -4,13 +4,20 @@ quarter of them.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from sbafab.laminate.films import PAPER_BURST
+from sbafab.models.quantity import (
+    ANYWHERE,
+    OF_STACK,
+    Conditions,
+    ModelId,
+    Quantity,
+    chamber_count,
+    share_of_stroke,
+)
 
 if TYPE_CHECKING:
     from sbafab.design.records import Form
@@ -99,43 +106,54 @@ FULL_SHARE = FULL_HEIGHT.value / BALLOONS / 2.5
 
 MISFIT = 0.25
 """Relative error up to which a figure may stand without its measured counterpart."""
-STACK, BALLOON = "elastic stack", "elastic balloon"
-EQ_4, EQS_1_TO_3 = "virtual work on Eq. 4", "virtual work on Eqs. 1-3"
-FACTORS = re.compile(r"(, (press factor|pocket loss|E =)| x (press|contact) factor) ")
-"""Marks of a calibration in the name of a model."""
-FLAT_HEIGHT_OF_FILMS = "sum of the films"
-FOLDED_HEIGHT = "folded height"
-LOST_WORK = "input work lost in a cycle"
-"""Name of a figure, as FOLDED_HEIGHT is."""
+BALLOON, FILMS = (ModelId.ELASTIC_BALLOON,), (ModelId.FILMS,)
+CALIBRATED_MODELS = (*OF_STACK, *BALLOON, *FILMS)
+"""Models that a calibration changes; its intervals say how far they may be off."""
 ONE_DOF, THREE_DOF = "1-DoF", "3-DoF"
+DerivedValue = Literal["time-with-air", "pocket-area", "cantilever-modulus"]
+"""Values that ``docs/validation.md`` computes from a prediction's figures."""
 
 
 @dataclass(frozen=True)
 class Counterpart:
     """A measured value, and the model's value for the actuator on which it was measured.
 
-    ``figure`` is a regular expression of the names of the figures that it stands beside, ``model``
-    the beginning of their models' names; ``state`` is the quantity or state that was ``measured``.
+    It stands beside figures of its ``quantities`` by its ``models`` (none: by any), at conditions
+    that meet ``at`` and that it ``fits``; ``state`` is the quantity or state that was ``measured``.
     ``parallel``: it holds for actuators that bend (True), for the others (False), or for all
     (None). ``template`` and ``recorded`` name the design and the figure from which ``gave`` was
-    taken, in the unit of ``measured``; ``at`` is the state in which the model gave it, if that is
-    not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
+    taken, in the unit of ``measured``; ``where`` is the state in which the model gave it, if that
+    is not the one of the measurement. ``calibrated`` is the value with the calibration "paper" in
     the unit of ``measured``, None where that is near or changes nothing. A row may be far off with
     that calibration alone. One ``of_papers`` stands beside figures of the paper's own 3-DoF alone.
     """
 
-    figure: str
-    model: str
+    quantities: tuple[Quantity, ...]
+    models: tuple[ModelId, ...]
     measured: Measured
     state: str
     actuator: str
     gave: float
-    at: str
+    where: str
     template: str
-    recorded: str
+    recorded: tuple[Quantity, Conditions] | DerivedValue
     parallel: bool | None = None
     calibrated: float | None = None
     of_papers: bool = False
+    at: Conditions = ANYWHERE
+    fits: Callable[[Conditions], bool] | None = None
+
+    def stands_beside(
+        self, quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
+    ) -> bool:
+        """Return True for a figure of this quantity by this model."""
+        return (
+            quantity in self.quantities
+            and (not self.models or model in self.models)
+            and self.parallel in (None, is_parallel)
+            and at.meet(self.at)
+            and (self.fits is None or self.fits(at))
+        )
 
     @property
     def ratio(self) -> float:
@@ -145,7 +163,7 @@ class Counterpart:
     def sentence(self, is_calibrated: bool = False) -> str:
         """Return the clause that stands in parentheses beside a figure."""
         by = "this model without factors" if is_calibrated else "this model"
-        at = f" {self.at}" if self.at else ""
+        at = f" {self.where}" if self.where else ""
         return (
             f"the paper measured {self.measured} {self.state} on its {self.actuator}; "
             f"{by} gives it {self.gave:.4g}{at}"
@@ -177,34 +195,36 @@ class Counterpart:
 
 def _forces() -> Iterator[Counterpart]:
     """Yield straight forces at 100 kPa (Sec. 4.3) that a model misses by more than MISFIT."""
-    calibrated = {(ONE_DOF, STACK): (None, 1.394, 0.9436)}
+    stack = OF_STACK[:1]
+    eq_4, eqs_1_to_3 = (ModelId.WORK_ON_EQ_4,), (ModelId.WORK_ON_EQS_1_TO_3,)
+    calibrated = {(ONE_DOF, stack): (None, 1.394, 0.9436)}
     gave = {
-        (ONE_DOF, STACK): (1.888, 1.709, 1.355),
-        (ONE_DOF, EQ_4): (None, None, 0.8422),
-        (ONE_DOF, EQS_1_TO_3): (0.9817, None, 0.8631),
-        (THREE_DOF, STACK): (None, 5.129, 4.069),
-        (THREE_DOF, EQS_1_TO_3): (2.945, 2.905, None),
+        (ONE_DOF, stack): (1.888, 1.709, 1.355),
+        (ONE_DOF, eq_4): (None, None, 0.8422),
+        (ONE_DOF, eqs_1_to_3): (0.9817, None, 0.8631),
+        (THREE_DOF, stack): (None, 5.129, 4.069),
+        (THREE_DOF, eqs_1_to_3): (2.945, 2.905, None),
     }
     measured_at = {ONE_DOF: FORCE_1DOF, THREE_DOF: FORCE_3DOF}
-    for (actuator, model), values in gave.items():
-        fitted = calibrated.get((actuator, model), (None, None, None))
+    for (actuator, models), values in gave.items():
+        fitted = calibrated.get((actuator, models), (None, None, None))
         rows = zip(HEIGHTS, measured_at[actuator], values, fitted, strict=True)
         for share, measured, value, calibrated_value in rows:
             if value is None:
                 continue
-            at = f"at {100 * share:g} % of the reference stroke" if share else "flat"
             yield Counterpart(
-                rf"blocked force( of one SBA)? at \S+ kPa, {at}",
-                model,
+                (Quantity.BLOCKED_FORCE,),
+                models,
                 measured,
-                f"at 100 kPa, {at},",
+                f"at 100 kPa, {share_of_stroke(share)},",
                 actuator,
                 value,
                 "",
                 "1dof-5mm" if actuator == ONE_DOF else "3dof-15mm",
-                f"blocked force at 100 kPa, {at}",
+                (Quantity.BLOCKED_FORCE, Conditions(kpa=FORCE_KPA, share=share)),
                 actuator == THREE_DOF,
                 calibrated_value,
+                at=Conditions(share=share),
             )
 
 
@@ -213,122 +233,128 @@ def _bent_forces() -> Iterator[Counterpart]:
     gave = {30: (1.667, None), 60: (1.434, 2.829), 90: (1.194, 2.341)}
     calibrated = {30: (1.345, None), 60: (1.054, 1.982), 90: (0.7642, 0.7656)}
     for angle, measured in FORCE_BENT:
-        rows = zip(("one chamber", "2 chambers"), gave[angle], calibrated[angle], strict=True)
+        rows = zip((1, 2), gave[angle], calibrated[angle], strict=True)
         for chambers, value, calibrated_value in rows:
             if value is None:
                 continue
+            at = Conditions(chambers=chambers, angle=angle)
             yield Counterpart(
-                rf"force at \S+ kPa in {chambers}, bent by {angle} deg",
-                STACK,
+                (Quantity.BENT_FORCE,),
+                OF_STACK,
                 measured,
                 f"at 100 kPa, bent by {angle} deg,",
                 THREE_DOF,
                 value,
-                f"with {chambers}",
+                f"with {chamber_count(chambers)}",
                 "3dof-15mm",
-                f"force at 100 kPa in {chambers}, bent by {angle} deg",
+                (Quantity.BENT_FORCE, at._replace(kpa=FORCE_KPA)),
                 True,
                 calibrated_value,
+                at=at,
             )
+
+
+def _has_several(at: Conditions) -> bool:
+    return at.chambers is not None and at.chambers > 1
+
+
+def _is_of_air(at: Conditions) -> bool:
+    """Return True for a flow in ml/min that only air has."""
+    return at.flow is not None and at.flow >= 1000
 
 
 def _further_counterparts() -> Iterator[Counterpart]:
     """Yield heights, bends, energy, time and stiffness (Sec. 4.1, 4.4 to 4.6)."""
     three, bend, full = "3dof-15mm", "of bend at most", "of full height"
     yield Counterpart(
-        FOLDED_HEIGHT, FLAT_HEIGHT_OF_FILMS, FLAT_HEIGHT, "of deflated height",
-        THREE_DOF, 1.865, "", three, FOLDED_HEIGHT, of_papers=True,
+        (Quantity.FOLDED_HEIGHT,), FILMS, FLAT_HEIGHT, "of deflated height",
+        THREE_DOF, 1.865, "", three, (Quantity.FOLDED_HEIGHT, ANYWHERE), of_papers=True,
     )  # fmt: skip
     yield Counterpart(
-        r"free (stroke|height) at \S+ kPa", BALLOON, FULL_HEIGHT, full,
-        THREE_DOF, 24.55, "at 10 kPa", three, "free height at 10 kPa",
+        (Quantity.FREE_STROKE, Quantity.FREE_HEIGHT), BALLOON, FULL_HEIGHT, full,
+        THREE_DOF, 24.55, "at 10 kPa", three, (Quantity.FREE_HEIGHT, Conditions(kpa=FULL_KPA)),
     )  # fmt: skip
     yield Counterpart(
-        "stroke at the largest volume", "Eqs. 1-3", FULL_HEIGHT, full,
-        THREE_DOF, 39.82, "", three, "stroke at the largest volume",
+        (Quantity.LARGEST_STROKE,), (ModelId.EQS_1_TO_3,), FULL_HEIGHT, full,
+        THREE_DOF, 39.82, "", three, (Quantity.LARGEST_STROKE, ANYWHERE),
     )  # fmt: skip
-    flat = "bend with one chamber at the reference stroke, the others flat"
     yield Counterpart(
-        "bend with .* at the reference stroke, the others flat|maximum lateral tip displacement",
-        "constant curvature", LARGEST_BEND, bend, THREE_DOF, 140.5, "", three, flat, True,
-        148.7,
+        (Quantity.REFERENCE_BEND, Quantity.LARGEST_ASIDE), (ModelId.CONSTANT_CURVATURE,),
+        LARGEST_BEND, bend, THREE_DOF, 140.5, "", three,
+        (Quantity.REFERENCE_BEND, Conditions(chambers=1)), True, 148.7,
     )  # fmt: skip
-    for some, chambers, kpa, value in (
-        ("one chamber", "one chamber", 10, 128.3),
-        (r"\d+ chambers", "2 chambers", 100, 105.5),
-    ):
+    for chambers, kpa, value in ((1, FULL_KPA, 128.3), (2, FORCE_KPA, 105.5)):
         yield Counterpart(
-            rf"(bend|lateral tip displacement) at \S+ kPa in {some}, the others empty", STACK,
-            LARGEST_BEND, bend, THREE_DOF, value, f"at {kpa} kPa in {chambers}", three,
-            f"bend at {kpa} kPa in {chambers}, the others empty", True,
+            (Quantity.BEND, Quantity.ASIDE), OF_STACK, LARGEST_BEND, bend, THREE_DOF, value,
+            f"at {kpa:g} kPa in {chamber_count(chambers)}", three,
+            (Quantity.BEND, Conditions(kpa=kpa, chambers=chambers)), True,
+            at=Conditions(chambers=1) if chambers == 1 else ANYWHERE,
+            fits=None if chambers == 1 else _has_several,
         )  # fmt: skip
     large, air = "1-DoF of d = 10", "to 10 kPa with air"
-    for figure, model, value, calibrated_value in (
-        ("pneumatic input work at {} kPa, free", BALLOON, 1.770, 1.588),
-        ("pneumatic input work at {} kPa", "p v with Eq. 4", 5.820, None),
+    for quantity, models, value, calibrated_value in (
+        (Quantity.FREE_WORK, BALLOON, 1.770, 1.588),
+        (Quantity.WORK_BOUND, (ModelId.P_V_EQ_4,), 5.820, None),
     ):
         yield Counterpart(
-            figure.format(r"\S+"), model, WORK, "at 10 kPa", large, value, "", "1dof-10mm",
-            figure.format(10), None, calibrated_value,
+            (quantity,), models, WORK, "at 10 kPa", large, value, "", "1dof-10mm",
+            (quantity, Conditions(kpa=FULL_KPA)), None, calibrated_value,
         )  # fmt: skip
     yield Counterpart(
-        "power density, .*", "F v / m", AIR_TIME, air, THREE_DOF,
-        0.01439, "", three, TIME_WITH_AIR,
+        (Quantity.POWER_DENSITY,), (ModelId.POWER,), AIR_TIME, air, THREE_DOF,
+        0.01439, "", three, "time-with-air",
     )  # fmt: skip
     yield Counterpart(
-        r"time to the reference stroke at \d{4,}\S* ml/min", "", AIR_TIME,
-        air, THREE_DOF, 0.01439, "", three, TIME_WITH_AIR,
+        (Quantity.REFERENCE_TIME,), (), AIR_TIME,
+        air, THREE_DOF, 0.01439, "", three, "time-with-air", fits=_is_of_air,
     )  # fmt: skip
     yield Counterpart(
-        r"blocked force at \S+ kPa, flat, at most", "pressure x pocket area",
+        (Quantity.FORCE_BOUND,), (ModelId.FLAT_PLATES,),
         FORCE_1DOF[0], "at 100 kPa, flat,", ONE_DOF, 1.963, "", "1dof-5mm",
-        POCKET_AREA, False,
+        "pocket-area", False,
     )  # fmt: skip
     for actuator, measured, value, calibrated_value, template, parallel in (
         (ONE_DOF, MODULUS_1DOF, 6.431, 5.248, "1dof-5mm", False),
         (THREE_DOF, MODULUS_3DOF, 13.06, 13.3, three, True),
     ):
         yield Counterpart(
-            r"lateral tip stiffness at \S+ kPa, .*", STACK, measured, "of modulus in bending",
-            actuator, value, "at 10 kPa, chambers shut", template, MODULUS, parallel,
-            calibrated_value,
+            (Quantity.HELD_STIFFNESS, Quantity.SHUT_STIFFNESS), OF_STACK, measured,
+            "of modulus in bending", actuator, value, "at 10 kPa, chambers shut", template,
+            "cantilever-modulus", parallel, calibrated_value,
         )  # fmt: skip
 
 
-TIME_WITH_AIR = "time to 10 kPa with air"
-POCKET_AREA = "pressure x pocket area, flat"
-MODULUS = "cantilever modulus"
-"""Values that ``docs/validation.md`` computes from a prediction's figures."""
 COUNTERPARTS = (*_forces(), *_bent_forces(), *_further_counterparts())
 """All figures of predictions that validation shows to be off by more than MISFIT."""
-
-
-@lru_cache(maxsize=4096)
-def _counterpart(name: str, model: str, is_parallel: bool) -> Counterpart | None:
-    for row in COUNTERPARTS:
-        if row.parallel is not None and row.parallel != is_parallel:
-            continue
-        if model.startswith(row.model) and re.fullmatch(row.figure, name):
-            return row
-    return None
+CALIBRATION = "paper"
+"""The calibration of ``Counterpart.calibrated``."""
 
 
 def counterpart(
-    form: Form, name: str, model: str, calibration: str = "", of_papers: bool = False
+    form: Form,
+    quantity: Quantity,
+    at: Conditions,
+    model: ModelId,
+    calibration: str = "",
+    of_papers: bool = False,
 ) -> Counterpart | None:
-    """Return the measured counterpart of a figure of this ``name`` by this ``model``, for a design
+    """Return the measured counterpart of a figure of this quantity by this model, for a design
     of this ``form``, which may be the paper's own 3-DoF (``of_papers``); None where the model is
     not known to be off by more than MISFIT.
 
-    With a ``calibration`` (its name) it has the calibrated value. A folded height by a measured
-    press factor has none.
+    With a ``calibration`` (its name) it has the calibrated value.
     """
-    if model.startswith(FLAT_HEIGHT_OF_FILMS) and FACTORS.search(model):
-        return None
-    row = _counterpart(name, model, form.is_parallel)
+    row = _counterpart(quantity, at, model, form.is_parallel)
     if row is None or (row.of_papers and not of_papers):
         return None
     return _calibrated(row, calibration)
+
+
+def _counterpart(
+    quantity: Quantity, at: Conditions, model: ModelId, is_parallel: bool
+) -> Counterpart | None:
+    beside = (row for row in COUNTERPARTS if row.stands_beside(quantity, at, model, is_parallel))
+    return next(beside, None)
 
 
 def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
@@ -340,11 +366,7 @@ def _calibrated(row: Counterpart, calibration: str) -> Counterpart | None:
     if calibration == CALIBRATION and row.calibrated is not None:
         return replace(row, gave=row.calibrated)
     # A calibration changes these models; its intervals say how far they may be off.
-    return None if row.model in (STACK, BALLOON, FLAT_HEIGHT_OF_FILMS) else row
-
-
-CALIBRATION = "paper"
-"""The calibration of ``Counterpart.calibrated``."""
+    return None if set(row.models) & set(CALIBRATED_MODELS) else row
 
 
 def counterparts_of_pose(chambers: int, calibration: str = "") -> dict[str, Counterpart]:
@@ -353,30 +375,9 @@ def counterparts_of_pose(chambers: int, calibration: str = "") -> dict[str, Coun
     """
     if calibration:
         return {}
-    sought = {"height": ("free height at 10 kPa", BALLOON)}
+    at = Conditions(kpa=FULL_KPA)
+    sought = {"height": (Quantity.FREE_HEIGHT, at, ModelId.ELASTIC_BALLOON)}
     if chambers > 1:
-        sought["bend"] = ("bend at 10 kPa in one chamber, the others empty", STACK)
-    rows = {quantity: _counterpart(*names, chambers > 1) for quantity, names in sought.items()}
+        sought["bend"] = (Quantity.BEND, at._replace(chambers=1), ModelId.ELASTIC_STACK)
+    rows = {quantity: _counterpart(*figure, chambers > 1) for quantity, figure in sought.items()}
     return {quantity: row for quantity, row in rows.items() if row is not None}
-
-
-def counterpart_of_column(form: Form, column: str, calibration: str = "") -> Counterpart | None:
-    """Return the counterpart of a column of a sweep: "name [unit]" or "name, model [unit]"."""
-    figure = column.partition(" [")[0]
-    name, _, model = figure.rpartition(", ")
-    for row in COUNTERPARTS:
-        if (
-            not row.of_papers
-            and row.parallel in (None, form.is_parallel)
-            and (
-                re.fullmatch(row.figure, figure)
-                or (model.startswith(row.model) and re.fullmatch(row.figure, name))
-            )
-        ):
-            return _calibrated(row, calibration)
-    return None
-
-
-def is_calibrated(model: str) -> bool:
-    """Return True for the name of a model that took a factor measured by the user."""
-    return FACTORS.search(model) is not None

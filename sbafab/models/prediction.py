@@ -27,14 +27,8 @@ from sbafab.models.drawn_pockets import (
     relation_by_disc,
     why_no_disc,
 )
-from sbafab.models.elastic import chamber_count
 from sbafab.models.figures import (
-    BURST,
     NEAR_BURST,
-    REACHED,
-    SCALED,
-    STACK,
-    WIDEST,
     Factors,
     Figure,
     Flag,
@@ -75,9 +69,19 @@ from sbafab.models.kinematics import NOT_MEASURED, Actuator, Kinematics
 from sbafab.models.kinematics import actuator as actuator_of
 from sbafab.models.mechanisms import mechanism_figures
 from sbafab.models.paper import BURST as BURST_MEASURED
-from sbafab.models.paper import FLAT_HEIGHT_OF_FILMS, counterpart
+from sbafab.models.paper import Counterpart, counterpart
 from sbafab.models.parabola import fullest
 from sbafab.models.pneumatics import seconds
+from sbafab.models.quantity import (
+    OF_STACK,
+    OVER_FLOW,
+    P_V,
+    WORK_ON,
+    Conditions,
+    ModelId,
+    Quantity,
+    chamber_count,
+)
 from sbafab.models.stack import Stack
 
 if TYPE_CHECKING:
@@ -99,56 +103,53 @@ def reference_model(actuator: Actuator) -> Model:
     """Return the model of the reference stroke."""
     if actuator.radii:
         return Model(
-            SCALED,
+            ModelId.SCALED_HEIGHT,
             "Sec. 4.6: 17.5 mm for 15 balloons of d = 5, in proportion to d",
             "measured, not predicted: one actuator of d = 5, at a pressure that is not given; as "
             "in the paper, all of the height counts as stroke",
         )
-    return Model(
-        "the largest volume", actuator.kinematics[0].model.name, actuator.kinematics[0].model.trust
-    )
+    first = actuator.kinematics[0].model
+    return Model(ModelId.LARGEST_VOLUME, first.name, first.trust)
 
 
 def strokes(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure | LeftOut]:
     """Yield the full state, the largest volumes, and strokes at each volume of the request."""
     if actuator.has_reference:
         model = reference_model(actuator)
+        scaled = {
+            Quantity.REFERENCE_STROKE: actuator.reference_stroke,
+            Quantity.REFERENCE_HEIGHT: actuator.reference_height,
+        }
         flags: tuple[Flag, ...] = ()
         if actuator.radii:
             sizes_here = sizes_of(actuator.form, actuator.laminate)
             flags = flags_at(farther(sizes_here, PAPER_3DOF, False))
-        stroke = Figure(
-            "stroke", "reference stroke", actuator.reference_stroke, "mm", model, flags=flags
-        )
-        yield replace(stroke, quantity="reference_stroke")
-        yield replace(stroke, name="reference height", value=actuator.reference_height)
+        for quantity, value in scaled.items():
+            yield Figure(quantity, value, model, flags=flags)
         for k in actuator.kinematics:
             at_full = float(k.volume(actuator.reference_stroke))
-            yield Figure(
-                "stroke", "volume a balloon at the reference stroke", at_full, "ul", k.model
-            )
+            yield Figure(Quantity.REFERENCE_VOLUME, at_full, k.model)
     else:
         yield LeftOut("reference stroke and height, and what is predicted at them", NOT_MEASURED)
     for k in actuator.kinematics:
-        yield Figure("stroke", "largest volume a balloon", k.largest_volume, "ul", k.model)
-        yield Figure("stroke", "stroke at the largest volume", k.largest_stroke, "mm", k.model)
+        yield Figure(Quantity.LARGEST_VOLUME, k.largest_volume, k.model)
+        yield Figure(Quantity.LARGEST_STROKE, k.largest_stroke, k.model)
     if actuator.radii:
         widest = max(actuator.radii)
         drawn_in = 2 * fullest(widest).radius
         by_eqs_1_to_3 = actuator.kinematics[-1].model
-        name = "balloon's diameter at the largest volume"
-        yield Figure("stroke", name, drawn_in, "mm", by_eqs_1_to_3)
+        yield Figure(Quantity.BALLOON_DIAMETER, drawn_in, by_eqs_1_to_3)
     for volume in request.volumes_ul:
         for k in actuator.kinematics:
             yield _stroke(k, volume)
 
 
 def _stroke(k: Kinematics, volume: float) -> Figure | LeftOut:
-    name = f"stroke at {volume:g} ul a balloon"
+    quantity, at = Quantity.VOLUME_STROKE, Conditions(volume=volume)
     try:
-        return Figure("stroke", name, float(k.stroke(volume)), "mm", k.model)
+        return Figure(quantity, float(k.stroke(volume)), k.model, at)
     except DesignError as error:
-        return LeftOut(f"{name}, {k.model.name}", str(error))
+        return LeftOut(f"{quantity.named(at)}, {k.model.name}", str(error), (quantity,))
 
 
 def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
@@ -157,14 +158,11 @@ def forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
     """
     for pressure in request.pressures_kpa:
         for share in paper.HEIGHTS if actuator.has_reference else paper.HEIGHTS[:1]:
-            at = "flat" if share == 0 else f"at {100 * share:g} % of the reference stroke"
+            at = Conditions(kpa=pressure, share=share, each=_each(actuator))
             for k in actuator.kinematics:
                 value = _force(actuator, k, pressure, share * actuator.reference_stroke, request)
-                name = f"blocked force{_each(actuator)} at {pressure:g} kPa, {at}"
                 model = _force_model(actuator, k, request)
-                figure = Figure("force", name, float(value), "N", model, pressure_kpa=pressure)
-                is_measured = share == 0 and not _each(actuator)
-                yield replace(figure, quantity="flat_force") if is_measured else figure
+                yield Figure(Quantity.BLOCKED_FORCE, float(value), model, at)
 
 
 def _force(
@@ -179,7 +177,7 @@ def _force(
 
 
 def _each(actuator: Actuator) -> str:
-    return "" if actuator.form.pushing == actuator.form.stacks else " of one SBA"
+    return "" if actuator.form.pushing == actuator.form.stacks else "sba"
 
 
 def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) -> Model:
@@ -189,8 +187,8 @@ def _force_model(actuator: Actuator, k: Kinematics, request: PredictionRequest) 
         if actuator.radii
         else "no film tension, no stretch, one balloon stack; not measured"
     )
-    model = Model(f"virtual work on {k.model.name}", "Sec. 4.3, F = p dv/dh", trust)
-    return model.times("contact factor", request.factors.contact_factor)
+    model = Model(WORK_ON[k.model.id], "Sec. 4.3, F = p dv/dh", trust)
+    return model.times("contact_factor", request.factors.contact_factor)
 
 
 def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) -> Iterator[Figure]:
@@ -203,37 +201,34 @@ def power(actuator: Actuator, request: PredictionRequest, mass_g: float | None) 
     if actuator.has_reference:
         chamber = actuator.balloons * float(first.volume(actuator.reference_stroke))
         whole = chamber * actuator.form.stacks
-        yield Figure(
-            "actuation", "volume of all chambers at the reference stroke", whole, "ul", first.model
-        )
+        yield Figure(Quantity.TOTAL_VOLUME, whole, first.model)
     flow = Model(
-        f"{first.model.name} over flow",
+        OVER_FLOW[first.model.id],
         "Sec. 4.5, 7",
         "a liquid at a steady flow into all chambers together, no lag of pump or tube: the paper's "
         "water took 0.92 +- 0.08 s; a gas takes 10 % longer at 10 kPa, and valves much longer",
     )
     if whole is not None:
         time = float(seconds(whole, request.flow_ml_min))
-        name = f"time to the reference stroke at {request.flow_ml_min:g} ml/min"
-        yield Figure("actuation", name, time, "s", flow)
+        at = Conditions(flow=request.flow_ml_min)
+        yield Figure(Quantity.REFERENCE_TIME, time, flow, at)
     for volume in request.volumes_ul:
         content = volume * actuator.balloons * actuator.form.stacks
-        name = f"time to {volume:g} ul a balloon at {request.flow_ml_min:g} ml/min"
-        plain = Model("volume over flow", "Sec. 7", flow.trust)
-        yield Figure("actuation", name, float(seconds(content, request.flow_ml_min)), "s", plain)
+        time = float(seconds(content, request.flow_ml_min))
+        at = Conditions(volume=volume, flow=request.flow_ml_min)
+        plain = Model(ModelId.VOLUME_OVER_FLOW, "Sec. 7", flow.trust)
+        yield Figure(Quantity.VOLUME_TIME, time, plain, at)
     if whole is None:
         return
     bound = Model(
-        f"p v with {first.model.name}",
+        P_V[first.model.id],
         "Sec. 4.1",
         "end pressure times volume: more than the integral of p dV that the paper means, which the "
         "elastic balloon gives",
     )
     for pressure in request.pressures_kpa:
-        name = f"pneumatic input work at {pressure:g} kPa"
-        yield Figure(
-            "actuation", name, work_uj(pressure, whole) / 1000, "mJ", bound, pressure_kpa=pressure
-        )
+        work = work_uj(pressure, whole) / 1000
+        yield Figure(Quantity.WORK_BOUND, work, bound, Conditions(kpa=pressure))
     if request.pressures_kpa and mass_g is not None:
         yield _power_density(actuator, request, whole, mass_g)
 
@@ -247,21 +242,14 @@ def _power_density(
     push = float(_force(actuator, actuator.kinematics[0], highest, 0.0, request))
     pushes = actuator.form.stacks / actuator.form.pushing
     model = Model(
-        "F v / m",
+        ModelId.POWER,
         "Sec. 7",
         "largest force times mean speed, as in the paper; the two never occur together. No lag of "
         "valve and pump: the paper's 0.067 s of air make it a fifth of this",
-    ).times("contact factor", request.factors.contact_factor)
+    ).times("contact_factor", request.factors.contact_factor)
     watts = pushes * push * actuator.reference_stroke / 1000 / time
-    return Figure(
-        "actuation",
-        f"power density, blocked force flat at {highest:g} kPa and "
-        f"{paper.AIR_FLOW / 1000:g} l/min of air",
-        watts / (mass_g / 1000),
-        "W/kg",
-        model,
-        pressure_kpa=highest,
-    )
+    at = Conditions(kpa=highest, flow=paper.AIR_FLOW)
+    return Figure(Quantity.POWER_DENSITY, watts / (mass_g / 1000), model, at)
 
 
 def stroke_relation(actuator: Actuator) -> Relation:
@@ -314,7 +302,7 @@ def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
         label = f"paper: {name}, {paper.FORCE_KPA:g} kPa"
         y, errors = [m.value for m in values_at], [m.error for m in values_at]
         points.append(Points(label, places, y, errors))
-    each = _each(actuator)
+    each = " of one SBA" if _each(actuator) else ""
     return Relation(
         "force",
         f"Blocked force{each} against stroke, by virtual work",
@@ -329,7 +317,7 @@ def force_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
 
 
 CURVATURE = Model(
-    "constant curvature",
+    ModelId.CONSTANT_CURVATURE,
     "from chamber lengths, each at its own stroke",
     "upper bound: chambers are taken to lengthen freely, and films between them do not hold back; "
     "the paper's largest is 81 +- 6 deg",
@@ -373,43 +361,46 @@ def bending(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     """Yield the largest bend of each number of chambers, and the lateral tip displacement."""
     if not actuator.has_reference:
         yield LeftOut(
-            "bend and tip displacement at the reference stroke, constant curvature", NOT_MEASURED
+            "bend and tip displacement at the reference stroke, constant curvature",
+            NOT_MEASURED,
+            (Quantity.REFERENCE_BEND, Quantity.LARGEST_ASIDE),
         )
         return
     all_paths = paths(actuator)
     for path in all_paths:
-        name = f"bend with {chamber_count(path.chambers)} at the reference stroke, the others flat"
+        quantity, at = Quantity.REFERENCE_BEND, Conditions(chambers=path.chambers)
         if len(path.stroke) < SAMPLES:
             reason = "more than half a turn: the tip would come down through the base"
-            yield LeftOut(name, reason)
+            yield LeftOut(quantity.named(at), reason, (quantity,))
         else:
-            yield Figure("bending", name, math.degrees(path.angle[-1]), "deg", CURVATURE)
+            yield Figure(quantity, math.degrees(path.angle[-1]), CURVATURE, at)
     every = [*all_paths, *paths(actuator, others_full=True)]
     reach = max(float(path.aside.max()) for path in every)
-    yield Figure("bending", "maximum lateral tip displacement", reach, "mm", CURVATURE)
+    yield Figure(Quantity.LARGEST_ASIDE, reach, CURVATURE)
 
 
 def folding(actuator: Actuator, request: PredictionRequest) -> Figure | LeftOut:
     """Return the diameter of the channel that three folded lobes pass."""
     if actuator.form.stacks != LOBES:
         reason = f"the model is of {LOBES} lobes folded into a triangle"
-        return LeftOut("folded diameter", f"{reason}; this design has {actuator.form.stacks}")
+        reason = f"{reason}; this design has {actuator.form.stacks}"
+        return LeftOut("folded diameter", reason, (Quantity.FOLDED_DIAMETER,))
     model = Model(
-        "three lobes as chords of a circle",
+        ModelId.FOLDED_LOBES,
         "our geometry; the paper reports 9.25",
         "one figure to compare with: 9.91 at the nominal thickness, 8.61 at the 0.95 mm that the "
         "paper measures, between which its 9.25 lies",
-    ).times("press factor", actuator.folded.factor)
+    ).times("press_factor", actuator.folded.factor if actuator.folded.molten else 1.0)
     width = 2 * max(actuator.radii) + 2 * actuator.design.bond.width
     value = folded_diameter(width, actuator.thickness)
-    return Figure("size", "folded diameter", value, "mm", model)
+    return Figure(Quantity.FOLDED_DIAMETER, value, model)
 
 
 def bending_relation(actuator: Actuator, request: PredictionRequest) -> Relation:
     """Return bend against time, each chamber fed at the flow of the request."""
     first = actuator.kinematics[0]
     model = Model(
-        f"{CURVATURE.name}, {first.model.name} over flow",
+        ModelId.CURVATURE_OVER_FLOW,
         CURVATURE.source,
         f"{CURVATURE.trust}; no lag of pump or tube",
     )
@@ -469,23 +460,23 @@ def workspace_relation(actuator: Actuator) -> Relation:
 
 
 GROUPS = ("size", "inlet", "strength", "stroke", "force", "actuation", "bending", "stiffness")
-GEOMETRY = Model("plain geometry", "of the cut files", "exact for what is cut")
+GEOMETRY = Model(ModelId.GEOMETRY, "of the cut files", "exact for what is cut")
 PAPER_SLOTS = Slots(width=10.0, run=8.5)
 """The paper's SBAs of 11.5 x 20 mm less a bond of 0.75 all round (Sec. 2.1)."""
 ROUND_THE_TUBE = {
-    "deflated_diameter": Model(
-        "tube and films",
+    Quantity.DEFLATED_DIAMETER: Model(
+        ModelId.TUBE_AND_FILMS,
         "Sec. 2.1",
         "the paper's 15.33 is the sum of tube and films as bought; the sheet is taken to lie close "
         "to the tube",
     ),
-    "reached_diameter": Model(
-        REACHED,
+    Quantity.REACHED_DIAMETER: Model(
+        ModelId.LENS,
         "the largest volume of films that do not stretch",
         "for what it must reach; for the paper's design 27.29, 2.5 % below its about 28",
     ),
-    "inflated_diameter": Model(
-        WIDEST,
+    Quantity.INFLATED_DIAMETER: Model(
+        ModelId.CYLINDER,
         "Sec. 2.1: 2 w / pi a balloon",
         "upper end, for what it must not touch: a full cylinder, its ends not holding it back; "
         "28.06 for the paper's design, which says about 28",
@@ -540,7 +531,7 @@ def predict(
             each.append(_figures(end, wish, None if quick else elastic.elastic_stack(end, wish)))
         items = list(bounded(items, each, discs))
         relations = tuple(relation_by_disc(relation, discs) for relation in relations)
-    to_come = (STACK,) if quick and subject.radii else ()
+    to_come = OF_STACK if quick and subject.radii else ()
     items = [*(_flagged(item, flat) for item in items), *past]
     figures = chosen(
         (item for item in items if isinstance(item, Figure)), to_come, uncertainty is not None
@@ -548,21 +539,23 @@ def predict(
     return Prediction(
         asked,
         tuple(
-            replace(
-                figure,
-                measured=counterpart(
-                    subject.form,
-                    figure.name,
-                    figure.model.name,
-                    wish.factors.calibration,
-                    is_the_papers_3dof(subject.form, flat),
-                ),
-            )
+            replace(figure, measured=_measured(figure, subject, wish.factors.calibration))
             for figure in figures
         ),
         relations,
         tuple(item for item in items if isinstance(item, LeftOut)),
     )
+
+
+def _measured(figure: Figure, actuator: Actuator, calibration: str) -> Counterpart | None:
+    """Return the paper's measurement of a figure that is far off; a folded height with a factor has
+    none.
+    """
+    model = figure.model
+    if model.id is ModelId.FILMS and model.factors:
+        return None
+    of_papers = is_the_papers_3dof(actuator.form, actuator.laminate)
+    return counterpart(actuator.form, figure.quantity, figure.at, model.id, calibration, of_papers)
 
 
 def _within_burst(
@@ -590,7 +583,7 @@ def _flagged(item: Figure | LeftOut, laminate: Laminate) -> Figure | LeftOut:
     try:
         refuse_beyond_burst(laminate, item.pressure_kpa)
     except BeyondError as error:
-        return LeftOut(item.name, str(error))
+        return LeftOut(item.name, str(error), (item.quantity,))
     if is_near_burst(laminate, item.pressure_kpa):
         return replace(item, flags=(*item.flags, NEAR_BURST))
     return item
@@ -600,25 +593,17 @@ def _burst(laminate: Laminate) -> Figure | LeftOut:
     """Return the burst pressure with its interval, which is ours."""
     estimate = burst(laminate)
     if estimate is None:
-        return LeftOut(BURST, NOT_BURST)
+        return LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
     interval, missed = burst_uncertainty(estimate)
     pocket = "round pocket" if estimate.is_round else "pocket, taken for a long one,"
     model = Model(
-        "film stress in proportion",
+        ModelId.FILM_STRESS,
         f"Sec. 4: {BURST_MEASURED}, pockets of d = 5",
         f"of its widest {pocket} and thinnest film; less where bonds peel or seams give way first. "
         "The interval has the paper's scatter, and what is assumed for other sizes and shapes",
     )
-    return Figure(
-        "strength",
-        BURST,
-        estimate.kpa,
-        "kPa",
-        model,
-        interval=interval,
-        flags=flags_at(missed),
-        quantity="burst",
-    )
+    flags = flags_at(missed)
+    return Figure(Quantity.BURST, estimate.kpa, model, interval=interval, flags=flags)
 
 
 def _moved_figures(
@@ -667,7 +652,7 @@ def _geometric_figures(
         yield folding(actuator, request)
     yield mass
     if isinstance(mass, LeftOut) and actuator.kinematics:
-        yield LeftOut("power density", mass.reason)
+        yield LeftOut("power density", mass.reason, (Quantity.POWER_DENSITY,))
     yield from _tubes(actuator)
     if not actuator.form.works_under_vacuum:
         yield _burst(actuator.laminate)
@@ -732,14 +717,12 @@ def _sizes(actuator: Actuator, factors: Factors) -> Iterator[Figure]:
     """Yield flat sizes, and diameters round the tube for radial designs."""
     folded = actuator.folded
     factor = folded.factor if folded.molten else 1.0
-    models = {name: model.times("press factor", factor) for name, model in ROUND_THE_TUBE.items()}
-    models["folded_height"] = _folded_model(folded).times("press factor", factor)
+    models = {of: model.times("press_factor", factor) for of, model in ROUND_THE_TUBE.items()}
+    models[Quantity.FOLDED_HEIGHT] = _folded_model(folded).times("press_factor", factor)
     for name, value in sizes(actuator.design, actuator.laminate, factors).items():
         if name != "thickness":
-            model = models.get(name, GEOMETRY)
-            figure = Figure("size", name.replace("_", " "), value, "mm", model)
-            is_folded = name == "folded_height"
-            yield replace(figure, quantity="folded_height") if is_folded else figure
+            quantity = Quantity.of(name)
+            yield Figure(quantity, value, models.get(quantity, GEOMETRY))
 
 
 def _folded_model(folded: FoldedHeight) -> Model:
@@ -747,17 +730,16 @@ def _folded_model(folded: FoldedHeight) -> Model:
     trust = AS_BOUGHT if folded.molten and folded.factor == 1 else SOLID
     trust += ", the others this share of it" if folded.molten and folded.factor != 1 else ""
     trust += f"; {folded.remark}" if folded.remark else ""
-    return Model(FLAT_HEIGHT_OF_FILMS, "Sec. 2", trust)
+    return Model(ModelId.FILMS, "Sec. 2", trust)
 
 
 def _mass(laminate: Laminate) -> Figure | LeftOut:
     try:
         grams = film_mass(laminate)
     except DesignError as error:
-        return LeftOut("mass", str(error))
+        return LeftOut("mass", str(error), (Quantity.MASS,))
     trust = "exact for the films, masks, tabs and ears included; without tubing, glue and fluid"
-    model = Model("area x thickness x density", "", trust)
-    return Figure("size", "mass", grams, "g", model, quantity="mass")
+    return Figure(Quantity.MASS, grams, Model(ModelId.FILM_MASS, "", trust))
 
 
 def _tubes(actuator: Actuator) -> Iterator[Figure | LeftOut]:
@@ -766,16 +748,15 @@ def _tubes(actuator: Actuator) -> Iterator[Figure | LeftOut]:
         return
     inlet = min(actuator.laminate.inlets, key=lambda inlet: inlet.width - inlet.tube_diameter)
     model = Model(
-        "half the perimeter",
+        ModelId.HALF_PERIMETER,
         "a flat strip opened round, its PTFE beside the tube",
         "cut at its narrowest; films do not stretch; glue not counted",
     )
     narrowest = inlet.width - actuator.design.strip_loss
     most = largest_tube(narrowest, actuator.design.films.ptfe.thickness)
-    yield Figure("inlet", "largest tube that the inlet opens to", most, "mm", model)
-    spare = most - inlet.tube_diameter
-    name = f"room round the tube of {inlet.tube_diameter:g} mm"
-    yield Figure("inlet", name, spare, "mm", model)
+    yield Figure(Quantity.LARGEST_TUBE, most, model)
+    tube = inlet.tube_diameter
+    yield Figure(Quantity.TUBE_ROOM, most - tube, model, Conditions(tube=tube))
 
 
 def plate_of(laminate: Laminate) -> Region | None:
@@ -787,28 +768,30 @@ def plate_of(laminate: Laminate) -> Region | None:
 
 def _stiffness(actuator: Actuator) -> Iterator[Figure | LeftOut]:
     """Yield the bending stiffness of a full actuator by the paper's cantilever formula."""
-    name = "lateral tip stiffness, inflated"
+    quantity = Quantity.REFERENCE_STIFFNESS
+    name = quantity.named(Conditions())
     plate = plate_of(actuator.laminate)
     if not actuator.radii:
-        yield LeftOut(name, "the paper measured no modulus of oblong balloons")
+        yield LeftOut(name, "the paper measured no modulus of oblong balloons", (quantity,))
         return
     if not actuator.has_the_papers_film:
-        yield LeftOut(name, NOT_MEASURED)
+        yield LeftOut(name, NOT_MEASURED, (quantity,))
         return
     if plate is None:
-        yield LeftOut(name, "the topmost film is not the plain outline: it has tabs or ears")
+        reason = "the topmost film is not the plain outline: it has tabs or ears"
+        yield LeftOut(name, reason, (quantity,))
         return
     measured = paper.MODULUS_3DOF if actuator.form.is_parallel else paper.MODULUS_1DOF
     least, _ = second_moments(plate)
-    yield Figure("stiffness", "second moment of area of the plate", least, "mm4", GEOMETRY)
+    yield Figure(Quantity.SECOND_MOMENT, least, GEOMETRY)
     model = Model(
-        "3 E I / l^3",
+        ModelId.CANTILEVER,
         f"Sec. 4.4, E = {measured.value:g} kPa as measured there",
         "order of magnitude: E is the paper's of its own actuators, not predicted, and its I is "
         "not given",
     )
     value = tip_stiffness(measured.value, least, actuator.reference_height)
-    yield Figure("stiffness", name, value, "N/mm", model)
+    yield Figure(quantity, value, model)
 
 
 def _diameter_relation(actuator: Actuator, wrap: Wrap) -> Relation:

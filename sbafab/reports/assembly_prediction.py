@@ -14,11 +14,11 @@ from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba
 from sbafab.design.records import Discs, Slots
 from sbafab.models.balloons import balloons_of
 from sbafab.models.elastic import free_rise
-from sbafab.models.figures import REACHED, WIDEST
 from sbafab.models.formulas import is_near_burst, is_the_papers_3dof, refuse_beyond_burst
 from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest, rate
-from sbafab.models.paper import BALLOON, FLAT_HEIGHT_OF_FILMS, counterpart
+from sbafab.models.paper import counterpart
+from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, ModelId, Quantity
 from sbafab.models.stack import Stack, stack
 from sbafab.reports.inflated import (
     TOUCHING,
@@ -246,8 +246,8 @@ def _first(around: _Around, part: str, pressed: Sequence[int], pressure: float) 
 GRAVITY = 9.80665
 MARBLE_G = 1.2
 """Mass of the marble that the paper's brace lifts, g (Sec. 5)."""
-ELASTIC = "elastic stack"
-LENS = f"{REACHED}, virtual work p dV/dh"
+STACK_WORDS = ModelId.ELASTIC_STACK.words
+LENS = f"{ModelId.LENS.words}, virtual work p dV/dh"
 STATIC = "statics"
 IN_THE_LUMEN = (
     "height of a balloon in the lumen",
@@ -398,7 +398,9 @@ def predict_assembly(
             for bend in bent_arms(assembled, placed, stacks, rises, pressure_kpa, pause):
                 if isinstance(bend, Clearance):
                     clearance = f"clearance to {bend.other}, bent by {bend.chambers}"
-                    figures.append(AssemblyFigure(placed.name, clearance, bend.gap, "mm", ELASTIC))
+                    figures.append(
+                        AssemblyFigure(placed.name, clearance, bend.gap, "mm", STACK_WORDS)
+                    )
                 else:
                     bent.append(bend)
         else:
@@ -421,60 +423,58 @@ def _arm(
     placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
     """Height, reach, bend and load of an actuator with round pockets."""
-    for figure in _figures_of_arm(placed, arm_stack, pressure, load_g):
-        name, model = _as_predicted(figure.name, pressure)
-        calibration = arm_stack.calibration
+    for figure, predicted in _figures_of_arm(placed, arm_stack, pressure, load_g):
         form = placed.made.design.form
         of_papers = is_the_papers_3dof(form, placed.made.laminate)
-        beside = counterpart(form, name, model, calibration, of_papers)
+        beside = counterpart(form, *predicted, arm_stack.calibration, of_papers)
         yield replace(figure, measured=beside.sentence() if beside else "")
-
-
-def _as_predicted(name: str, pressure: float) -> tuple[str, str]:
-    """Return the name and the model of the same figure in a design's own prediction."""
-    at = f"at {pressure:g} kPa"
-    figures = {
-        "height, flat": ("folded height", FLAT_HEIGHT_OF_FILMS),
-        "height, inflated": (f"free height {at}", BALLOON),
-        "push at 75 % of its stroke": (
-            f"blocked force {at}, at 75 % of the reference stroke",
-            ELASTIC,
-        ),
-        "bend by one chamber": (f"bend {at} in one chamber, the others empty", ELASTIC),
-        "maximum lateral tip displacement": (
-            f"lateral tip displacement {at} in one chamber, the others empty",
-            ELASTIC,
-        ),
-    }
-    # A sag is a load over a stiffness.
-    return figures.get(name, (f"lateral tip stiffness {at}, pressure held", ELASTIC))
 
 
 def _figures_of_arm(
     placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
-) -> Iterator[AssemblyFigure]:
+) -> Iterator[tuple[AssemblyFigure, FigureKey]]:
+    """Yield figures, each with that of the same kind in a design's own prediction."""
     name, weight = placed.name, load_g * 1e-3 * GRAVITY
+    at, stack_model = Conditions(kpa=pressure), ModelId.ELASTIC_STACK
+
+    def key(quantity: Quantity, model: ModelId = stack_model, **where: float) -> FigureKey:
+        return FigureKey(quantity, at._replace(**where), model)  # type: ignore[arg-type]
+
+    def figure(words: str, value: float, unit: str, paper: str = "") -> AssemblyFigure:
+        return AssemblyFigure(name, words, value, unit, stack_model.words, paper)
+
     every = (pressure,) * arm_stack.chambers
     free = arm_stack.pose(every)
     flat = arm_stack.flat_height
-    yield AssemblyFigure(name, "height, flat", flat, "mm", ELASTIC, "about 1 (Sec. 6)")
+    yield (
+        figure("height, flat", flat, "mm", "about 1 (Sec. 6)"),
+        FigureKey(Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS),
+    )
     stroke = _free_stroke(placed, pressure)
-    height = flat + stroke
-    yield AssemblyFigure(name, "height, inflated", height, "mm", BALLOON, "about 20 (Sec. 5)")
-    three_quarters = arm_stack.pose(every, plate=flat + 0.75 * stroke)
-    yield AssemblyFigure(name, "push at 75 % of its stroke", three_quarters.force, "N", ELASTIC)
+    balloon = ModelId.ELASTIC_BALLOON
+    yield (
+        replace(
+            figure("height, inflated", flat + stroke, "mm", "about 20 (Sec. 5)"),
+            model=balloon.words,
+        ),
+        key(Quantity.FREE_HEIGHT, balloon),
+    )
+    push = arm_stack.pose(every, plate=flat + 0.75 * stroke).force
+    blocked = key(Quantity.BLOCKED_FORCE, share=0.75)
+    yield figure("push at 75 % of its stroke", push, "N"), blocked
     if arm_stack.chambers > 1:
         single = arm_stack.pose((pressure, *(0.0,) * (arm_stack.chambers - 1)))
-        yield AssemblyFigure(name, "bend by one chamber", single.bend, "deg", ELASTIC)
+        yield figure("bend by one chamber", single.bend, "deg"), key(Quantity.BEND, chambers=1)
         aside = float(np.hypot(*single.tip[:2]))
-        yield AssemblyFigure(name, "maximum lateral tip displacement", aside, "mm", ELASTIC)
+        bent = key(Quantity.ASIDE, chambers=1)
+        yield figure("maximum lateral tip displacement", aside, "mm"), bent
     if weight > 0:
         hung = arm_stack.pose(every, tip_load=(weight, 0.0, 0.0), near=free)
         sag = float(np.linalg.norm(hung.tip - free.tip))
         paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
-        yield AssemblyFigure(
-            name, f"sag of the tip, {load_g:g} g across it", sag, "mm", ELASTIC, paper
-        )
+        words = f"sag of the tip, {load_g:g} g across it"
+        # A sag is a load over a stiffness.
+        yield figure(words, sag, "mm", paper), key(Quantity.HELD_STIFFNESS)
 
 
 def _free_stroke(placed: PlacedSba, pressure: float) -> float:
@@ -515,8 +515,8 @@ def _grip_figures(
     name, paper = hold.part, "about 28 (Sec. 2.1)"
     diameters = (
         ("diameter, deflated", hold.deflated, "tube and films", "15.33 (Sec. 2.1)"),
-        ("diameter, inflated free", hold.free, REACHED, paper),
-        ("diameter, inflated at most", hold.most, WIDEST, paper),
+        ("diameter, inflated free", hold.free, ModelId.LENS.words, paper),
+        ("diameter, inflated at most", hold.most, ModelId.CYLINDER.words, paper),
     )
     for diameter, value, model, paper in diameters:
         yield AssemblyFigure(name, diameter, value, "mm", model, paper)

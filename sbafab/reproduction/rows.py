@@ -16,6 +16,7 @@ from sbafab.models.figures import Factors, Prediction, PredictionRequest
 from sbafab.models.formulas import modulus
 from sbafab.models.pneumatics import AIR, Line, seconds
 from sbafab.models.prediction import predict
+from sbafab.models.quantity import ModelId, chamber_count, share_of_stroke
 from sbafab.models.rippled import free_shapes
 from sbafab.models.stack import Stack, stack
 from sbafab.pressing.schedule import schedule
@@ -119,7 +120,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "circle round the 3-DoF",
         exact(15, "mm", "Sec. 2"),
-        three.value("outline diameter"),
+        three.value("outline_diameter"),
         geometry,
         "one bond width between lumen and chamber, one outside the chamber",
     )
@@ -127,14 +128,14 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "radial, deflated",
         paper.RADIAL_FLAT,
-        radial.value("deflated diameter"),
+        radial.value("deflated_diameter"),
         "tube and films",
         "the paper rounds: it adds 0.330",
     )
     yield Row(
         "radial, inflated (about)",
         paper.RADIAL_FULL,
-        radial.value("inflated diameter"),
+        radial.value("inflated_diameter"),
         "cylinder of unstretched film",
         "a pocket 10 wide becomes a cylinder of 6.366",
     )
@@ -148,7 +149,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "inlet opens to the tube",
         exact(1.016, "mm", "Sec. 2"),
-        three.value("largest tube that the inlet opens to"),
+        three.value("largest_tube"),
         "half the perimeter",
         "a strip of 1.95 is cut 1.65 at its narrowest; with its PTFE the tube needs 1.635",
     )
@@ -156,7 +157,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "3-DoF of 15 balloons, deflated",
         paper.FLAT_HEIGHT,
-        three.value("folded height"),
+        three.value("folded_height"),
         tall,
         "films that melt flow in the press; the paper gives no factor, and none is applied here",
     )
@@ -164,7 +165,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "channel that the folded 3-DoF passes",
         paper.FOLDED,
-        three.value("folded diameter"),
+        three.value("folded_diameter"),
         f"{chords}, nominal thickness",
         "the pressed lobes are thinner than the films' sum",
     )
@@ -172,7 +173,7 @@ def sizes(three: Prediction) -> Iterator[Row]:
     yield Row(
         "the same",
         paper.FOLDED,
-        pressed.value("folded diameter"),
+        pressed.value("folded_diameter"),
         f"{chords}, the paper's 0.95",
         "the paper's figure lies between the two; likely the lobes do not fold as tight as bars",
     )
@@ -257,7 +258,8 @@ def simulators() -> Iterator[Row]:
 # Energy, force, time, bending, stiffness.
 
 
-STACK = "elastic stack"
+STACK = ModelId.ELASTIC_STACK.words
+FORCE_MODELS = (ModelId.WORK_ON_EQ_4, ModelId.WORK_ON_EQS_1_TO_3, ModelId.ELASTIC_STACK)
 ENERGY_BALLOONS = 6
 """Of the actuator whose energy was measured (Sec. 7)."""
 AVERAGED = (
@@ -283,11 +285,11 @@ def energy() -> Iterator[Row]:
     }
     for pressure, measured in ((1, 0.531), (10, 45.3)):
         least = 1000 * measured / pressure / ENERGY_BALLOONS
-        volume = prediction.value(f"volume a balloon at {pressure} kPa")
+        volume = prediction.value("balloon_volume", kpa=pressure)
         yield Row(
             f"energy in at {pressure} kPa, {ENERGY_BALLOONS} balloons, d = 10",
             exact(measured, "mJ", "Sec. 4.1"),
-            prediction.value(f"pneumatic input work at {pressure} kPa, free"),
+            prediction.value("free_work", kpa=pressure),
             "elastic balloon, integral of p dV",
             reasons[pressure].format(least=least, held=volume),
         )
@@ -302,29 +304,29 @@ def energy() -> Iterator[Row]:
 
 
 FORCE_WHY = {
-    ("1-DoF", "virtual work on Eq. 4"): (
+    ("1-DoF", ModelId.WORK_ON_EQ_4): (
         "low: held flat it touches over most of its pocket, where a parabola touches in a point; "
         "p times the whole pocket is 1.96 N",
         "high: likely film tension, which pulls back once there is a height",
         "high: likely as at 25 %",
     ),
-    ("3-DoF", "virtual work on Eq. 4"): (
+    ("3-DoF", ModelId.WORK_ON_EQ_4): (
         "low: as the 1-DoF; p times three pockets is 5.89 N. 3.3 times the 1-DoF was measured, "
         "where the model says 3",
         "low, where the 1-DoF is high: one factor cannot serve both",
         "near: no reason known why the 1-DoF is not",
     ),
-    ("1-DoF", "virtual work on Eqs. 1-3"): (
+    ("1-DoF", ModelId.WORK_ON_EQS_1_TO_3): (
         "low: touches in a point, and begins 3/4 as steep as Eq. 4",
         "near: likely by two errors that cancel, contact and film tension",
         "high: a parabola goes on to rise where the real balloon is nearly full",
     ),
-    ("3-DoF", "virtual work on Eqs. 1-3"): (
+    ("3-DoF", ModelId.WORK_ON_EQS_1_TO_3): (
         "low: as the 1-DoF",
         "low: as when flat",
         "near: as with Eq. 4",
     ),
-    ("1-DoF", STACK): (
+    ("1-DoF", ModelId.ELASTIC_STACK): (
         "high: the pockets likely come out smaller than drawn, where molten TPE creeps under the "
         "mask",
         "high: as when flat; a column of six balloons likely also tilts, which a straight one does "
@@ -332,7 +334,7 @@ FORCE_WHY = {
         "high: as at 25 %, and the film is likely stiffer than 10 MPa, which bulges less and "
         "touches less",
     ),
-    ("3-DoF", STACK): (
+    ("3-DoF", ModelId.ELASTIC_STACK): (
         "high: as the 1-DoF, less so; 3.3 times that was measured",
         "high: as when flat",
         "high: as the 1-DoF",
@@ -345,31 +347,26 @@ def forces(single: Prediction, three: Prediction) -> Iterator[Row]:
         ("1-DoF", single, paper.FORCE_1DOF),
         ("3-DoF", three, paper.FORCE_3DOF),
     ):
-        for model in ("virtual work on Eq. 4", "virtual work on Eqs. 1-3", STACK):
+        for model in FORCE_MODELS:
             whys = FORCE_WHY[name, model]
-            for at, value, why in zip(heights(), measured, whys, strict=True):
-                yield Row(f"{name}, 100 kPa, {at}", value, force(prediction, at, model), model, why)
+            for share, value, why in zip(paper.HEIGHTS, measured, whys, strict=True):
+                at = f"{name}, 100 kPa, {share_of_stroke(share)}"
+                yield Row(at, value, force(prediction, share, model), model.words, why)
     bent_whys = {
         30: "near, with two chambers pressed against a plate square to the tip, which sticks",
         60: "high: the paper does not say which chambers push, nor how the sensor holds the tip",
         90: "with one chamber: two do not bend so far and stay within what films stretch",
     }
     for angle, value in paper.FORCE_BENT:
-        chambers = "one chamber" if angle == 90 else "2 chambers"
-        name = f"force at 100 kPa in {chambers}, bent by {angle} deg"
+        chambers = 1 if angle == 90 else 2
+        bent = three.value("bent_force", kpa=100, chambers=chambers, angle=angle)
         figure = f"3-DoF, 100 kPa, bent by {angle} deg"
-        yield Row(figure, value, three.value(name), f"{STACK}, {chambers}", bent_whys[angle])
+        model_of = f"{STACK}, {chamber_count(chambers)}"
+        yield Row(figure, value, bent, model_of, bent_whys[angle])
 
 
-def heights() -> list[str]:
-    return [
-        "flat",
-        *(f"at {100 * share:g} % of the reference stroke" for share in paper.HEIGHTS[1:]),
-    ]
-
-
-def force(prediction: Prediction, at: str, model: str) -> float:
-    return prediction.value(f"blocked force at 100 kPa, {at}", model)
+def force(prediction: Prediction, share: float, model: ModelId) -> float:
+    return prediction.value("blocked_force", model, kpa=100, share=share)
 
 
 def motion(three: Prediction) -> Iterator[Row]:
@@ -382,7 +379,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "time to 10 kPa, water, 35 ml/min",
         paper.WATER_TIME,
-        three.value(f"time to the reference stroke at {paper.WATER_FLOW:g} ml/min"),
+        three.value("reference_time", flow=paper.WATER_FLOW),
         "Eq. 4 over flow, three chambers of 15 balloons at 17.5 mm",
         "agrees by chance: the stroke is the paper's, and no pressure belongs to it; to 10 kPa in "
         f"the chambers films take in half as much again; {AVERAGED}",
@@ -412,11 +409,7 @@ def _times(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "time to 10 kPa, air, 2.5 l/min",
         paper.AIR_TIME,
-        float(
-            seconds(
-                three.value("volume of all chambers at the reference stroke"), paper.AIR_FLOW, 10
-            )
-        ),
+        float(seconds(three.value("total_volume"), paper.AIR_FLOW, 10)),
         "Eq. 4 over flow, squeezed to 10 kPa",
         "likely valves, tubing and the rise of the pump, which are not in the model; " + AVERAGED,
     )
@@ -443,7 +436,7 @@ def _bends(three: Prediction, whole: Stack) -> Iterator[Row]:
     yield Row(
         "largest bend",
         paper.LARGEST_BEND,
-        three.value("bend with one chamber at the reference stroke, the others flat"),
+        three.value("reference_bend", chambers=1),
         "constant curvature",
         "upper bound: one chamber is taken to be 17.5 long beside two flat ones",
     )
@@ -476,9 +469,9 @@ def stiffness(single: Prediction, three: Prediction) -> Iterator[Row]:
         ("1-DoF", single, paper.MODULUS_1DOF),
         ("3-DoF", three, paper.MODULUS_3DOF),
     ):
-        tip = prediction.value("lateral tip stiffness at 10 kPa, chambers shut")
-        height = prediction.value("free height at 10 kPa")
-        second = prediction.value("second moment of area of the plate")
+        tip = prediction.value("shut_stiffness", kpa=10)
+        height = prediction.value("free_height", kpa=10)
+        second = prediction.value("second_moment")
         yield Row(
             f"cantilever modulus, {name}",
             value,
@@ -487,14 +480,14 @@ def stiffness(single: Prediction, three: Prediction) -> Iterator[Row]:
             "low: the paper gives neither pressure, force nor I of its test; at a higher pressure, "
             "or pressed on less far out, it is stiffer",
         )
-    power = "power density, blocked force flat at 100 kPa and 2.5 l/min of air"
+    power = three.value("power_density", kpa=100)
     yield Row(
         "power densities (Table 2)",
         exact(0, "", "Table 2"),
         None,
         "F v / m",
         "the table's figures are not in the text we have; "
-        f"{three.value(power):.0f} W/kg for the 3-DoF with air, as the paper takes its speed",
+        f"{power:.0f} W/kg for the 3-DoF with air, as the paper takes its speed",
     )
 
 
@@ -525,10 +518,13 @@ def factors(single: Prediction, three: Prediction) -> Iterator[str]:
         ("1-DoF", single, paper.FORCE_1DOF),
         ("3-DoF", three, paper.FORCE_3DOF),
     ):
-        for model in ("virtual work on Eq. 4", "virtual work on Eqs. 1-3", STACK):
+        for model in FORCE_MODELS:
             shares = [
-                value.value / force(prediction, at, model)
-                for at, value in zip(heights(), measured, strict=True)
+                value.value / force(prediction, share, model)
+                for share, value in zip(paper.HEIGHTS, measured, strict=True)
             ]
             shown = ", ".join(f"{share:.2f}" for share in np.array(shares))
-            yield f"| measured force over {model} | {name} at 100 kPa: flat, 25 %, 75 % | {shown} |"
+            yield (
+                f"| measured force over {model.words} | {name} at 100 kPa: flat, 25 %, 75 % "
+                f"| {shown} |"
+            )

@@ -17,22 +17,23 @@ from sbafab.design.files import ASSEMBLY
 from sbafab.design.identity import actuator_sha256, design_sha256
 from sbafab.design.records import Design, design_toml, validated
 from sbafab.errors import DesignError
-from sbafab.models.figures import FigureQuantity, PredictionRequest
+from sbafab.models.figures import PredictionRequest
 from sbafab.models.formulas import usual_pressures
 from sbafab.models.paper import FORCE_KPA
 from sbafab.models.prediction import predict
+from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.output.checked import limits
 from sbafab.rules.registration_yield import simulate
 from sbafab.version import GENERATOR
 
-MEASURED: Mapping[FigureQuantity, str] = {
-    "burst": "burst_kpa",
-    "reference_stroke": "stroke_mm",
-    "flat_force": "force_n",
-    "folded_height": "height_mm",
-    "mass": "mass_g",
+MEASURED: Mapping[str, tuple[Quantity, Conditions]] = {
+    "burst_kpa": (Quantity.BURST, ANYWHERE),
+    "stroke_mm": (Quantity.REFERENCE_STROKE, ANYWHERE),
+    "force_n": (Quantity.BLOCKED_FORCE, Conditions(kpa=FORCE_KPA, share=0.0)),
+    "height_mm": (Quantity.FOLDED_HEIGHT, ANYWHERE),
+    "mass_g": (Quantity.MASS, ANYWHERE),
 }
-"""By figure: the measured quantity that is held against it, by the model to design with."""
+"""By measured quantity: the figure that it is held against, by the model to design with."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +124,10 @@ def promised(built: Design | Assembled) -> Build:
 def _predicted(design: Design) -> dict[str, tuple[float, str]]:
     """Return value and model of each quantity that a lab measures."""
     request = PredictionRequest(usual_pressures(design.form)[-1:])
+    figures = [figure for figure in predict(design, request).figures if not figure.other]
     return {
-        MEASURED[figure.quantity]: (figure.value, figure.model.title)
-        for figure in predict(design, request).figures
-        if figure.quantity and not figure.other and figure.pressure_kpa in (None, FORCE_KPA)
+        measured: (figure.value, figure.model.title)
+        for measured, sought in MEASURED.items()
+        for figure in figures
+        if figure.is_of(*sought)
     }

@@ -22,6 +22,7 @@ from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.formulas import refuse_beyond_burst, usual_pressures
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
+from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import stack
 from sbafab.output.checked import Checked, check
 from sbafab.output.schema_ids import COMPARE_SCHEMA
@@ -36,12 +37,20 @@ from sbafab.version import GENERATOR
 
 FOLDER, PAGE = "compare", "compare.html"
 TEMPLATE = "compare.html.j2"
-MAIN = re.compile(
-    r"(outline|overall|reached) diameter|folded height|mass|free stroke at .*|reference stroke"
-    r"|bend at .* in one chamber, .*|blocked force at .*, flat|time to .* at the pump, water .*"
-    r"|lateral tip stiffness .*, chambers shut"
-)
-"""Figures that a reader looks for first."""
+MAIN = {
+    Quantity.OUTLINE_DIAMETER: ANYWHERE,
+    Quantity.OVERALL_DIAMETER: ANYWHERE,
+    Quantity.REACHED_DIAMETER: ANYWHERE,
+    Quantity.FOLDED_HEIGHT: ANYWHERE,
+    Quantity.MASS: ANYWHERE,
+    Quantity.FREE_STROKE: ANYWHERE,
+    Quantity.REFERENCE_STROKE: ANYWHERE,
+    Quantity.BEND: Conditions(chambers=1),
+    Quantity.BLOCKED_FORCE: Conditions(share=0.0),
+    Quantity.WATER_TIME: ANYWHERE,
+    Quantity.SHUT_STIFFNESS: ANYWHERE,
+}
+"""Figures that a reader looks for first, at these conditions."""
 DIGITS = 4
 """Figures that agree to so many digits do not differ."""
 SIZE = 640, 512
@@ -91,16 +100,26 @@ class RuleDifference:
 
 @dataclass(frozen=True)
 class FigurePair:
-    """A figure of both designs, in ``unit``; None where a design has none."""
+    """A figure of both designs; None where a design has none."""
 
-    name: str
-    unit: str
+    quantity: Quantity
+    at: Conditions
     figures: tuple[Figure | None, Figure | None]
+
+    @property
+    def name(self) -> str:
+        """Quantity and conditions in words."""
+        return self.quantity.named(self.at)
+
+    @property
+    def unit(self) -> str:
+        """The unit of both."""
+        return self.quantity.unit
 
     @property
     def is_main(self) -> bool:
         """True for figures that a reader looks for first."""
-        return MAIN.fullmatch(self.name) is not None
+        return _is_main(self.quantity, self.at)
 
     @property
     def differs(self) -> bool:
@@ -255,7 +274,7 @@ def compare(
         figures = tuple(
             figure
             for figure in prediction.figures
-            if not figure.other or (figure.interval and MAIN.fullmatch(figure.name))
+            if not figure.other or (figure.interval and _is_main(figure.quantity, figure.at))
         )
         each.append(ComparedDesign(source, checked, margins(checked.findings), figures))
     designs = each[0], each[1]
@@ -291,9 +310,13 @@ def _verdict(margin: RuleMargin | None) -> tuple[str, float | None] | None:
 
 
 def _figures(designs: Two) -> Iterable[FigurePair]:
-    a, b = ({(row.name, row.unit): row for row in each.figures} for each in designs)
-    for name, unit in dict.fromkeys([*a, *b]):
-        yield FigurePair(name, unit, (a.get((name, unit)), b.get((name, unit))))
+    a, b = ({(row.quantity, row.at): row for row in each.figures} for each in designs)
+    for quantity, at in dict.fromkeys([*a, *b]):
+        yield FigurePair(quantity, at, (a.get((quantity, at)), b.get((quantity, at))))
+
+
+def _is_main(quantity: Quantity, at: Conditions) -> bool:
+    return quantity in MAIN and at.meet(MAIN[quantity])
 
 
 # Words of the table and the page.

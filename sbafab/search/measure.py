@@ -13,7 +13,6 @@ import signal
 import sys
 import threading
 import time
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
@@ -25,7 +24,7 @@ from sbafab.design.files import checked as checked_record
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, keys_of
 from sbafab.errors import SbafabError
-from sbafab.models.figures import Figure, PredictionRequest
+from sbafab.models.figures import PredictionRequest
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.output.checked import check, refuse_undoable
@@ -40,7 +39,8 @@ SweepOutcome = Literal["passes", "fails", "refused", "crashed", "too long"]
 SweepRow = dict[str, Any]
 """What is known of one design, in values that JSON has. ``outcome`` and ``reason`` are always
 there; ``sha256``, ``keys``, ``rules``, ``yield`` (share of good builds and the ends of its
-interval), ``figures`` where the design could be measured so far."""
+interval), ``figures`` by their ``FigureKey`` where the design could be measured so far, and the
+messages of the rules that ``failed``."""
 
 
 def measured(
@@ -81,24 +81,14 @@ def _measure(design: Design, pressures: Sequence[float], row: SweepRow) -> None:
     # Figures have no intervals here: with the factors given, none are computed.
     request = PredictionRequest(tuple(pressures), calibration=factors_of(design))
     prediction = predict(design, request, checked.laminate)
-    row["figures"] = named_figures(prediction.figures)
+    row["figures"] = {str(figure.key): figure.as_dict()["value"] for figure in prediction.figures}
     if checked.failed:
-        failed = [rule for rule in worst.values() if rule.verdict == "fail"]
-        row["outcome"] = "fails"
-        row["reason"] = " | ".join(f"{rule.rule}: {rule.message}" for rule in failed)
+        failed = {name: rule.message for name, rule in worst.items() if rule.verdict == "fail"}
+        row["outcome"], row["failed"] = "fails", failed
+        row["reason"] = " | ".join(f"{name}: {message}" for name, message in failed.items())
         return
     refuse_undoable([checked])
     row["outcome"] = "passes"
-
-
-def named_figures(figures: Sequence[Figure]) -> dict[str, float]:
-    """Values by name and unit; the model is in the name where several give the same figure."""
-    count = Counter(figure.name for figure in figures)
-    return {
-        f"{figure.name}{f', {figure.model.name}' if count[figure.name] > 1 else ''} "
-        f"[{figure.unit}]": figure.as_dict()["value"]
-        for figure in figures
-    }
 
 
 # The margin of each rule: its findings as one verdict and one margin.

@@ -27,7 +27,6 @@ from sbafab.models.balloons import balloons_of
 from sbafab.models.calibrated import SHARE
 from sbafab.models.elastic import (
     blocked_force,
-    chamber_count,
     free_rise,
     held_stretch,
     moved_stack,
@@ -46,7 +45,6 @@ from sbafab.models.formulas import (
     sizes,
 )
 from sbafab.models.intervals import (
-    DELAYS,
     GROUP_BY_UNIT,
     PAPER_3DOF,
     Uncertainty,
@@ -59,18 +57,9 @@ from sbafab.models.intervals import (
 )
 from sbafab.models.kinematics import Actuator, actuator
 from sbafab.models.mechanisms import ASKED, mechanism_value
-from sbafab.models.paper import BALLOON as ELASTIC_BALLOON
-from sbafab.models.paper import (
-    FLAT_HEIGHT_OF_FILMS,
-    FOLDED_HEIGHT,
-    FULL_KPA,
-    HEIGHTS,
-    WATER_FLOW,
-    Counterpart,
-    counterpart,
-)
-from sbafab.models.paper import STACK as ELASTIC_STACK
+from sbafab.models.paper import FULL_KPA, HEIGHTS, WATER_FLOW, Counterpart, counterpart
 from sbafab.models.pneumatics import seconds
+from sbafab.models.quantity import ANYWHERE, Conditions, ModelId, Quantity
 from sbafab.models.stack import MOST_PRESSURE, Stack, stack
 
 
@@ -495,7 +484,7 @@ class Subject:
             # Below 0 a force is how far it is from one, to search by.
             return max(value, 0.0) if is_force else value
 
-        delay = DELAYS["water"] if quantity.name == "time" else ""
+        delay = "water_delay" if quantity.name == "time" else ""
         return self.uncertainty.interval_of(group, value_at, share, delay)[1]
 
     @cached_property
@@ -549,35 +538,35 @@ class Subject:
 
     def counterpart(self, quantity: RequestedQuantity) -> Counterpart | None:
         """Return the paper's measured value where the model is off by over a quarter, or None."""
-        name, model = self._figure(quantity)
+        figure = self._figure(quantity)
+        if figure is None:
+            return None
         of_papers = is_the_papers_3dof(self.design.form, self.laminate)
-        return counterpart(self.design.form, name, model, self.factors.calibration, of_papers)
+        return counterpart(self.design.form, *figure, self.factors.calibration, of_papers)
 
-    def _figure(self, quantity: RequestedQuantity) -> tuple[str, str]:
-        """Return the name of the figure in ``predict``, and that of its model; empty without."""
-        at = f"at {quantity.kpa or 0.0:g} kPa"
-        flow = f"at {quantity.flow or WATER_FLOW:g} ml/min"
+    def _figure(self, quantity: RequestedQuantity) -> tuple[Quantity, Conditions, ModelId] | None:
+        """Return the figure in ``predict`` and its model; None if the paper measured none such."""
+        kpa = quantity.kpa or 0.0
         if quantity.name == "height":
             folded = self._actuator.folded
             is_pressed = folded.molten > 0 and folded.factor != 1
-            pressed = f" x press factor {folded.factor:.3g}" if is_pressed else ""
-            return FOLDED_HEIGHT, FLAT_HEIGHT_OF_FILMS + pressed
+            return None if is_pressed else (Quantity.FOLDED_HEIGHT, ANYWHERE, ModelId.FILMS)
         if group_of(quantity, self.design.form) is None:
-            return "", ""
+            return None
         if quantity.name == "stroke":
-            return f"free stroke {at}", ELASTIC_BALLOON
-        names = {
-            "bend": f"bend {at} in {chamber_count(quantity.chambers)}, the others empty",
-            "time": f"time to {FULL_KPA:g} kPa at the pump, water {flow} in all",
-            "lateral_stiffness": f"lateral tip stiffness {at}, chambers shut",
-        }
-        if quantity.name in names:
-            return names[quantity.name], ELASTIC_STACK
+            return Quantity.FREE_STROKE, Conditions(kpa=kpa), ModelId.ELASTIC_BALLOON
+        if quantity.name == "bend":
+            at = Conditions(kpa=kpa, chambers=quantity.chambers)
+            return Quantity.BEND, at, ModelId.ELASTIC_STACK
+        if quantity.name == "time":
+            at = Conditions(kpa=FULL_KPA, flow=quantity.flow or WATER_FLOW)
+            return Quantity.WATER_TIME, at, ModelId.STACK_IN_TIME
+        if quantity.name == "lateral_stiffness":
+            return Quantity.SHUT_STIFFNESS, Conditions(kpa=kpa), ModelId.STACK_SHUT
         # Of the three heights at which forces were measured the nearest.
         share = self._stroke_of(quantity) / self._actuator.reference_stroke
         near = min(HEIGHTS, key=lambda height: abs(height - share))
-        where = f"at {100 * near:g} % of the reference stroke" if near else "flat"
-        return f"blocked force {at}, {where}", ELASTIC_STACK
+        return Quantity.BLOCKED_FORCE, Conditions(kpa=kpa, share=near), ModelId.ELASTIC_STACK
 
 
 def kpa_of(quantity: RequestedQuantity) -> float | None:

@@ -19,6 +19,7 @@ from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, plain_tables
 from sbafab.errors import OutputError
 from sbafab.models.formulas import refuse_pressure, usual_pressures
+from sbafab.models.intervals import factors_of
 from sbafab.notebook import data_frame
 from sbafab.output.swap import MANIFEST
 from sbafab.process import Progress, ignore_progress
@@ -140,7 +141,11 @@ def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress
             journal.close()
         progress("writing tables", 0, 1)
         table = Table(
-            lambda: journal.rows(iter(keys)), values, request.pressures_kpa, request.all_columns
+            lambda: journal.rows(iter(keys)),
+            values,
+            request.pressures_kpa,
+            request.all_columns,
+            is_calibrated=bool(factors_of(request.design).calibration),
         )
         gone = stale_designs(folder / CSV, table)
         files = _write(folder, request, table)

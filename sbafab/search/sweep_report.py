@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -21,9 +21,9 @@ from typing import IO, Any, NamedTuple
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design
 from sbafab.errors import OutputError
-from sbafab.models.figures import OF_CALIBRATION
 from sbafab.models.intervals import factors_of
-from sbafab.models.paper import counterpart_of_column
+from sbafab.models.paper import CALIBRATED_MODELS, counterpart
+from sbafab.models.quantity import ANYWHERE, Conditions, FigureKey, Quantity
 from sbafab.reports.charts import ChartBars, ChartCurve, ChartSpecks, Panel, chart_svg
 from sbafab.reports.html_templates import environment
 from sbafab.rules.deck import rule_names
@@ -42,16 +42,16 @@ PARTS = (("verdict", 0), ("margin", 1), ("measured", 2), ("limit", 3))
 HEAD = ("number", "sha256", "outcome", "reason")
 """The first columns, whatever is varied."""
 FIRST = (
-    "outline diameter",
-    "overall diameter",
-    "deflated diameter",
-    "reached diameter",
-    "folded height",
-    "mass",
-    "reference stroke",
+    Quantity.OUTLINE_DIAMETER,
+    Quantity.OVERALL_DIAMETER,
+    Quantity.DEFLATED_DIAMETER,
+    Quantity.REACHED_DIAMETER,
+    Quantity.FOLDED_HEIGHT,
+    Quantity.MASS,
+    Quantity.REFERENCE_STROKE,
 )
 """Figures that are looked for first, whatever the pressure."""
-MOVED = ("free stroke", "bend", "blocked force", "blocked force of one SBA")
+MOVED = (Quantity.FREE_STROKE, Quantity.BEND, Quantity.BLOCKED_FORCE)
 """Those at a pressure."""
 YIELD = ("yield", "yield.low", "yield.high")
 """Share of good builds, and the interval of 95 % that its number of random builds leaves."""
@@ -80,11 +80,13 @@ class Table:
         values: Sequence[Values],
         pressures_kpa: Sequence[float] = (),
         is_whole: bool = False,
+        is_calibrated: bool = False,
     ) -> None:
         self.rows = rows
         self.values = values
         self.pressures_kpa = pressures_kpa
         self.is_whole = is_whole
+        self.is_calibrated = is_calibrated
 
     def __len__(self) -> int:
         return len(self.values)
@@ -112,15 +114,36 @@ class Table:
         """Columns of the files: varied keys, leading figures, binding rules; or all."""
         by_name = {column.name: column for column in self.columns}
         varied = [name for values in self.values for name in values]
-        first = [*HEAD, *varied, *self._leading(list(by_name)), *self._binding()]
+        first = [*HEAD, *varied, *self._leading(), *self._binding()]
         rest = by_name if self.is_whole else ()
         return tuple(by_name[name] for name in dict.fromkeys([*first, *rest]) if name in by_name)
 
-    def _leading(self, names: Sequence[str]) -> Iterator[str]:
+    @cached_property
+    def figures(self) -> dict[str, FigureKey]:
+        """The figures of all rows by their columns."""
+        keys = dict.fromkeys(key for row in self.rows() for key in row.get("figures", ()))
+        return {_heading(key): FigureKey.read(key) for key in keys}
+
+    def first(self, quantity: Quantity, at: Conditions) -> str | None:
+        """Return the column of the first figure of a quantity, at conditions that meet ``at``, by
+        the model that ``predict`` designs with: the calibrated one, else the first.
+        """
+        found = [c for c, of in self.figures.items() if of.quantity is quantity and of.at.meet(at)]
+        if not found:
+            return None
+        here = self.figures[found[0]].at
+        same = [column for column in found if self.figures[column].at == here]
+        if not self.is_calibrated:
+            return same[0]
+        return min(same, key=lambda column: self.figures[column].model not in CALIBRATED_MODELS)
+
+    def _leading(self) -> Iterator[str]:
         """Yield each leading figure's first column, by the model to design with."""
-        each = [f"{figure} at {kpa:g} kPa" for kpa in self.pressures_kpa for figure in MOVED]
-        for begins in (*FIRST, *each):
-            yield from _designed_with([name for name in names if name.startswith(begins)])
+        moved = [(of, Conditions(kpa=kpa)) for kpa in self.pressures_kpa for of in MOVED]
+        for quantity, at in (*((of, ANYWHERE) for of in FIRST), *moved):
+            column = self.first(quantity, at)
+            if column is not None:
+                yield column
         yield from YIELD
 
     def _binding(self) -> Iterator[str]:
@@ -149,7 +172,8 @@ class Table:
             head = dict(zip(HEAD, cells, strict=True))
             # What was asked stands there even where no design came of it.
             shares = dict(zip(YIELD, row.get("yield", ()), strict=False))
-            figures = {**shares, **row.get("figures", {})}
+            by_column = {_heading(key): value for key, value in row.get("figures", {}).items()}
+            figures = {**shares, **by_column}
             yield head, {**values, **row.get("keys", {})}, _rules(row), figures
 
     @staticmethod
@@ -162,14 +186,10 @@ class Table:
         begun.replace(path)
 
 
-def _designed_with(columns: Sequence[str]) -> Sequence[str]:
-    """Return the column of the first figure of these by the model that ``predict`` designs with:
-    the calibrated one, else the first.
-    """
-    # A force's name goes on with its height, and then with its model.
-    figure = ", ".join(columns[0].split(", ")[:2]) if columns else ""
-    of_models = [name for name in columns if name.startswith(figure)]
-    return sorted(of_models, key=lambda name: OF_CALIBRATION not in name)[:1]
+@lru_cache(maxsize=4096)
+def _heading(key: str) -> str:
+    """Return the column of a figure."""
+    return FigureKey.read(key).heading
 
 
 def _rules(row: SweepRow) -> dict[str, Any]:
@@ -394,11 +414,7 @@ def _tick(text: str) -> str:
 
 TEMPLATE = "sweep.html.j2"
 GOOD_BUILDS = Objective(YIELD[0], "share of good builds", True)
-INTRODUCTION = (
-    ("mass [g]", False),
-    ("overall diameter [mm]", False),
-    ("deflated diameter [mm]", False),
-)
+INTRODUCTION = (Quantity.MASS, Quantity.OVERALL_DIAMETER, Quantity.DEFLATED_DIAMETER)
 MOST_REASONS = 12
 MOST_ROWS = 60
 """Designs on a front that the page lists; all are in the tables."""
@@ -439,19 +455,21 @@ def sweep_html(design: Design, varied: Sequence[Varied], table: Table) -> str:
             head=[*keys, *(objective.label for objective in objectives)],
             best=[(n + 1, [_shown_value(dots.columns[name][n]) for name in names]) for n in listed],
             unlisted=len(best) - len(listed),
-            measured=_measured(design, objectives),
+            measured=list(_measured(design, table, objectives)),
         )
     )
 
 
-def _measured(design: Design, objectives: Sequence[Objective]) -> list[tuple[str, str]]:
-    """Return the paper's measured values for figures whose model is off by more than a quarter."""
+def _measured(
+    design: Design, table: Table, objectives: Sequence[Objective]
+) -> Iterator[tuple[str, str]]:
+    """Yield the paper's measured values for figures whose model is off by more than a quarter."""
     calibration = factors_of(design).calibration
-    rows = [
-        (objective.label, counterpart_of_column(design.form, objective.column, calibration))
-        for objective in objectives
-    ]
-    return [(label, row.sentence()) for label, row in rows if row is not None]
+    for objective in objectives:
+        figure = table.figures.get(objective.column)
+        beside = figure and counterpart(design.form, *figure, calibration)
+        if beside:
+            yield objective.label, beside.sentence()
 
 
 def _values_text(swept: Varied) -> str:
@@ -470,17 +488,15 @@ def _shown_value(value: Any) -> str:
 def _objectives(table: Table) -> list[Objective]:
     """Size and mass, the first stroke and force that were predicted, and the yield."""
     names = [column.name for column in table.columns]
-    objectives = [
-        Objective(name, _label(name), more) for name, more in INTRODUCTION if name in names
-    ]
-    strokes = [name for name in names if name.startswith(("free stroke", "reference stroke"))]
-    flat = [n for n in names if n.startswith("blocked force") and ", flat" in n]
-    # Of the highest pressure, which comes last.
-    highest = flat[-1].split(", ")[0] if flat else ""
-    forces = _designed_with([name for name in flat if name.startswith(f"{highest}, ")])
-    for group in (sorted(strokes, key=lambda name: name.startswith("reference")), forces):
-        if group:
-            objectives.append(Objective(group[0], _label(group[0]), True))
+    wanted = [(table.first(quantity, ANYWHERE), False) for quantity in INTRODUCTION]
+    stroke = table.first(Quantity.FREE_STROKE, ANYWHERE)
+    wanted.append((stroke or table.first(Quantity.REFERENCE_STROKE, ANYWHERE), True))
+    flat = Conditions(share=0.0)
+    if table.pressures_kpa:
+        flat = flat._replace(kpa=max(table.pressures_kpa, key=abs))
+    force = table.first(Quantity.BLOCKED_FORCE, flat) or table.first(Quantity.FORCE_BOUND, ANYWHERE)
+    wanted.append((force, True))
+    objectives = [Objective(name, _label(name), more) for name, more in wanted if name in names]
     return [*objectives, GOOD_BUILDS] if YIELD[0] in names else objectives
 
 
@@ -494,15 +510,15 @@ def _read(table: Table, wanted_columns: Sequence[str]) -> tuple[Dots, list[_Caus
     places = {name: names.index(name) for name in (*wanted_columns, "outcome", "reason")}
     columns: dict[str, list[Any]] = {name: [] for name in places}
     stopped: dict[str, list[tuple[int, str]]] = {}
-    for number, cells in enumerate(table.cells(), 1):
+    for cells in table.cells():
         for name, place in places.items():
             columns[name].append(cells[place])
-        outcome, reason = cells[places["outcome"]], cells[places["reason"]]
-        if outcome != "passes":
-            for message in reason.split(" | ") if outcome == "fails" else [f"{outcome}: {reason}"]:
-                cause, colon, _ = message.partition(": ")
-                if colon:
-                    stopped.setdefault(cause, []).append((number, message))
+    for number, row in enumerate(table.rows(), 1):
+        failed = row.get("failed", {})
+        if row["outcome"] not in ("passes", "fails"):
+            failed = {row["outcome"]: row["reason"]}
+        for cause, message in failed.items():
+            stopped.setdefault(cause, []).append((number, f"{cause}: {message}"))
     causes = [_Cause(cause, len(designs), *designs[0]) for cause, designs in stopped.items()]
     causes.sort(key=lambda cause: -cause.designs)
     return Dots(columns["outcome"], {name: columns[name] for name in wanted_columns}), causes

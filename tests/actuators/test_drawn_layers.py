@@ -261,10 +261,10 @@ def test_predictions_leave_out_in_a_sentence_what_has_no_model() -> None:
 def test_a_pouch_motor_pulls_by_the_closed_form_of_its_pocket_as_drawn() -> None:
     """40 x 30 mm along x: at t = 1.0 rad, 15.853 % shorter, p D L cos t / t."""
     prediction = predict(load_design("pouch"), PredictionRequest((0.5,)))
-    assert prediction.value("free contraction") == pytest.approx(40 * (1 - 2 / math.pi))
+    assert prediction.value("contraction") == pytest.approx(40 * (1 - 2 / math.pi))
     angle = float(half_angle(0.1))
     by_hand = 0.5e-3 * 30 * 40 * math.cos(angle) / angle
-    assert prediction.value("pull at 0.5 kPa, 10 % shorter") == pytest.approx(by_hand, rel=1e-6)
+    assert prediction.value("pull", kpa=0.5, share=0.1) == pytest.approx(by_hand, rel=1e-6)
     assert all("not calibrated" in f.model.trust for f in prediction.figures if f.group == "force")
     quantities = [line.quantity for line in prediction.verdict]
     assert {"stroke", "force"} <= set(quantities)
@@ -273,7 +273,7 @@ def test_a_pouch_motor_pulls_by_the_closed_form_of_its_pocket_as_drawn() -> None
 def test_a_pouch_motor_turned_by_90_degrees_pulls_along_the_other_side() -> None:
     design = load_design("pouch").with_({"mechanism.direction": 90})
     prediction = predict(design, PredictionRequest((0.5,)))
-    assert prediction.value("free contraction") == pytest.approx(30 * (1 - 2 / math.pi))
+    assert prediction.value("contraction") == pytest.approx(30 * (1 - 2 / math.pi))
 
 
 def test_a_film_that_would_stretch_leaves_the_pull_out_and_says_how_far_it_holds() -> None:

@@ -98,24 +98,21 @@ def test_the_finger_bends_by_the_moment_of_its_pouch() -> None:
     """By hand p D L^2 (1/2 + 1 / sqrt 3) / 4, D = 14 and L = 16 mm; 3 hinges of 95.3 deg."""
     prediction = predict(load_design("finger"), PredictionRequest((10.0,)))
     by_hand = 0.01 * 14 * 16**2 * (0.5 + 1 / math.sqrt(3)) / 4
-    assert prediction.value("moment at 10 kPa, straight") == pytest.approx(by_hand, rel=1e-4)
-    assert prediction.value("free bend, 3 hinges") == pytest.approx(3 * 95.3, abs=0.2)
+    assert prediction.value("moment", kpa=10, share=0) == pytest.approx(by_hand, rel=1e-4)
+    assert prediction.value("free_bend") == pytest.approx(3 * 95.3, abs=0.2)
 
 
 def test_a_beam_of_the_truss_wrinkles_by_comer_and_levy() -> None:
     """A moment of pi p r^3 / 2, and a load of that over 100 mm; r = 15 / pi."""
     prediction = predict(load_design("truss"), PredictionRequest((10.0,)))
     by_hand = math.pi * 0.01 * (15 / math.pi) ** 3 / 2 / 100
-    assert prediction.value("load that wrinkles a beam at 10 kPa") == pytest.approx(
-        by_hand, rel=0.01
-    )
+    assert prediction.value("wrinkling_load", kpa=10) == pytest.approx(by_hand, rel=0.01)
 
 
 def test_the_array_is_bounded_by_pressure_times_pocket_and_says_what_was_measured() -> None:
     prediction = predict(load_design("array"), PredictionRequest((230.0,)))
-    (name,) = {f.name for f in prediction.figures if "row2" in f.name and f.group == "force"}
     by_hand = 0.230 * math.pi * 4**2
-    assert prediction.value(name) == pytest.approx(by_hand, rel=0.05)
+    assert prediction.value("force_bound", of="row2") == pytest.approx(by_hand, rel=0.05)
     (model,) = {f.model for f in prediction.figures if f.group == "force"}
     assert "2.1 N at 230 kPa" in model.trust
 
@@ -123,8 +120,8 @@ def test_the_array_is_bounded_by_pressure_times_pocket_and_says_what_was_measure
 def test_the_vacuum_stack_slips_by_its_friction_and_jams_n_squared_times_as_stiff() -> None:
     """2 mu P b n h / 3 with mu = 0.3, b = 20, n h = 0.4: by hand 0.128 N at -80 kPa."""
     prediction = predict(load_design("vacuum"), PredictionRequest((-80.0,)))
-    assert prediction.value("load that slips at -80 kPa") == pytest.approx(0.128)
-    assert prediction.value("jammed over loose stiffness") == 64
+    assert prediction.value("slip_load", kpa=-80) == pytest.approx(0.128)
+    assert prediction.value("jamming_ratio") == 64
 
 
 def test_the_traveller_says_which_face_of_a_coated_film_is_up(tmp_path: Path) -> None:

@@ -151,13 +151,17 @@ def test_a_measured_value_is_shown_as_what_it_is_compared_as() -> None:
     assert short.measured == 0.748
 
 
-def test_a_figure_of_two_models_wants_one_named() -> None:
+def test_a_figure_is_asked_for_by_quantity_and_model() -> None:
     found = sbafab.predict("1dof-5mm")
-    with pytest.raises(KeyError, match=r"given by .*Eq\. 4.*Eqs\. 1-3.*name one"):
-        found.value("largest volume a balloon")
-    assert found.value("largest volume a balloon", "Eqs. 1-3") == pytest.approx(16.95, abs=0.01)
-    with pytest.raises(KeyError, match="did you mean 'reference stroke'"):
-        found.value("referenc stroke")
+    # The first model, Eq. 4, is the one to design with.
+    assert found.value("largest_volume") == found.value("largest_volume", "eq-4")
+    assert found.value("largest_volume", "eqs-1-to-3") == pytest.approx(16.95, abs=0.01)
+    with pytest.raises(DesignError, match="did you mean reference_stroke"):
+        found.value("referenc_stroke")
+    with pytest.raises(DesignError, match=r"not one figure: there are .*by eq-4.*by eqs-1-to-3"):
+        found.value("largest_volume", "lens")
+    with pytest.raises(DesignError, match="not one figure: it is not predicted"):
+        found.value("pull")
 
 
 def test_one_pressure_is_a_number_or_a_list_and_no_text() -> None:

@@ -36,7 +36,7 @@ def test_predict_opens_with_the_size_also_round_a_tube(tmp_path: Path) -> None:
     assert said.startswith("size: 15.33 mm round its tube, flat, ")
     # Pressed, it is the tube and twice the pressed films, as in the figures below it.
     said = CliRunner().invoke(app, [*arguments, "--set", "models.calibration=paper"]).output
-    pressed = sbafab.predict("radial-15mm").value("deflated diameter")
+    pressed = sbafab.predict("radial-15mm").value("deflated_diameter")
     assert said.startswith(f"size: {pressed:.2f} mm round its tube, flat, ")
     assert 15 < pressed < 15.33
 

@@ -66,13 +66,13 @@ def test_the_brace_holds_its_lumen_and_lifts_the_marble() -> None:
     found = predict_assembly(sbafab.assemble("brace"))
     # Paper, Sec. 2.1: 15.33 and about 28, with films as bought; a cylinder's 28.06 is the most.
     alone = sbafab.predict("radial-15mm")
-    flown = 15.328 - alone.value("deflated diameter")
+    flown = 15.328 - alone.value("deflated_diameter")
     assert value(found, "grip", "diameter, deflated") == pytest.approx(15.328 - flown)
     most = value(found, "grip", "diameter, inflated at most")
     assert most == pytest.approx(28.06 - flown, abs=0.005)
     assert value(found, "grip", "diameter, inflated free") == pytest.approx(28.0, rel=0.035)
     assert found.left_out == ()
-    room = (25.4 - alone.value("deflated diameter")) / 2
+    room = (25.4 - alone.value("deflated_diameter")) / 2
     assert value(found, "grip", "height of a balloon") == pytest.approx(room)
     push = value(found, "grip", "push of each stack")
 

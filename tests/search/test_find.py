@@ -295,12 +295,12 @@ def test_a_stroke_is_not_met_by_what_predict_says_is_less(tmp_path: Path) -> Non
     asked = ["find", "1dof-5mm", "--min", "reference_stroke=20", "--max", "outline_diameter=8"]
     ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
     assert ended.exit_code == 0, ended.output
-    assert sbafab.predict(target).value("reference stroke") >= 20
+    assert sbafab.predict(target).value("reference_stroke") >= 20
     target.unlink()
     asked[3] = "stroke@10kPa=20"
     ended = CliRunner().invoke(app, [*asked, "--tries", "60", "--to", str(target)])
     assert ended.exit_code == 0, repr(ended.exception) + ended.output
-    assert sbafab.predict(target).value("reference stroke") < 20
+    assert sbafab.predict(target).value("reference_stroke") < 20
 
 
 def test_find_refuses_what_predict_leaves_out() -> None:

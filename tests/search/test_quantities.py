@@ -132,7 +132,7 @@ def test_what_must_reach_counts_the_lens_and_what_must_not_touch_the_cylinder(na
     subject = Subject(design, sbafab.build(design))
     reached, widest = (subject.value(one.quantity, lambda: 1.0) for one in (reach, clear))
     assert widest == pytest.approx(15.328 + 4 * 8 / math.pi)
-    stroke = sbafab.predict(design).value("reference stroke")
+    stroke = sbafab.predict(design).value("reference_stroke")
     assert reached == pytest.approx(15.328 + 2 * stroke)
     assert not reach.holds(reached)
     assert not clear.holds(widest)
@@ -158,17 +158,17 @@ def test_each_figure_is_the_one_of_predict(diameter: float) -> None:
     def value(text: str) -> float:
         return _value(text, "3dof-15mm", chamber=chamber)
 
-    full = said.value("reference stroke")
+    full = said.value("reference_stroke")
     assert value("reference_stroke") == full
-    assert value("stroke@8kPa") == pytest.approx(said.value("free stroke at 8 kPa"), rel=1e-7)
-    bend = said.value("bend at 8 kPa in one chamber, the others empty")
+    assert value("stroke@8kPa") == pytest.approx(said.value("free_stroke", kpa=8), rel=1e-7)
+    bend = said.value("bend", kpa=8, chambers=1)
     assert value("bend@8kPa") == pytest.approx(bend, rel=1e-7)
     # From flat: a quarter of the way from the films to the reference height.
-    height = 0.25 * (full - said.value("folded height"))
-    force = said.value("blocked force at 8 kPa, at 25 % of the reference stroke", "elastic stack")
+    height = 0.25 * (full - said.value("folded_height"))
+    force = said.value("blocked_force", "elastic-stack", kpa=8, share=0.25)
     assert value(f"force@{height!r}mm@8kPa") == pytest.approx(force, rel=1e-7)
     assert value("force@25%@8kPa") == pytest.approx(force, rel=1e-7)
-    assert value("height") == said.value("folded height")
+    assert value("height") == said.value("folded_height")
 
 
 def test_each_interval_is_the_one_of_predict() -> None:
@@ -204,7 +204,7 @@ def test_a_bend_leaves_a_chamber_empty() -> None:
 def test_diameters_round_a_tube_are_those_of_predict() -> None:
     said = sbafab.predict("radial-15mm")
     for name in ("deflated_diameter", "reached_diameter", "inflated_diameter"):
-        found = said.value(name.replace("_", " "))
+        found = said.value(name)
         assert _value(name, "radial-15mm") == pytest.approx(found, rel=1e-12)
 
 
@@ -228,12 +228,12 @@ def test_a_lone_chamber_does_not_bend() -> None:
 def test_the_force_of_a_taper_is_that_of_predict() -> None:
     taper = {"chamber": {"diameter": [6.0, 5.0]}, "stack": {"balloons": 2}}
     said = sbafab.predict("1dof-5mm", pressures_kpa=[5.0], **taper)
-    flat = said.value("blocked force at 5 kPa, flat", "elastic stack")
+    flat = said.value("blocked_force", "elastic-stack", kpa=5, share=0)
     assert _value("force@0mm@5kPa", **taper) == pytest.approx(flat, rel=1e-7)
 
 
 def test_stroke_and_force_are_those_of_a_flat_balloon() -> None:
-    said = sbafab.predict("1dof-5mm", pressures_kpa=[5.0]).value("free stroke at 5 kPa")
+    said = sbafab.predict("1dof-5mm", pressures_kpa=[5.0]).value("free_stroke", kpa=5)
     # Hardly raised, the film lies flat on the plates all over its pocket.
     flat = 10e-3 * math.pi * 2.5**2
     assert flat * 0.9 < _value("force@0.05mm@10kPa", models=UNCALIBRATED) <= flat

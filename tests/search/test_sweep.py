@@ -18,6 +18,7 @@ import sbafab
 from sbafab.cli.sweep import _as_json
 from sbafab.design.identity import design_sha256
 from sbafab.errors import OutputError
+from sbafab.models.quantity import Conditions, FigureKey, ModelId, Quantity
 from sbafab.search import sweep as module
 from sbafab.search.measure import measured
 from sbafab.search.pool import MeasureJob
@@ -77,7 +78,7 @@ def test_a_table_opens_with_what_was_varied_asked_for_and_binding(
     predicted = sbafab.predict("1dof-5mm", changes, pressures_kpa=QUICK["pressures_kpa"]).figures
     forces = [one for one in predicted if one.name == "blocked force at 10 kPa, flat"]
     (force,) = (one for one in forces if not one.other)
-    column = f"{force.name}, {force.model.name} [N]"
+    column = f"{force.name}, {force.model.id.words} [N]"
     assert len(forces) > 1
     assert [name for name in first if name.startswith("blocked force")] == [column]
     assert float(row[column]) == pytest.approx(force.value, rel=1e-4)
@@ -111,7 +112,7 @@ def test_each_row_says_what_check_and_predict_say(found: SweptDesigns) -> None:
         said = sbafab.predict(design, pressures_kpa=[10.0])
         assert float(row["mass [g]"]) == pytest.approx(said.value("mass"), rel=1e-6)
         stroke = float(row["free stroke at 10 kPa [mm]"])
-        assert stroke == pytest.approx(said.value("free stroke at 10 kPa"), rel=1e-6)
+        assert stroke == pytest.approx(said.value("free_stroke", kpa=10), rel=1e-6)
     assert float(rows[2]["bond-width.margin"]) == pytest.approx(-0.05, abs=1e-5)
     assert rows[2]["reason"].startswith("bond-width: ")
     # Every key stands there, defaults too, and times do not.
@@ -248,15 +249,16 @@ def test_a_table_that_no_sweep_wrote_is_left_alone(
     assert (folder / "sweep.csv").read_text() == "mine"
 
 
-@pytest.mark.parametrize("ending", ["", ", calibration paper"])
-def test_page_and_table_lead_with_one_force(ending: str) -> None:
+@pytest.mark.parametrize("is_calibrated", [False, True])
+def test_page_and_table_lead_with_one_force(is_calibrated: bool) -> None:
     """Without a calibration ``predict`` designs with Eq. 4, the first."""
-    flat = [f"blocked force at {kpa} kPa, flat, " for kpa in (10, 100)]
-    models = ["virtual work on Eq. 4", f"elastic stack{ending}"]
-    names = [f"{begins}{model} [N]" for model in models for begins in flat]
-    row = {"outcome": "passes", "reason": "", "figures": dict.fromkeys(names, 1.0)}
-    table = Table(lambda: iter([row]), [{}], (10.0, 100.0))
+    models = ModelId.WORK_ON_EQ_4, ModelId.ELASTIC_STACK
+    flat = [Conditions(kpa=kpa, share=0.0) for kpa in (10.0, 100.0)]
+    keys = [FigureKey(Quantity.BLOCKED_FORCE, at, model) for model in models for at in flat]
+    row = {"outcome": "passes", "reason": "", "figures": dict.fromkeys(map(str, keys), 1.0)}
+    table = Table(lambda: iter([row]), [{}], (10.0, 100.0), is_calibrated=is_calibrated)
     leading = [column.name for column in table.written if column.name.startswith("blocked")]
-    model = models[bool(ending)]
-    assert leading == [f"{begins}{model} [N]" for begins in flat]
+    assert leading == [
+        f"blocked force at {kpa} kPa, flat, {models[is_calibrated].words} [N]" for kpa in (10, 100)
+    ]
     assert leading[-1] in [objective.column for objective in _objectives(table)]

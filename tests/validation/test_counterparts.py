@@ -23,15 +23,14 @@ from sbafab.models.calibrated import load_calibration
 from sbafab.models.figures import Figure, Prediction
 from sbafab.models.formulas import modulus
 from sbafab.models.paper import (
+    CALIBRATED_MODELS,
     COUNTERPARTS,
     MISFIT,
-    MODULUS,
-    POCKET_AREA,
-    TIME_WITH_AIR,
     Counterpart,
-    counterpart_of_column,
+    counterpart,
 )
 from sbafab.models.pneumatics import seconds
+from sbafab.models.quantity import FigureKey
 from sbafab.studio.jobs import elastic
 from sbafab.studio.moving import stack_model
 from tests.cli.test_predict_command import run as run_predict
@@ -61,19 +60,26 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Prediction
 
 def _model_value(row: Counterpart, found: Prediction) -> float:
     """What a row's model gives for the actuator that was measured, as validation works it out."""
-    if row.recorded == TIME_WITH_AIR:
-        held = found.value("volume of all chambers at the reference stroke")
+    if row.recorded == "time-with-air":
+        held = found.value("total_volume")
         return float(seconds(held, paper.AIR_FLOW, paper.FULL_KPA))
-    if row.recorded == POCKET_AREA:
+    if row.recorded == "pocket-area":
         return 0.1 * math.pi * 2.5**2
-    if row.recorded == MODULUS:
-        tip = found.value("lateral tip stiffness at 10 kPa, chambers shut")
-        second = found.value("second moment of area of the plate")
-        return float(modulus(tip, 1.0, found.value("free height at 10 kPa"), second))
-    return found.value(row.recorded, row.model)
+    if row.recorded == "cantilever-modulus":
+        tip = found.value("shut_stiffness", kpa=10)
+        second = found.value("second_moment")
+        return float(modulus(tip, 1.0, found.value("free_height", kpa=10), second))
+    quantity, at = row.recorded
+    figures = [one for one in found.figures if one.quantity is quantity and one.at == at]
+    (figure,) = (one for one in figures if one.model.id in row.models)
+    return figure.value
 
 
-@pytest.mark.parametrize("row", COUNTERPARTS, ids=lambda row: f"{row.figure} {row.model}")
+def named(row: Counterpart) -> str:
+    return f"{row.quantities[0].key} {row.state} {row.models[:1]}"
+
+
+@pytest.mark.parametrize("row", COUNTERPARTS, ids=named)
 def test_each_row_says_what_its_model_gives_and_is_off_by_more_than_a_quarter(
     row: Counterpart, predictions: dict[str, Prediction]
 ) -> None:
@@ -82,7 +88,7 @@ def test_each_row_says_what_its_model_gives_and_is_off_by_more_than_a_quarter(
     assert abs(row.ratio - 1) > MISFIT or row.calibrated is not None
 
 
-@pytest.mark.parametrize("row", COUNTERPARTS, ids=lambda row: f"{row.figure} {row.model}")
+@pytest.mark.parametrize("row", COUNTERPARTS, ids=named)
 def test_each_row_says_what_its_calibrated_model_gives_where_that_is_off(
     row: Counterpart, calibrated: dict[str, Prediction]
 ) -> None:
@@ -92,14 +98,10 @@ def test_each_row_says_what_its_calibrated_model_gives_where_that_is_off(
     if row.calibrated is not None:
         assert row.calibrated == pytest.approx(value, rel=2e-3)
         assert misfit > MISFIT
-    elif row.model in CALIBRATED_MODELS:
+    elif set(row.models) & set(CALIBRATED_MODELS):
         assert misfit <= MISFIT
     else:
         assert row.gave == pytest.approx(value, rel=2e-3)
-
-
-CALIBRATED_MODELS = (paper.STACK, paper.BALLOON, paper.FLAT_HEIGHT_OF_FILMS)
-"""Models that unknowns of a calibration enter, by the beginnings of their names."""
 
 
 def _measured_figures() -> Iterator[tuple[str, str, float]]:
@@ -131,7 +133,7 @@ def test_each_measured_figure_of_an_elastic_model_that_is_far_off_has_a_row(
         (figure,) = (
             figure
             for figure in found.figures
-            if figure.name == name and figure.model.name.startswith(CALIBRATED_MODELS)
+            if figure.name == name and figure.model.id in CALIBRATED_MODELS
         )
         is_far = abs(figure.value / measured - 1) > MISFIT
         far += is_far
@@ -174,19 +176,18 @@ def test_every_row_of_the_validation_that_is_off_by_more_than_a_quarter_is_in_th
 
 def _is_far_off(row: Counterpart, is_calibrated: bool) -> bool:
     if is_calibrated:
-        return row.calibrated is not None or row.model not in CALIBRATED_MODELS
+        return row.calibrated is not None or not set(row.models) & set(CALIBRATED_MODELS)
     return abs(row.ratio - 1) > MISFIT
 
 
 def _far_off(found: Prediction) -> Iterator[Figure]:
-    """Figures that the table's patterns name, looked up apart from the program's own marks."""
+    """Figures that the table's rows are of, looked up apart from the program's own marks."""
     parallel = any(figure.group == "bending" for figure in found.figures)
     for figure in found.figures:
         for row in COUNTERPARTS:
-            is_its = row.parallel in (None, parallel) and figure.model.name.startswith(row.model)
+            is_its = row.stands_beside(figure.quantity, figure.at, figure.model.id, parallel)
             # The 3-DoF of this file is the paper's own.
-            is_its = is_its and (parallel or not row.of_papers)
-            if is_its and re.fullmatch(row.figure, figure.name):
+            if is_its and (parallel or not row.of_papers):
                 if _is_far_off(row, bool(found.asked.factors.calibration)):
                     yield figure
                 break
@@ -234,7 +235,7 @@ def test_predict_prints_them_below_their_figures(
         assert "24.55" in text
         after = _joined(text).partition("22.68")[2]
         assert after.index("(the paper measured 17.5 mm") < 60
-        bend = predictions["3dof-15mm"].value("bend at 10 kPa in one chamber, the others empty")
+        bend = predictions["3dof-15mm"].value("bend", kpa=10, chambers=1)
         after = _joined(text).partition(f" {bend:.4g} ")[2]
         assert after.index("(the paper measured 81 +- 6 deg") < 80
         assert "folded height 1.865 mm (paper's 3-DoF 0.95, not 1.865)" in _joined(text)
@@ -368,24 +369,21 @@ def test_pictures_say_them(tmp_path: Path) -> None:
 
 def test_columns_of_a_sweep_have_them() -> None:
     form = sbafab.load("3dof-15mm").form
-    for column, measured in (
-        ("free stroke at 10 kPa [mm]", "17.5 mm"),
-        (
-            "blocked force at 100 kPa, at 75 % of the reference stroke, elastic stack [N]",
-            "2.4 +- 0.03 N",
-        ),
-        ("bend at 10 kPa in one chamber, the others empty [deg]", "81 +- 6 deg"),
+    for key, measured in (
+        ("free_stroke@kpa=10.0|elastic-balloon", "17.5 mm"),
+        ("blocked_force@kpa=100.0,share=0.75|elastic-stack", "2.4 +- 0.03 N"),
+        ("bend@kpa=10.0,chambers=1|elastic-stack", "81 +- 6 deg"),
     ):
-        row = counterpart_of_column(form, column)
+        row = counterpart(form, *FigureKey.read(key))
         assert row is not None
         assert str(row.measured) == measured
-    for column in (
-        "reference stroke [mm]",
-        "mass [g]",
-        "blocked force at 100 kPa, flat, virtual work on Eq. 4 [N]",
-        "blocked force at 100 kPa, flat, elastic stack [N]",
+    for key in (
+        "reference_stroke@|scaled-height",
+        "mass@|film-mass",
+        "blocked_force@kpa=100.0,share=0.0|work-on-eq-4",
+        "blocked_force@kpa=100.0,share=0.0|elastic-stack",
     ):
-        assert counterpart_of_column(form, column) is None, column
+        assert counterpart(form, *FigureKey.read(key)) is None, key
 
 
 def test_with_factors_the_clause_says_that_the_model_had_none() -> None:

@@ -1,0 +1,395 @@
+"""What a predicted figure is of: its quantity and the conditions that it holds at.
+
+Programs ask by these. The words that people read are made from them here, and nowhere read back.
+"""
+
+from __future__ import annotations
+
+import difflib
+from enum import Enum, StrEnum
+from typing import Any, NamedTuple
+
+from sbafab.errors import DesignError
+
+
+class Conditions(NamedTuple):
+    """State of the actuator that a figure holds at; None where the figure does not depend on it.
+
+    ``kpa`` gauge, a vacuum below 0; ``share`` of the reference stroke, of a pocket's length by
+    which it is shorter, or of the free bend; ``chambers`` pressurised, the others empty or flat;
+    ``angle`` of a bend in degrees; ``volume`` in ul a balloon; ``flow`` in ml/min; ``tube`` its
+    diameter in mm; ``hinges`` in a row. ``of`` names one chamber of several, "sba" one actuator of
+    several side by side, or "pouch" one pouch of several.
+    """
+
+    kpa: float | None = None
+    share: float | None = None
+    chambers: int | None = None
+    angle: float | None = None
+    volume: float | None = None
+    flow: float | None = None
+    tube: float | None = None
+    hinges: int | None = None
+    of: str = ""
+    each: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the conditions that are given."""
+        given = self._asdict().items()
+        return {name: value for name, value in given if value is not None and value != ""}
+
+    def meet(self, asked: Conditions) -> bool:
+        """Return True if these are the conditions ``asked`` for, whatever that leaves open."""
+        mine = self.as_dict()
+        return all(mine.get(name) == value for name, value in asked.as_dict().items())
+
+
+ANYWHERE = Conditions()
+"""No conditions."""
+
+
+class Quantity(Enum):
+    """Quantities of figures: ``key`` for programs, ``group`` in the output, ``unit``, and the
+    ``words`` of their names, in which ``c`` is the conditions in words.
+    """
+
+    key: str
+    group: str
+    unit: str
+    words: str
+
+    def __init__(self, key: str, group: str, unit: str, words: str) -> None:
+        self.key, self.group, self.unit, self.words = key, group, unit, words
+
+    OVERALL_DIAMETER = "overall_diameter", "size", "mm", "overall diameter"
+    OUTLINE_DIAMETER = "outline_diameter", "size", "mm", "outline diameter"
+    DEFLATED_DIAMETER = "deflated_diameter", "size", "mm", "deflated diameter"
+    REACHED_DIAMETER = "reached_diameter", "size", "mm", "reached diameter"
+    INFLATED_DIAMETER = "inflated_diameter", "size", "mm", "inflated diameter"
+    PITCH = "pitch", "size", "mm", "pitch"
+    WIDTH = "width", "size", "mm", "width"
+    LENGTH = "length", "size", "mm", "length"
+    FOLDED_HEIGHT = "folded_height", "size", "mm", "folded height"
+    FOLDED_DIAMETER = "folded_diameter", "size", "mm", "folded diameter"
+    MASS = "mass", "size", "g", "mass"
+    BEAM_DIAMETER = "beam_diameter", "size", "mm", "inflated diameter of a beam{c.of}"
+
+    LARGEST_TUBE = "largest_tube", "inlet", "mm", "largest tube that the inlet opens to"
+    TUBE_ROOM = "tube_room", "inlet", "mm", "room round the tube of {c.tube} mm"
+
+    BURST = "burst", "strength", "kPa", "burst pressure"
+
+    REFERENCE_STROKE = "reference_stroke", "stroke", "mm", "reference stroke"
+    REFERENCE_HEIGHT = "reference_height", "stroke", "mm", "reference height"
+    REFERENCE_VOLUME = (
+        "reference_volume", "stroke", "ul", "volume a balloon at the reference stroke",
+    )  # fmt: skip
+    LARGEST_VOLUME = "largest_volume", "stroke", "ul", "largest volume a balloon"
+    LARGEST_STROKE = "largest_stroke", "stroke", "mm", "stroke at the largest volume"
+    BALLOON_DIAMETER = (
+        "balloon_diameter", "stroke", "mm", "balloon's diameter at the largest volume",
+    )  # fmt: skip
+    VOLUME_STROKE = "volume_stroke", "stroke", "mm", "stroke at {c.volume} ul a balloon"
+    FREE_STROKE = "free_stroke", "stroke", "mm", "free stroke at {c.kpa} kPa"
+    FREE_HEIGHT = "free_height", "stroke", "mm", "free height at {c.kpa} kPa"
+    BALLOON_VOLUME = "balloon_volume", "stroke", "ul", "volume a balloon at {c.kpa} kPa"
+    CONTRACTION = "contraction", "stroke", "mm", "free contraction{c.of}"
+    CONTRACTION_SHARE = "contraction_share", "stroke", "%", "free contraction{c.of}, share"
+
+    BLOCKED_FORCE = (
+        "blocked_force", "force", "N", "blocked force{c.of}{c.each} at {c.kpa} kPa, {c.stroke}",
+    )  # fmt: skip
+    FORCE_BOUND = (
+        "force_bound", "force", "N", "blocked force{c.of}{c.each} at {c.kpa} kPa, flat, at most",
+    )  # fmt: skip
+    BENT_FORCE = (
+        "bent_force", "force", "N", "force at {c.kpa} kPa in {c.chambers}, bent by {c.angle} deg",
+    )  # fmt: skip
+    PULL = "pull", "force", "N", "pull{c.of} at {c.kpa} kPa, {c.percent} % shorter"
+    MOMENT = "moment", "force", "N mm", "moment{c.of} at {c.kpa} kPa, {c.bent}"
+    WRINKLING_LOAD = (
+        "wrinkling_load", "force", "N", "load that wrinkles a beam{c.of} at {c.kpa} kPa",
+    )  # fmt: skip
+    COLLAPSE_LOAD = (
+        "collapse_load", "force", "N", "load that collapses a beam{c.of} at {c.kpa} kPa",
+    )  # fmt: skip
+    SLIP_LOAD = "slip_load", "force", "N", "load that slips{c.of} at {c.kpa} kPa"
+
+    TOTAL_VOLUME = (
+        "total_volume", "actuation", "ul", "volume of all chambers at the reference stroke",
+    )  # fmt: skip
+    REFERENCE_TIME = (
+        "reference_time", "actuation", "s", "time to the reference stroke at {c.flow} ml/min",
+    )  # fmt: skip
+    VOLUME_TIME = (
+        "volume_time", "actuation", "s", "time to {c.volume} ul a balloon at {c.flow} ml/min",
+    )  # fmt: skip
+    WORK_BOUND = "work_bound", "actuation", "mJ", "pneumatic input work at {c.kpa} kPa"
+    FREE_WORK = "free_work", "actuation", "mJ", "pneumatic input work at {c.kpa} kPa, free"
+    LOST_WORK = "lost_work", "actuation", "%", "input work lost in a cycle"
+    POWER_DENSITY = (
+        "power_density", "actuation", "W/kg",
+        "power density, blocked force flat at {c.kpa} kPa and {c.litres} l/min of air",
+    )  # fmt: skip
+    WATER_TIME = (
+        "water_time", "actuation", "s",
+        "time to {c.kpa} kPa at the pump, water at {c.flow} ml/min in all",
+    )  # fmt: skip
+    WATER_HEIGHT = (
+        "water_height", "actuation", "mm", "height when the water's pump shows {c.kpa} kPa",
+    )  # fmt: skip
+    CONTRACTION_VOLUME = (
+        "contraction_volume", "actuation", "ul", "volume at free contraction{c.of}",
+    )  # fmt: skip
+
+    REFERENCE_BEND = (
+        "reference_bend", "bending", "deg",
+        "bend with {c.chambers} at the reference stroke, the others flat",
+    )  # fmt: skip
+    LARGEST_ASIDE = "largest_aside", "bending", "mm", "maximum lateral tip displacement"
+    BEND = "bend", "bending", "deg", "bend at {c.kpa} kPa in {c.chambers}, the others empty"
+    RIM_ROOM = (
+        "rim_room", "bending", "mm",
+        "room between rims on the inner side, {c.kpa} kPa in {c.chambers}, the others empty",
+    )  # fmt: skip
+    CHAMBER_CLEARANCE = (
+        "chamber_clearance", "bending", "mm",
+        "clearance between chambers, {c.kpa} kPa in {c.chambers}, the others empty",
+    )  # fmt: skip
+    ASIDE = (
+        "aside", "bending", "mm",
+        "lateral tip displacement at {c.kpa} kPa in {c.chambers}, the others empty",
+    )  # fmt: skip
+    FREE_BEND = "free_bend", "bending", "deg", "free bend{c.of}{c.hinges}"
+
+    SECOND_MOMENT = "second_moment", "stiffness", "mm4", "second moment of area of the plate"
+    REFERENCE_STIFFNESS = (
+        "reference_stiffness", "stiffness", "N/mm", "lateral tip stiffness, inflated",
+    )  # fmt: skip
+    HELD_STIFFNESS = (
+        "held_stiffness", "stiffness", "N/mm",
+        "lateral tip stiffness at {c.kpa} kPa, pressure held",
+    )  # fmt: skip
+    SHUT_STIFFNESS = (
+        "shut_stiffness", "stiffness", "N/mm",
+        "lateral tip stiffness at {c.kpa} kPa, chambers shut",
+    )  # fmt: skip
+    JAMMING_RATIO = "jamming_ratio", "stiffness", "", "jammed over loose stiffness{c.of}"
+    LOOSE_STIFFNESS = "loose_stiffness", "stiffness", "N mm2", "bending stiffness{c.of}, loose"
+    JAMMED_STIFFNESS = "jammed_stiffness", "stiffness", "N mm2", "bending stiffness{c.of}, jammed"
+
+    def named(self, at: Conditions) -> str:
+        """Return the figure's name in words."""
+        return self.words.format(c=_Words(at))
+
+    @classmethod
+    def of(cls, key: str) -> Quantity:
+        """Return the quantity of a key. Raises DesignError for any other, with the nearest ones."""
+        keys = {quantity.key: quantity for quantity in cls}
+        if key not in keys:
+            near = difflib.get_close_matches(key, keys, 3) or keys
+            raise DesignError(f"no quantity has the key {key!r}; did you mean {' or '.join(near)}?")
+        return keys[key]
+
+
+class _Words:
+    """Conditions in words, as the names of figures have them."""
+
+    def __init__(self, at: Conditions) -> None:
+        self._at = at
+
+    def __getattr__(self, name: str) -> str:
+        return f"{getattr(self._at, name):g}"
+
+    @property
+    def of(self) -> str:
+        return f" of {self._at.of}" if self._at.of else ""
+
+    @property
+    def each(self) -> str:
+        return {"sba": " of one SBA", "pouch": " a pouch"}.get(self._at.each, "")
+
+    @property
+    def chambers(self) -> str:
+        return chamber_count(self._at.chambers or 0)
+
+    @property
+    def hinges(self) -> str:
+        return f", {self._at.hinges} hinges" if self._at.hinges else ""
+
+    @property
+    def percent(self) -> str:
+        return f"{100 * (self._at.share or 0.0):g}"
+
+    @property
+    def stroke(self) -> str:
+        return share_of_stroke(self._at.share or 0.0)
+
+    @property
+    def bent(self) -> str:
+        return "half bent" if self._at.share else "straight"
+
+    @property
+    def litres(self) -> str:
+        return f"{(self._at.flow or 0.0) / 1000:g}"
+
+
+def share_of_stroke(share: float) -> str:
+    """Return a share of the reference stroke in words."""
+    return f"at {100 * share:g} % of the reference stroke" if share else "flat"
+
+
+def chamber_count(number: int) -> str:
+    """Return a number of chambers in words."""
+    return "one chamber" if number == 1 else f"{number} chambers"
+
+
+class ModelId(StrEnum):
+    """Models of figures, by their ids for programs."""
+
+    GEOMETRY = "geometry"
+    FILMS = "films"
+    FILM_MASS = "film-mass"
+    TUBE_AND_FILMS = "tube-and-films"
+    LENS = "lens"
+    CYLINDER = "cylinder"
+    FOLDED_LOBES = "folded-lobes"
+    HALF_PERIMETER = "half-perimeter"
+    FILM_STRESS = "film-stress"
+    SCALED_HEIGHT = "scaled-height"
+    LARGEST_VOLUME = "largest-volume"
+    EQ_4 = "eq-4"
+    EQS_1_TO_3 = "eqs-1-to-3"
+    LENS_STROKE = "lens-stroke"
+    WORK_ON_EQ_4 = "work-on-eq-4"
+    WORK_ON_EQS_1_TO_3 = "work-on-eqs-1-to-3"
+    WORK_ON_LENS = "work-on-lens"
+    VOLUME_OVER_FLOW = "volume-over-flow"
+    EQ_4_OVER_FLOW = "eq-4-over-flow"
+    LENS_OVER_FLOW = "lens-over-flow"
+    P_V_EQ_4 = "p-v-eq-4"
+    P_V_LENS = "p-v-lens"
+    POWER = "power"
+    CONSTANT_CURVATURE = "constant-curvature"
+    CURVATURE_OVER_FLOW = "curvature-over-flow"
+    CANTILEVER = "cantilever"
+    FLAT_PLATES = "flat-plates"
+    ELASTIC_BALLOON = "elastic-balloon"
+    ELASTIC_STACK = "elastic-stack"
+    STACK_IN_TIME = "stack-in-time"
+    STACK_SHUT = "stack-shut"
+    POUCH_MOTOR = "pouch-motor"
+    POUCH_HINGE = "pouch-hinge"
+    INFLATED_BEAM = "inflated-beam"
+    LAMINAR_JAMMING = "laminar-jamming"
+    TEXTILE_POUCHES = "textile-pouches"
+
+    @property
+    def words(self) -> str:
+        """The model's name, without its factors."""
+        return _MODELS[self]
+
+
+_MODELS = {
+    ModelId.GEOMETRY: "plain geometry",
+    ModelId.FILMS: "sum of the films",
+    ModelId.FILM_MASS: "area x thickness x density",
+    ModelId.TUBE_AND_FILMS: "tube and films",
+    ModelId.LENS: "lens of two arcs",
+    ModelId.CYLINDER: "cylinder of unstretched film",
+    ModelId.FOLDED_LOBES: "three lobes as chords of a circle",
+    ModelId.HALF_PERIMETER: "half the perimeter",
+    ModelId.FILM_STRESS: "film stress in proportion",
+    ModelId.SCALED_HEIGHT: "the paper's height, scaled",
+    ModelId.LARGEST_VOLUME: "the largest volume",
+    ModelId.EQ_4: "Eq. 4",
+    ModelId.EQS_1_TO_3: "Eqs. 1-3",
+    ModelId.LENS_STROKE: "the lens of two arcs",
+    ModelId.WORK_ON_EQ_4: "virtual work on Eq. 4",
+    ModelId.WORK_ON_EQS_1_TO_3: "virtual work on Eqs. 1-3",
+    ModelId.WORK_ON_LENS: "virtual work on the lens of two arcs",
+    ModelId.VOLUME_OVER_FLOW: "volume over flow",
+    ModelId.EQ_4_OVER_FLOW: "Eq. 4 over flow",
+    ModelId.LENS_OVER_FLOW: "the lens of two arcs over flow",
+    ModelId.P_V_EQ_4: "p v with Eq. 4",
+    ModelId.P_V_LENS: "p v with the lens of two arcs",
+    ModelId.POWER: "F v / m",
+    ModelId.CONSTANT_CURVATURE: "constant curvature",
+    ModelId.CURVATURE_OVER_FLOW: "constant curvature, Eq. 4 over flow",
+    ModelId.CANTILEVER: "3 E I / l^3",
+    ModelId.FLAT_PLATES: "pressure x pocket area",
+    ModelId.ELASTIC_BALLOON: "elastic balloon",
+    ModelId.ELASTIC_STACK: "elastic stack",
+    ModelId.STACK_IN_TIME: "elastic stack in time",
+    ModelId.STACK_SHUT: "elastic stack, chambers shut",
+    ModelId.POUCH_MOTOR: "pouch motor",
+    ModelId.POUCH_HINGE: "pouch hinge",
+    ModelId.INFLATED_BEAM: "inflated beam",
+    ModelId.LAMINAR_JAMMING: "laminar jamming",
+    ModelId.TEXTILE_POUCHES: (
+        "pressure x pocket area; textile pouches pushed with 0.18 of it at 230 kPa"
+    ),
+}
+WORK_ON = {
+    ModelId.EQ_4: ModelId.WORK_ON_EQ_4,
+    ModelId.EQS_1_TO_3: ModelId.WORK_ON_EQS_1_TO_3,
+    ModelId.LENS_STROKE: ModelId.WORK_ON_LENS,
+}
+OVER_FLOW = {
+    ModelId.EQ_4: ModelId.EQ_4_OVER_FLOW,
+    ModelId.LENS_STROKE: ModelId.LENS_OVER_FLOW,
+}
+P_V = {ModelId.EQ_4: ModelId.P_V_EQ_4, ModelId.LENS_STROKE: ModelId.P_V_LENS}
+"""What follows from the models of a pocket's volume: virtual work, time, work at most."""
+OF_STACK = (ModelId.ELASTIC_STACK, ModelId.STACK_IN_TIME, ModelId.STACK_SHUT)
+"""Models of the elastic stack."""
+FACTOR_WORDS = {
+    "press_factor": "press factor {:.3g}",
+    "contact_factor": "contact factor {:g}",
+    "pocket_loss": "pocket loss {:g} mm",
+    "modulus_mpa": "E = {:g} MPa",
+}
+"""Factors that a user measured, by field of ``Factors``, in the name of a model."""
+
+
+class FigureKey(NamedTuple):
+    """What tells a figure from all others of a prediction."""
+
+    quantity: Quantity
+    at: Conditions
+    model: ModelId
+
+    def __str__(self) -> str:
+        """The key as a text for programs: blocked_force@kpa=10,share=0.25|elastic-stack."""
+        at = ",".join(f"{name}={value}" for name, value in self.at.as_dict().items())
+        return f"{self.quantity.key}@{at}|{self.model}"
+
+    @classmethod
+    def read(cls, text: str) -> FigureKey:
+        """Return the key of such a text. Raises DesignError or ValueError for any other."""
+        of, _, model = text.partition("|")
+        quantity, _, at = of.partition("@")
+        given = dict(part.split("=", 1) for part in at.split(",") if part)
+        values = {name: _CONDITIONS[name](value) for name, value in given.items()}
+        return cls(Quantity.of(quantity), Conditions(**values), ModelId(model))
+
+    @property
+    def heading(self) -> str:
+        """The figure in words, with its model if several may give it, and its unit."""
+        model = f", {self.model.words}" if self.quantity in BY_SEVERAL else ""
+        return f"{self.quantity.named(self.at)}{model} [{self.quantity.unit}]"
+
+
+_CONDITIONS: dict[str, Any] = {
+    **dict.fromkeys(("kpa", "share", "angle", "volume", "flow", "tube"), float),
+    **dict.fromkeys(("chambers", "hinges"), int),
+    **dict.fromkeys(("of", "each"), str),
+}
+BY_SEVERAL = (
+    Quantity.BLOCKED_FORCE,
+    Quantity.LARGEST_VOLUME,
+    Quantity.LARGEST_STROKE,
+    Quantity.REFERENCE_VOLUME,
+    Quantity.VOLUME_STROKE,
+)
+"""Quantities that several models give."""
