@@ -114,7 +114,7 @@ def _first_conflict(laminate: Laminate, tasks: Sequence[_Task]) -> str:
     while True:
         conflicts = [_conflict(laminate, task, waiting, done) for task in waiting]
         if None not in conflicts:
-            return next(filter(None, conflicts))
+            return next(filter(None, conflicts)).sentence
         done.append(waiting.pop(conflicts.index(None)))
 
 
@@ -180,15 +180,18 @@ def _in_hand(laminate: Laminate, task: _Task, done: Sequence[_Task]) -> tuple[in
 
 def _conflict(
     laminate: Laminate, task: _Task, waiting: Sequence[_Task], done: Sequence[_Task]
-) -> str | None:
-    """Return why a task cannot come now, in a sentence, or None if it can."""
+) -> _Conflict | None:
+    """Return why a task cannot come now, or None if it can."""
     bond = _bond(laminate, task)
     if bond is not None and bond.after is not None:
         others = [other for other in waiting if other is not task]
         if any(_is_of(laminate, other, bond.after) for other in others):
-            return (
-                f"{_what(task)} comes after bond {bond.after} by face_bonds.{bond.name}.after, and "
-                "that cannot be made before; change the order of the two"
+            return _Conflict(
+                _what(task),
+                f"comes after bond {bond.after} by face_bonds.{bond.name}.after, and that cannot "
+                "be made before",
+                "",
+                "change the order of the two",
             )
     first, last = _in_hand(laminate, task, done)
     gaps = laminate.interfaces[first - 1 : last]
@@ -206,7 +209,32 @@ def _what(task: _Task) -> str:
     return "the press" if task.seam is None else f"seam {task.seam.name}"
 
 
-def _pressed_by_mistake(laminate: Laminate, task: _Task, gaps: Sequence[Interface]) -> str | None:
+class _Conflict(NamedTuple):
+    """Why films cannot be joined yet: what would go wrong, where, and what would prevent it."""
+
+    subject: str
+    harm: str
+    where: str
+    remedy: str
+
+    @property
+    def words(self) -> str:
+        """What goes wrong and where."""
+        return f"{self.subject} {self.harm}{self.where}"
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        return f"{self.words}; {self.remedy}"
+
+
+def _named(seam: Seam) -> str:
+    return f"seam {seam.name} of layers {seam.below} and {seam.above}"
+
+
+def _pressed_by_mistake(
+    laminate: Laminate, task: _Task, gaps: Sequence[Interface]
+) -> _Conflict | None:
     if laminate.bonds:
         # Faces that do not bond in the press are safe in it; its temperature is looked at later.
         return None
@@ -216,11 +244,13 @@ def _pressed_by_mistake(laminate: Laminate, task: _Task, gaps: Sequence[Interfac
         weld = _open(laminate, gap)
         if weld.area > LEAST_WELD:
             x, y = _somewhere(weld)
-            return (
-                f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index} would weld "
-                f"layers {gap.below.index} and {gap.above.index} all over, which are bonded by "
-                f"seams (x {x:.3f}, y {y:.3f}); lay a mask between them, or say in [face_bonds] "
-                "that these faces do not bond in the press"
+            return _Conflict(
+                f"the press of layers {gaps[0].below.index} to {gaps[-1].above.index}",
+                f"would weld layers {gap.below.index} and {gap.above.index} all over, which are "
+                "bonded by seams",
+                f" (x {x:.3f}, y {y:.3f})",
+                "lay a mask between them, or say in [face_bonds] that these faces do not bond in "
+                "the press",
             )
     return None
 
@@ -247,18 +277,20 @@ def _open(laminate: Laminate, gap: Interface) -> Region:
 
 def _welded_by_mistake(
     laminate: Laminate, seam: Seam, task: _Task, gaps: Sequence[Interface]
-) -> str | None:
+) -> _Conflict | None:
     for gap in gaps:
         if gap.index == task.first or not _bonds_by(laminate, gap, seam):
             continue
         weld = _open(laminate, gap) & seam.region
         if weld.area > LEAST_WELD:
             x, y = _somewhere(weld)
-            return (
-                f"seam {seam.name} of layers {seam.below} and {seam.above} would weld layers "
-                f"{gap.below.index} and {gap.above.index} too, over {weld.area:.3f} mm2 at "
-                f"x {x:.3f}, y {y:.3f}; lay a mask between these, move the seam, or take films "
-                "whose faces do not bond there"
+            return _Conflict(
+                _named(seam),
+                f"would weld layers {gap.below.index} and {gap.above.index} too, over "
+                f"{weld.area:.3f} mm2 at x {x:.3f}, y {y:.3f}",
+                "",
+                "lay a mask between these, move the seam, or take films whose faces do not bond "
+                "there",
             )
     return None
 
@@ -275,17 +307,18 @@ def _bonds_by(laminate: Laminate, gap: Interface, seam: Seam) -> bool:
     return (bond.temperature_c or 0.0) >= (other.temperature_c or 0.0)
 
 
-def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> str | None:
-    """Return the sentence for a seam that films which melt cover from above and from below."""
+def _is_covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
+    """Return the conflict of a seam that films which melt cover from above and from below."""
     below = [gap.below for gap in gaps if gap.index < task.first]
     covers = [_cover(seam, task, gaps), _melting(below, seam)]
     if None in covers:
         return None
     over, under = (layer.index for layer in covers if layer is not None)
-    return (
-        f"seam {seam.name} of layers {seam.below} and {seam.above} would have to be made through "
-        f"layer {over} or layer {under}, which melt under the tool; make it before these are "
-        "joined to them, or open them there"
+    return _Conflict(
+        _named(seam),
+        f"would have to be made through layer {over} or layer {under}, which melt under the tool",
+        "",
+        "make it before these are joined to them, or open them there",
     )
 
 
@@ -314,7 +347,7 @@ def _steps(
     laminate: Laminate,
     task: _Task,
     done: Sequence[_Task],
-    before: Sequence[str | None],
+    before: Sequence[_Conflict | None],
     count: int,
 ) -> Iterator[Joining]:
     """Yield a task's joining, and the folds that come before it. ``before``: why earlier ones in
@@ -365,7 +398,7 @@ def _bodies(
             body = []
 
 
-def _reason(laminate: Laminate, task: _Task, before: Sequence[str | None]) -> str:
+def _reason(laminate: Laminate, task: _Task, before: Sequence[_Conflict | None]) -> str:
     bond = _bond(laminate, task)
     gap = laminate.interfaces[task.first - 1]
     faces = f"{gap.below.faces[0]} and {gap.above.faces[1]}"
@@ -381,7 +414,7 @@ def _reason(laminate: Laminate, task: _Task, before: Sequence[str | None]) -> st
     if later is not None:
         return f"{words}; now, for once more films are joined {later}"
     waits = next(filter(None, before), None)
-    return words if waits is None else f"{words}; before others, for {waits.split(';')[0]}"
+    return words if waits is None else f"{words}; before others, for {waits.words}"
 
 
 def _later(laminate: Laminate, task: _Task) -> str | None:
@@ -396,8 +429,4 @@ def _later(laminate: Laminate, task: _Task) -> str | None:
         conflict = conflict or _is_covered(task.seam, task, gaps)
     if conflict is None:
         return None
-    words = conflict.split(";")[0].split(" (x ")[0]
-    if task.seam is None:
-        return words
-    own = f"seam {task.seam.name} of layers {task.seam.below} and {task.seam.above}"
-    return words.replace(own, "it", 1)
+    return f"{conflict.subject if task.seam is None else 'it'} {conflict.harm}"

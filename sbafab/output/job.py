@@ -57,7 +57,11 @@ class CheckedJob:
         if len(self.designs) == 1 and self.between is None:
             return self.designs[0].findings
         named = (
-            replace(finding, message=f"{checked.design.name}: {finding.message}")
+            replace(
+                finding,
+                message=f"{checked.design.name}: {finding.message}",
+                design=checked.design.name,
+            )
             for checked in self.designs
             for finding in checked.findings
         )

@@ -44,6 +44,8 @@ class Finding:
     by_user: bool = False
     remedy: str = ""
     interval: tuple[float, float] | None = None
+    design: str = ""
+    """Of several designs: the name of its own, with which the message begins."""
 
     def __post_init__(self) -> None:
         # Limits are in um: what arithmetic leaves below 1 nm says nothing.

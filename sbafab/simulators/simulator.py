@@ -431,15 +431,20 @@ LOOK_EVERY = 0.1
 """s between two looks at how far a run is."""
 STOP_WITHIN = 10.0
 """s that a program has to end by itself before it is killed."""
-INTERRUPTED = "it was interrupted"
-OUT_OF_TIME = "it was stopped after"
+
+
+class Stop(NamedTuple):
+    """Why a program ended early: on an interrupt, after its time, as it diverged, or failed."""
+
+    kind: Literal["interrupt", "time", "diverged", "failed"]
+    words: str
 
 
 class Ended(NamedTuple):
     """End of a program: its exit code, and why it was stopped, None if it ended by itself."""
 
     code: int
-    stopped: str | None
+    stopped: Stop | None
 
 
 def program_path(name: str, install: str) -> str:
@@ -463,7 +468,7 @@ def run_program(
     thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError where it cannot be started.
     """
     began = time.monotonic()
-    stopped: str | None = None
+    stopped: Stop | None = None
     with log.open("wb") as opened:
         try:
             # In a session of its own: the command may be a script that starts the real program.
@@ -489,10 +494,10 @@ def run_program(
                 except subprocess.TimeoutExpired:
                     look()
                 if limit is not None and time.monotonic() - began >= limit:
-                    stopped = f"{OUT_OF_TIME} {limit / 60:g} minutes"
+                    stopped = Stop("time", f"it was stopped after {limit / 60:g} minutes")
         except KeyboardInterrupt:
             # Hours of computing are not thrown away with the rest of them.
-            stopped = INTERRUPTED
+            stopped = Stop("interrupt", "it was interrupted")
         finally:
             _end(process)
     return Ended(process.returncode, stopped)

@@ -99,13 +99,8 @@ def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[A
     pause()
     # What the whole does takes seconds, and is asked for when the hand rests.
     yield {"kind": "prediction", "quick": True, "figures": [], "left_out": []}
-    designs = {actuator.design.name for actuator in assembled.designs}
     checked = api.check(assembly, progress=lambda *_: pause())
     findings = [finding_model(finding) for finding in checked]
-    for finding in findings:
-        of, _, rest = finding["message"].partition(": ")
-        if of in designs:
-            finding |= {"design": of, "message": rest}
     yield {"kind": "rule", "rule": "assembly", "number": 1, "findings": findings}
     yield {"kind": "checked"}
 

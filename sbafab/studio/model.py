@@ -142,8 +142,12 @@ def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[s
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:
-    """A finding as ``checks.json`` has it."""
-    return {**finding.as_dict(), "by_user": finding.by_user}
+    """A finding as ``checks.json`` has it; of a part's design without that name in its message."""
+    model = {**finding.as_dict(), "by_user": finding.by_user}
+    if finding.design:
+        message = finding.message.removeprefix(f"{finding.design}: ")
+        model |= {"design": finding.design, "message": message}
+    return model
 
 
 # Assemblies: the surface of each part once, and its place.

@@ -30,7 +30,7 @@ from sbafab.simulators.calculix.results import (
     read_sta,
     write_deformed,
 )
-from sbafab.simulators.calculix.run import Ending, converged_frames, deck_mesh
+from sbafab.simulators.calculix.run import DIVERGED, Ending, converged_frames, deck_mesh
 
 pytest.importorskip("netgen")
 
@@ -115,7 +115,7 @@ def test_frames_after_the_last_converged_step_are_left_out(tmp_path: Path) -> No
     path = tmp_path / "actuator.frd"
     path.write_text(frd(0.25, 0.3125, 0.5))
     mesh = Mesh("volume", "wedge15", np.zeros((2, 3)), np.zeros((0, 15), int), {}, {}, {}, {})
-    kept = converged_frames(path, mesh, Ending(0.3125, "it diverged"))
+    kept = converged_frames(path, mesh, Ending(0.3125, DIVERGED))
     assert [frame.time for frame in kept] == [0.25, 0.3125]
 
 

@@ -25,6 +25,7 @@ from sbafab.reports.traveller.bench import Tool
 from sbafab.reports.traveller.bill import THREAD, Item
 from sbafab.reports.traveller.job import HERE, Action, Work, frame
 from sbafab.reports.traveller.page import (
+    Caution,
     cautions,
     code_svg,
     context,
@@ -185,24 +186,26 @@ def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _cautions(job: AssemblyJob) -> list[tuple[str, str]]:
-    warnings: list[tuple[str, str]] = []
+def _cautions(job: AssemblyJob) -> list[Caution]:
+    warnings: list[Caution] = []
     if job.waived:
         messages = " / ".join(finding.message for finding in job.findings if finding.by_user)
         words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {messages}"
-        warnings.append(("Waived checks", words))
+        warnings.append(Caution("Waived checks", words))
     if job.lowered:
-        warnings.append(("Lowered limits", f"{CHECKED_AGAINST}{', '.join(job.lowered)}."))
+        words = f"{CHECKED_AGAINST}{', '.join(job.lowered)}."
+        warnings.append(Caution("Lowered limits", words))
     for design in job.works:
-        for title, text in cautions(design.work):
-            is_own = title.startswith(("Press", "Waived", "Lowered"))
-            warnings.append((f"{title} ({design.name})" if is_own else title, text))
+        for caution in cautions(design.work):
+            if caution.of_design:
+                caution = caution._replace(title=f"{caution.title} ({design.name})")
+            warnings.append(caution)
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = (
             "small and brittle; they snap together. Keep them away from anything that a magnet "
             "harms."
         )
-        warnings.append(("Magnets", words))
+        warnings.append(Caution("Magnets", words))
     every = [
         *job.findings,
         *(finding for design in job.works for finding in design.work.job.findings),

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from string import ascii_uppercase
-from typing import Any
+from typing import Any, NamedTuple
 
 from sbafab.cutting.sheets import SheetFile
 from sbafab.design.identity import cited, departures, tube_name
@@ -309,12 +309,20 @@ def code_svg(text: str) -> str:
 # Warnings; the rules' findings have their own page.
 
 
-def cautions(work: Work) -> list[tuple[str, str]]:
-    """Return every warning once: a short title and its text."""
+class Caution(NamedTuple):
+    """A warning of a page: a short title, its text, and whether it is of one design alone."""
+
+    title: str
+    text: str
+    of_design: bool = False
+
+
+def cautions(work: Work) -> list[Caution]:
+    """Return every warning once."""
     return list(dict.fromkeys(_all(work)))
 
 
-def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
+def for_the_designer(findings: Iterable[Finding]) -> list[Caution]:
     """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
     any.
     """
@@ -325,38 +333,40 @@ def for_the_designer(findings: Iterable[Finding]) -> list[tuple[str, str]]:
         f"{units.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. "
         "findings.html gives places and remedies; at the press follow the steps."
     )
-    return [("For the designer", words)]
+    return [Caution("For the designer", words)]
 
 
-def _all(work: Work) -> Iterator[tuple[str, str]]:
+def _all(work: Work) -> Iterator[Caution]:
     job, schedule = work.job, work.schedule
     films = list(dict.fromkeys(layer.film for layer in work.laminate.layers))
     materials = [film.material for film in films]
     for film in films:
         if film.warning:
             title = "PTFE fumes" if film.material == "PTFE" else f"Cutting {film.material}"
-            yield title, film.warning
+            yield Caution(title, film.warning)
     if job.waived:
-        yield (
+        yield Caution(
             "Waived rules",
             f"made although the design waives {', '.join(job.waived)}: ask the designer whether "
             "this is intended (findings.html).",
+            of_design=True,
         )
     if job.lowered:
-        yield (
+        yield Caution(
             "Lowered limits",
             f"{CHECKED_AGAINST}{', '.join(job.lowered)}. A pass here may be a failure at the usual "
             "limits: ask the designer whether this is intended.",
+            of_design=True,
         )
     nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
     if nominal:
-        yield (
+        yield Caution(
             f"{joined_words(nominal)} kerf uncalibrated",
             "edges are nominal, so outlines come out smaller and holes larger by half a kerf. A "
             "calibration piece tells by how much (bench.html).",
         )
     if job.underlay is not None:
-        yield (
+        yield Caution(
             "Toner on the underlay",
             "laser toner softens in the press and may mark the release film or stick to it: print "
             "with ink if you can. Each print goes into the press once: paper dries there and "
@@ -365,4 +375,4 @@ def _all(work: Work) -> Iterator[tuple[str, str]]:
     for caution in schedule.cautions:
         if not caution.at_step:
             tell = "; tell the designer" if caution.remedy else ""
-            yield "Press schedule", f"{caution.words}{tell}"
+            yield Caution("Press schedule", f"{caution.words}{tell}", of_design=True)

@@ -37,11 +37,10 @@ from sbafab.simulators.calculix.results import (
     write_deformed,
 )
 from sbafab.simulators.simulator import (
-    INTERRUPTED,
-    OUT_OF_TIME,
     Result,
     SimulationRequest,
     State,
+    Stop,
     impossible,
     limits,
     program_path,
@@ -49,14 +48,14 @@ from sbafab.simulators.simulator import (
 )
 
 LOG = "ccx.log"
-DIVERGED = "its iterations no longer converge, however small the step"
+DIVERGED = Stop("diverged", "its iterations no longer converge, however small the step")
 
 
 class Ending(NamedTuple):
     """End of a run: the last converged time in s, and what stopped it, None if nothing did."""
 
     time: float
-    stopped: str | None
+    stopped: Stop | None
 
 
 def find_ccx() -> str:
@@ -96,7 +95,7 @@ def _reached(sta: Path) -> float:
     return max(read_sta(sta), default=0.0)
 
 
-def _complaint(log: Path, code: int, is_there: bool) -> str | None:
+def _complaint(log: Path, code: int, is_there: bool) -> Stop | None:
     """Return what went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
 
     A step that diverges and is tried again with less is no failure.
@@ -108,8 +107,8 @@ def _complaint(log: Path, code: int, is_there: bool) -> str | None:
         return DIVERGED
     error = re.search(r"\*ERROR[^:\n]*:?\s*(.+)", text)
     if error is not None:
-        return f"it reports: {error[1].strip().rstrip('.:')}"
-    return f"it ended with code {code} and without a word"
+        return Stop("failed", f"it reports: {error[1].strip().rstrip('.:')}")
+    return Stop("failed", f"it ended with code {code} and without a word")
 
 
 # A whole run in one folder: mesh, deck, ccx and results.
@@ -165,9 +164,10 @@ def simulate(
     run_mesh = started(mesh, settings)
     frames = converged_frames(folder / f"{JOB}.frd", run_mesh, ending)
     if not frames:
+        stop = ending.stopped or Stop("failed", "it wrote no result")
         raise OutputError(
             f"ccx stopped at {_place(ending.time, settings)}, before the first result: "
-            f"{ending.stopped}; {_advice(ending, settings)}"
+            f"{stop.words}; {_advice(stop, settings)}"
         )
     states = history(run_mesh, laminate, mesh_settings.symmetry, settings, frames)
     wrong = _first_wrong(run_mesh, laminate, settings, frames, states)
@@ -181,7 +181,13 @@ def simulate(
         frames, states = frames[:number], states[: number + 1]
     _write_results(run_mesh, laminate.name, mesh_settings.symmetry, states, frames[-1], folder)
     _tidy(folder)
-    stopped = None if ending.stopped is None else _stopped(ending, states, settings)
+    stopped = None
+    if ending.stopped is not None:
+        place, last = _place(ending.time, settings), _largest(states[-1])
+        stopped = (
+            f"ccx stopped at {place}: {ending.stopped.words}; results up to {last:.3g} kPa are "
+            f"kept; {_advice(ending.stopped, settings)}"
+        )
     if wrong is not None:
         stopped = (
             f"beyond {_largest(states[-1]):.3g} kPa the result cannot be: {wrong[1]}; results up "
@@ -247,14 +253,6 @@ def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
     return [frame for frame in frames if frame.time <= ending.time * (1 + SAME_TIME)]
 
 
-def _stopped(ending: Ending, states: Sequence[State], settings: DeckSettings) -> str:
-    last = states[-1]
-    return (
-        f"ccx stopped at {_place(ending.time, settings)}: {ending.stopped}; results up to "
-        f"{_largest(last):.3g} kPa are kept; {_advice(ending, settings)}"
-    )
-
-
 def _largest(state: State) -> float:
     """The pressure in kPa that is farthest from 0."""
     return max(state.pressures.values(), key=abs)
@@ -265,12 +263,12 @@ def _place(time: float, settings: DeckSettings) -> str:
     return f"{time:.4g} s, {reached:.3g} of {settings.largest:g} kPa"
 
 
-def _advice(ending: Ending, settings: DeckSettings) -> str:
-    if ending.stopped == INTERRUPTED:
+def _advice(stop: Stop, settings: DeckSettings) -> str:
+    if stop.kind == "interrupt":
         return "run it again for the rest"
-    if ending.stopped != DIVERGED and not str(ending.stopped).startswith(OUT_OF_TIME):
+    if stop.kind == "failed":
         return "see whether ccx runs on this machine; a larger --h takes less memory"
-    if ending.stopped != DIVERGED:
+    if stop.kind == "time":
         return "give it more --minutes or a larger --h, or less to do with --symmetry"
     if settings.procedure == "static":
         return "take --procedure dynamic, which gets past wrinkles"

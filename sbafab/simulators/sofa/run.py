@@ -178,8 +178,8 @@ def run_scene(
     log = read_log(log_path.read_text(encoding="utf-8", errors="replace"), plugins_needed(scene))
     tips = read_points(state)
     why = _trouble(ended, log, [time for time, _ in tips], seconds)
-    is_cut = ended.stopped is not None and tips and log.trouble is None
-    if why is not None and not is_cut:
+    is_cut = bool(tips) and log.trouble is None
+    if why is not None and not (ended.stopped and is_cut):
         reached = (
             f"the tip is known to {tips[-1][0]:g} s" if tips else "nothing is known of the tip"
         )
@@ -189,9 +189,9 @@ def run_scene(
     for extra in (nodes, recorded):
         extra.unlink(missing_ok=True)
     states = tuple(films.state(laminate, time, points, places.get(time)) for time, points in tips)
-    if is_cut:
+    if ended.stopped is not None:
         stopped = (
-            f"{scene.name} ran to {tips[-1][0]:g} of {seconds:g} s: {ended.stopped}; what it "
+            f"{scene.name} ran to {tips[-1][0]:g} of {seconds:g} s: {ended.stopped.words}; what it "
             "reached is kept"
         )
         return SofaRun(scene, states, depth, round(tips[-1][0] / dt), None, None, stopped)
@@ -211,7 +211,7 @@ def _trouble(ended: Ended, log: Log, times: list[float], seconds: float) -> str 
     """Why a run cannot be believed."""
     code = ended.code
     if ended.stopped is not None:
-        return ended.stopped
+        return ended.stopped.words
     if code < 0:
         return f"runSofa was killed by signal {-code} ({signal.Signals(-code).name})"
     if log.trouble is not None:
