@@ -197,9 +197,8 @@ def _cautions(job: AssemblyJob) -> list[Caution]:
         warnings.append(Caution("Lowered limits", words))
     for design in job.works:
         for caution in cautions(design.work):
-            if caution.of_design:
-                caution = caution._replace(title=f"{caution.title} ({design.name})")
-            warnings.append(caution)
+            of = f" ({design.name})" if caution.of_design else ""
+            warnings.append(caution._replace(title=f"{caution.title}{of}"))
     if any(placed.part.kind == "magnet" for placed in job.assembled.parts):
         words = (
             "small and brittle; they snap together. Keep them away from anything that a magnet "
