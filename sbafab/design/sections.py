@@ -557,6 +557,10 @@ class Sheets(Section):
     R12 by colours) or "epilog" (SVG with hairlines by colours)."""
 
 
+REMOVED_RULES = ("bridges", "scrap")
+"""Rules of registered sheets, which earlier design files may waive."""
+
+
 class Rules(Section):
     """Limits of the rule deck, and what is waived."""
 
@@ -581,6 +585,14 @@ class Rules(Section):
     """A branch of a net without a port may be so many times as long as wide; by default 2."""
     waive: tuple[Annotated[str, *name_of(rule_names)], ...] = Field(default=(), strict=False)
     """Rules whose failure shall not stop the cut files; every file then says so."""
+
+    @field_validator("waive", mode="before")
+    @classmethod
+    def _without_removed_rules(cls, names: object) -> object:
+        # What is not checked any more needs no waiver.
+        if not isinstance(names, list | tuple):
+            return names
+        return [name for name in names if name not in REMOVED_RULES]
 
 
 class Models(Section):

@@ -86,3 +86,8 @@ def test_a_kit_may_give_what_other_families_use(tmp_path: Path) -> None:
     file = tmp_path / "d.toml"
     file.write_text(f'kit = "lab.toml"\n{text}', encoding="utf-8")
     assert load_design(file).with_({"name": "other"}).kit == "lab.toml"
+
+
+def test_a_waiver_of_a_removed_rule_waives_nothing() -> None:
+    design = load_design("1dof-5mm", ['rules.waive=["bridges", "bond-width", "scrap"]'])
+    assert design.rules.waive == ("bond-width",)
