@@ -91,7 +91,7 @@ def axisymmetric_states(
         (folder / f"{JOB}.inp").write_text(deck, encoding="ascii", newline="\n")
         ending = run_ccx(folder, JOB, pressures[-1], LIMIT)
         if ending.stopped is not None:
-            raise OutputError(f"ccx stopped at {ending.time:g} kPa: {ending.stopped}")
+            raise OutputError(f"ccx stopped at {ending.time:g} kPa: {ending.stopped.words}")
         frames = read_frd(folder / f"{JOB}.frd", len(section.nodes))
     times = np.array([frame.time for frame in frames])
     flat = np.array(section.nodes)

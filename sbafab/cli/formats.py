@@ -85,7 +85,7 @@ def finding() -> dict[str, Any]:
         x={**number("null"), "description": "mm"},
         y={**number("null"), "description": "mm"},
     )
-    return of(Finding, "by_user", "remedy", "interval", where=where)
+    return of(Finding, "by_user", "remedy", "interval", "design", where=where)
 
 
 # Runs, records, measurements.

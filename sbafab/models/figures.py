@@ -50,8 +50,9 @@ FLAGS: Mapping[Flag, str] = {
 class Model:
     """Origin of a number: ``source`` is an equation or section, ``trust`` the model's validity.
 
-    ``factors`` are those that a user measured, by field of ``Factors``; ``calibration`` is the name
-    of the one that the model is calibrated by. ``by_disc``: a drawn pocket is taken for a disc.
+    ``factors`` are those that a user measured, each in the unit of that field of ``Factors``;
+    ``calibration`` is the name of the one that the model is calibrated by. ``by_disc``: a drawn
+    pocket is taken for a disc.
     """
 
     id: ModelId

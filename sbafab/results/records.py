@@ -180,12 +180,12 @@ class Record(LabRow):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """What was measured once, by column."""
+        """What was measured once, by column, each in the unit of its name."""
         return self.group("numbers")
 
     @property
     def errors(self) -> dict[str, tuple[float, ...]]:
-        """The measured errors, by column."""
+        """The measured errors, by column, each in the unit of its name."""
         return self.group("errors")
 
     def _problems(self) -> Iterator[str]:
@@ -236,7 +236,7 @@ class HistoryEntry(LabRow):
 
     @property
     def readings(self) -> dict[str, float]:
-        """The numbers that were read, by column."""
+        """The numbers that were read, by column, each in the unit of its name."""
         return self.group("readings")
 
     @property

@@ -265,7 +265,7 @@ def test_a_run_that_takes_too_long_is_stopped(
     stand_in(tmp_path, monkeypatch, f"{HALF_WAY}\nimport time\ntime.sleep(600)")
     told: list[float] = []
     ending = run_ccx(tmp_path, "job", 1.0, 1.5, told.append)
-    assert ending == (0.5, "it was stopped after 0.025 minutes")
+    assert ending == (0.5, ("time", "it was stopped after 0.025 minutes"))
     assert told[-1] == 0.5
 
 
@@ -300,7 +300,10 @@ def test_an_interrupted_run_keeps_what_it_has(
         if reached:
             raise KeyboardInterrupt
 
-    assert run_ccx(tmp_path, "job", 1.0, 60, interrupt) == (0.5, "it was interrupted")
+    assert run_ccx(tmp_path, "job", 1.0, 60, interrupt) == (
+        0.5,
+        ("interrupt", "it was interrupted"),
+    )
 
 
 @pytest.mark.parametrize(
