@@ -7,7 +7,10 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.actuators import build, records
 from sbafab.assemblies.records import AnyPart, Assembly, Base, Cup, Line, Magnet, Sba, Seat, Tube
@@ -28,10 +31,6 @@ from sbafab.errors import DesignError, GeometryError
 from sbafab.laminate.laminate import Inlet, Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.meshing.wrap import bent_point
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 Rows = tuple[Vector, Vector, Vector]
 
@@ -60,8 +59,6 @@ class PartPose(NamedTuple):
 
     def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the points (n, 3) in this pose."""
-        import numpy as np
-
         moved: NDArray[np.float64] = points @ np.array(self.rows).T + np.array(self.shift)
         return moved
 
@@ -264,8 +261,6 @@ class PlacedPart:
 
         A part that lies on a tube stands on the tangent.
         """
-        import numpy as np
-
         turned = self.turned(points)
         if self.radius is not None:
             x, y, z = turned.T

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.assemblies.build import Assembled, PlacedPart, PlacedSba, inlet_of
 from sbafab.assemblies.records import AssemblyRules, Base, CheckName, Cup, Line, Magnet, Tube
@@ -19,10 +22,6 @@ from sbafab.models.formulas import sizes as sizes_of
 from sbafab.models.intervals import factors_of
 from sbafab.rules.finding import Finding, Place
 from sbafab.rules.limits import holds, weakened
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 WHOLE = Place()
 
@@ -566,8 +565,6 @@ def _lies_on(a: PlacedPart, b: PlacedPart) -> bool:
 
 
 def _box(surface: Surface) -> NDArray[np.float64]:
-    import numpy as np
-
     return np.array([surface.points.min(axis=0), surface.points.max(axis=0)])
 
 
@@ -576,15 +573,12 @@ def _meet(a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
 
 
 def _box_of(solid: Any) -> NDArray[np.float64]:
-    import numpy as np
-
     low, high = np.array(solid.bounding_box()).reshape(2, 3)
     middle: NDArray[np.float64] = (low + high) / 2
     return middle
 
 
 def _solid(surface: Surface) -> Any:
-    import numpy as np
     from manifold3d import Manifold, Mesh64
 
     return Manifold(

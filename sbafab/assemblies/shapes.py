@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from sbafab.assemblies.build import Assembled, PlacedPart
-from sbafab.assemblies.records import Base, Cup, Line, Magnet, Sba, Tube
+from sbafab.assemblies.records import AnyPart, Base, Cup, Line, Magnet, Sba, Tube
 from sbafab.geometry.region import Region, disc, rectangle
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.solid import Slab, closed_surface, solid_slabs
 from sbafab.meshing.surface import Surface
 from sbafab.meshing.wrap import bent
-
-if TYPE_CHECKING:
-    from sbafab.assemblies.records import AnyPart
 
 SAGITTA = 0.02
 """mm: an assembly is seen whole, so its arcs are coarser than a single solid's."""
@@ -111,8 +109,6 @@ def cup_mould(cup: Cup) -> tuple[Surface, Surface]:
 
 def _turned(outline: Sequence[tuple[float, float]]) -> Surface:
     """Return a section (r, z), counter-clockwise, turned round the axis."""
-    import numpy as np
-
     section = np.array(outline)
     angles = np.arange(AROUND) * (2 * math.pi / AROUND)
     r, z = section.T

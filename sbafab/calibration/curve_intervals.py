@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING
 
 from sbafab.calibration.fit import GROUP_OF, MIDDLES, relative_errors, term_of
 from sbafab.calibration.model_values import ModelledActuator, ModelValue, NoModel, model_values
 from sbafab.errors import DesignError
-from sbafab.models.calibrated import SHARE, Ends, deviations
+from sbafab.evidence.records import MeasuredCurve
+from sbafab.models.calibrated import SHARE, Ends, ModelCalibration, deviations
+from sbafab.models.figures import Factors
 from sbafab.models.intervals import ActuatorSizes, Uncertainty, for_film
 from sbafab.models.unknowns import factors_at
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sbafab.evidence.records import MeasuredCurve
-    from sbafab.models.calibrated import ModelCalibration
-    from sbafab.models.figures import Factors
 
 """Least and largest value."""
 

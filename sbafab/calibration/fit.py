@@ -7,7 +7,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import tomli_w
@@ -23,14 +23,12 @@ from sbafab.calibration.posterior import (
 )
 from sbafab.calibration.surface import ValueSurface, surfaces
 from sbafab.errors import DesignError
+from sbafab.evidence.records import Evidence, MeasuredCurve
 from sbafab.models.calibrated import GROUPS, SHARE, ModelCalibration, SizeRange
+from sbafab.models.film_elements import Array
 from sbafab.models.intervals import sizes_of
 from sbafab.models.unknowns import UNKNOWNS, factors_at
 from sbafab.process import Progress
-
-if TYPE_CHECKING:
-    from sbafab.evidence.records import Evidence, MeasuredCurve
-    from sbafab.models.film_elements import Array
 
 DIGITS = 6
 TOLD_APART = 0.3

@@ -9,22 +9,18 @@ is as likely as the others.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from sbafab.calibration.surface import ValueSurface, interpolated
 from sbafab.errors import DesignError
 from sbafab.models.calibrated import GROUPS
+from sbafab.models.film_elements import Array
 from sbafab.models.unknowns import UNKNOWNS
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from sbafab.models.film_elements import Array
 
 SHARED = 0.5
 """Share of the discrepancy's variance that the points of a curve have in common."""

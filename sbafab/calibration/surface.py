@@ -9,19 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sbafab.calibration.model_values import NoModel, model_values
 from sbafab.errors import DesignError
+from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import DESIGN_UNKNOWNS
+from sbafab.models.figures import Factors
+from sbafab.models.film_elements import Array
 from sbafab.models.unknowns import UNKNOWNS, factors_at
-
-if TYPE_CHECKING:
-    from sbafab.evidence.records import MeasuredCurve
-    from sbafab.models.figures import Factors
-    from sbafab.models.film_elements import Array
 
 NODES = (11, 6, 6)
 """Nodes by modulus ratio, pocket loss and press factor."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import click
 
@@ -46,12 +46,8 @@ from sbafab.output.advice import Advice, advise
 from sbafab.output.checked import checks, limits, refuse_undoable
 from sbafab.output.job import CheckedJob, check_job
 from sbafab.rules.deck import has_failed
+from sbafab.rules.finding import Finding
 from sbafab.rules.nets import netlist_findings
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from sbafab.rules.finding import Finding
 
 YIELD_RULE = "registration-yield"
 DEFAULT_KIT = "paper"

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from sbafab.cli.options import Request, dxf_options, run_options, sheet_options
 from sbafab.cli.run import run_parts
-
-if TYPE_CHECKING:
-    from sbafab.cutting.properties import Curves
+from sbafab.cutting.properties import Curves
 
 
 @click.command()

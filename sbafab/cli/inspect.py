@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -18,11 +17,9 @@ from sbafab.cli.printing import (
     print_written,
 )
 from sbafab.errors import DesignError
-
-if TYPE_CHECKING:
-    from sbafab.inspection.inspection import Inspection
-    from sbafab.inspection.picture import ScanPicture
-    from sbafab.inspection.scale import Reference
+from sbafab.inspection.inspection import Inspection
+from sbafab.inspection.picture import ScanPicture
+from sbafab.inspection.scale import Reference
 
 MOST_LINES = 20
 """Pieces amiss that are printed; the files have all."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from sbafab.actuators import load_design
@@ -20,11 +18,9 @@ from sbafab.cli.printing import (
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.cli.run import add_batch, finish
+from sbafab.cutting.properties import Curves
 from sbafab.output.schema_ids import NESTED_SCHEMA
 from sbafab.runs.run import Run, RunRequest, generate
-
-if TYPE_CHECKING:
-    from sbafab.cutting.properties import Curves
 
 
 @click.command()

@@ -10,7 +10,6 @@ from click.shell_completion import CompletionItem
 
 from sbafab.cli.options import completions, json_option
 from sbafab.cli.printing import print_json
-from sbafab.cutting.calibration import write_coupon
 from sbafab.design.files import template_summaries, write_new
 from sbafab.design.kits import write_kit
 from sbafab.version import GENERATOR
@@ -77,6 +76,9 @@ def _kit(file: Path) -> None:
 
 
 def _coupon(folder: Path) -> None:
+    # Its drawing takes numpy, which no other file to start from does.
+    from sbafab.cutting.calibration import write_coupon
+
     drawing, picture, table = write_coupon(folder, GENERATOR)
     click.echo(f"Cut {drawing} (picture: {picture}) from each film with a kerf offset of 0.")
     path = shlex.quote(str(table))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -16,9 +16,6 @@ from click.shell_completion import CompletionItem
 from sbafab.cutting.properties import Curves, DxfProfile
 from sbafab.design.files import key_paths, template_summaries
 from sbafab.design.units import KILOPASCALS, MILLILITRES_PER_MINUTE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 _WRITTEN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -19,6 +18,7 @@ from sbafab.cli.options import (
 )
 from sbafab.cli.printing import print_verdict, print_wrapped
 from sbafab.cli.progress import shown_progress
+from sbafab.design.records import Design
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
 from sbafab.models.drawn_pockets import model_form, near_discs
@@ -33,9 +33,6 @@ from sbafab.reports.inflated_picture import (
     write_flat_picture,
     write_picture,
 )
-
-if TYPE_CHECKING:
-    from sbafab.design.records import Design
 
 
 @click.command()

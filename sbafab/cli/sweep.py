@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -13,10 +13,8 @@ from sbafab.cli.printing import print_json, print_verdict
 from sbafab.cli.progress import shown_progress
 from sbafab.output.schema_ids import SWEEP_SCHEMA
 from sbafab.search import sweep as search
+from sbafab.search.sweep import SweepRequest, SweptDesigns
 from sbafab.search.vary import read_varied
-
-if TYPE_CHECKING:
-    from sbafab.search.sweep import SweepRequest, SweptDesigns
 
 
 @click.command()

@@ -19,7 +19,10 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.cutting.dxf_read import read_profile
 from sbafab.cutting.dxf_write import Surroundings, dxf_text
@@ -32,9 +35,6 @@ from sbafab.errors import DesignError
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region, rectangle, union
 from sbafab.spreadsheet import csv_text
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MOST_DEGREES = 200
 """Degrees of freedom from which on Student's t is taken as if there were no more."""
@@ -252,8 +252,6 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
 
 def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
     """Kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
-    import numpy as np
-
     instruments = sorted({size.instrument for size in measurements})
     count = len(measurements)
     nominal = np.array([size.nominal for size in measurements])
@@ -303,8 +301,6 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
 
 def _are_apart(columns: NDArray[Any]) -> bool:
     """Return True if the sizes tell the causes of the columns from each other."""
-    import numpy as np
-
     unit = columns / np.linalg.norm(columns, axis=0)
     return bool(np.linalg.matrix_rank(unit, tol=SAME_COLUMN) == unit.shape[1])
 

@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from sbafab.cutting.lettering import Stroke, strokes, width
 from sbafab.geometry.edges import Point
 from sbafab.geometry.region import Region
 from sbafab.nesting.records import Nest
 
 if TYPE_CHECKING:
-    import numpy as np
     import shapely
 
 HEIGHT = 1.2
@@ -43,7 +44,6 @@ class IndexMark(NamedTuple):
 
 def index_marks(nest: Nest, sheet: int) -> tuple[IndexMark, ...]:
     """Return the marks of a sheet's parts, at most one for each."""
-    import numpy as np
     import shapely
 
     placed = nest.on_sheet(sheet)
@@ -108,7 +108,6 @@ def _by_distance(
     number: int,
 ) -> list[int]:
     """Return the free boxes that are nearest to their own part and to no other, nearest first."""
-    import numpy as np
     import shapely
 
     free = np.flatnonzero(is_free)

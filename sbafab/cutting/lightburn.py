@@ -13,8 +13,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.cutting.beam_check import BeamRun
 from sbafab.cutting.beam_paths import LaserRun
@@ -35,10 +38,6 @@ from sbafab.geometry.edges import Arc, Edge, Line, Point, distance_to
 from sbafab.geometry.region import coord
 from sbafab.laminate.films import Material
 from sbafab.markup import quoteattr
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 ENDING = ".lbrn2"
 INDICES = {ENGRAVE: 0, CUT_INNER: 1, CUT_OUTER: 2, CUT_SHEET: 7, REFERENCE: 8}
@@ -506,8 +505,6 @@ def _surely_on(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[bool]:
 
 def _circle_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
     """Return the distance of the curves of drawn circles from the expected ones, mm."""
-    import numpy as np
-
     if not pairs:
         return []
     drawn_as = np.array([(*shape.circle[0], shape.circle[1]) for shape, _ in pairs if shape.circle])
@@ -524,8 +521,6 @@ def _path_offs(pairs: Sequence[tuple[LaserShape, LaserRun]]) -> list[float]:
     """Return the distance of the curves of paths from the expected edges, mm; infinite for other
     kinds.
     """
-    import numpy as np
-
     if not pairs:
         return []
     edges = np.array([_numbers(edge) for _, run in pairs for edge in run.edges])
@@ -568,8 +563,6 @@ def _numbers(edge: Edge) -> tuple[float, ...]:
 
 def _sweep(edges: NDArray[np.float64]) -> NDArray[np.float64]:
     """The angle that each edge turns through, of a line 0."""
-    import numpy as np
-
     ax, ay, bx, by = (edges[:, k] - edges[:, 4 + k % 2] for k in range(4))
     turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
     sense = edges[:, 7]
@@ -585,8 +578,6 @@ def _row_offs(
     share: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Return the distance of each curve from its part of an edge; ``share`` is from and to, mm."""
-    import numpy as np
-
     centre, radius = edges[:, 4:6], edges[:, 6]
     first = np.arctan2(edges[:, 1] - edges[:, 5], edges[:, 0] - edges[:, 4])
     off = np.zeros(len(rows))

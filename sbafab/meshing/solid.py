@@ -13,6 +13,9 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.errors import OutputError
 from sbafab.geometry.contour import Contour, facets
 from sbafab.geometry.edges import SAME, Point
@@ -21,9 +24,7 @@ from sbafab.laminate.laminate import Chamber, Interface, Laminate
 from sbafab.meshing.surface import Surface, open_edges
 
 if TYPE_CHECKING:
-    import numpy as np
     import shapely
-    from numpy.typing import NDArray
 
 GRID = 1e-5
 """Spacing in mm of the grid that vertices are rounded to; single precision tells them apart."""
@@ -44,8 +45,6 @@ class Partition(NamedTuple):
 
     def boundary(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Edges (k, 2) round the union of the chosen cells, the cells on their left."""
-        import numpy as np
-
         edges = self.edges[chosen[self.cells]]
         size = len(self.points)
         forth = edges[:, 0] * size + edges[:, 1]
@@ -57,7 +56,6 @@ class Partition(NamedTuple):
 
     def triangles(self, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
-        import numpy as np
         from manifold3d import triangulate
 
         loops = _loops(self.boundary(chosen))
@@ -70,7 +68,6 @@ class Partition(NamedTuple):
 
 def partition(regions: Sequence[Region], sagitta: float) -> Partition:
     """The cells between all edges of the regions, arcs as chords within ``sagitta`` mm."""
-    import numpy as np
     import shapely
 
     areas = [_polygons(region, sagitta) for region in regions]
@@ -90,7 +87,6 @@ def partition(regions: Sequence[Region], sagitta: float) -> Partition:
 
 
 def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
-    import numpy as np
     import shapely
 
     def ring(contour: Contour) -> shapely.LinearRing:
@@ -106,8 +102,6 @@ def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
 
 def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Closed chains of points that the directed edges make up, none through a point twice."""
-    import numpy as np
-
     following: defaultdict[int, list[int]] = defaultdict(list)
     for tail, head in edges.tolist():
         following[tail].append(head)
@@ -159,8 +153,6 @@ def fuse(slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()) -> S
     needed: walls stand on the outline of a level, and what differs from the level above it or
     below it is a face. ``cuts`` (x in mm, ascending) are lines that no face runs across.
     """
-    import numpy as np
-
     regions = list(dict.fromkeys(slab.region for slab in slabs))
     strips = list(_strips(regions, cuts))
     plane = partition([*regions, *strips], sagitta)
@@ -218,8 +210,6 @@ def _levels(
     slabs: Sequence[Slab], regions: Sequence[Region], plane: Partition
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The heights where something starts or ends, and the filled cells between each two."""
-    import numpy as np
-
     # To 1e-9 mm, so that faces that touch lie at one number.
     spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
     heights = sorted({height for span in spans for height in span})
@@ -235,8 +225,6 @@ def _faces(
     plane: Partition, levels: NDArray[np.bool_], strips: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Triangles (k, 3) of point + height x number of points, heights counted from the lowest."""
-    import numpy as np
-
     walls: dict[bytes, NDArray[np.int64]] = {}
     lids: dict[bytes, NDArray[np.int64]] = {}
     count = len(plane.points)
@@ -258,8 +246,6 @@ def _faces(
 
 def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Two triangles an edge, from one height to the next."""
-    import numpy as np
-
     tails, heads = edges.T
     lower = np.column_stack([tails, heads, heads + count])
     upper = np.column_stack([tails, heads + count, tails + count])

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.geometry.cache import cached_attribute
 
 if TYPE_CHECKING:
-    import numpy as np
     import trimesh
-    from numpy.typing import NDArray
 
 Vector = tuple[float, float, float]
 """A point or a way in space, mm, or a direction."""
@@ -30,8 +31,6 @@ class Surface:
     @cached_attribute
     def volume(self) -> float:
         """Enclosed volume in mm3."""
-        import numpy as np
-
         a, b, c = self.points.take(self.faces.T, axis=0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
@@ -47,8 +46,6 @@ def open_edges(surface: Surface) -> NDArray[np.float64]:
 
     Points are merged as a single-precision file merges them. Empty for a watertight surface.
     """
-    import numpy as np
-
     faces = _merged(surface.points)[surface.faces]
     size = len(surface.points)
     tails = faces.ravel()
@@ -71,8 +68,6 @@ def open_edges(surface: Surface) -> NDArray[np.float64]:
 
 def _merged(points: NDArray[np.float64]) -> NDArray[np.int64]:
     """A number for each point (n,), the same for those that single precision makes one."""
-    import numpy as np
-
     # Numbers of four bytes are told apart by their bits; adding 0 makes -0 and 0 one.
     x, y, z = (points.astype(np.float32) + np.float32(0)).view(np.uint32).T.astype(np.uint64)
     half = np.uint64(32)

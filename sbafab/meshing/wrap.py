@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface, Vector
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
 
 SAGITTA = 0.008
 """mm by which a facet of a bent film may leave its cylinder; a fifth of a film."""
@@ -44,8 +43,6 @@ class TubeWrap(NamedTuple):
         A body that is fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature:
         0 leaves it straight, on the tangent.
         """
-        import numpy as np
-
         x, y, z = points.T
         angle, at = self.angle(x, middle, share), middle / (self.radius + self.neutral)
         bend = np.asarray(share, dtype=float) / self.radius
@@ -61,16 +58,12 @@ class TubeWrap(NamedTuple):
         self, x: NDArray[np.float64], middle: float = 0.0, share: ArrayLike = 1.0
     ) -> NDArray[np.float64]:
         """Angle in radians by which a body leans at x, seen from where it is fixed."""
-        import numpy as np
-
         bend = np.asarray(share, dtype=float) / self.radius
         angle: NDArray[np.float64] = bend * (x - middle) / (1 + bend * self.neutral)
         return angle
 
     def raised(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Height in mm by which the sheet is lifted by its overlapping end."""
-        import numpy as np
-
         return self.thickness * np.clip((x - self.seam) / RAMP + 1, 0, 1)
 
 
@@ -92,8 +85,6 @@ def tube_wrap(laminate: Laminate) -> TubeWrap | None:
 
 def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
     """The surface of a flat laminate round its tube; it has been cut at ``wrap.cuts``."""
-    import numpy as np
-
     x, y, z = surface.points.T
     return Surface(wrap.placed(np.column_stack([x, y, z + wrap.raised(x)])), surface.faces)
 
@@ -109,8 +100,6 @@ def bent(surface: Surface, radius: float, sagitta: float = SAGITTA) -> Surface:
 
     Lengths at z = 0 stay; what lies above is stretched round the tube, as films on it are.
     """
-    import numpy as np
-
     step = math.sqrt(8 * radius * sagitta)
     low, high = surface.points[:, 0].min(), surface.points[:, 0].max()
     first, last = math.floor(low / step) + 1, math.ceil(high / step)
@@ -124,8 +113,6 @@ def bent(surface: Surface, radius: float, sagitta: float = SAGITTA) -> Surface:
 
 def cut_along(surface: Surface, x: float) -> Surface:
     """Return the surface with edges wherever it crosses the plane of this x."""
-    import numpy as np
-
     offset = surface.points[:, 0] - x
     side = np.sign(np.where(np.abs(offset) < SNAP, 0.0, offset)).astype(np.int8)
     sides = side[surface.faces]
@@ -153,8 +140,6 @@ def cut_along(surface: Surface, x: float) -> Surface:
 
 
 def _rows(*columns: NDArray[np.int64]) -> NDArray[np.int64]:
-    import numpy as np
-
     return np.column_stack(columns)
 
 
@@ -165,8 +150,6 @@ def _crossings(
     on_plane: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], tuple[NDArray[np.int64], ...]]:
     """The points with those added where edges cross, and their indices by edge of the faces."""
-    import numpy as np
-
     a, b, c = faces.T
     sets = [(a, b, ~on_plane), (b, c, on_plane), (c, a, ~on_plane)]
     ends = np.concatenate([np.column_stack([p, q])[use] for p, q, use in sets])

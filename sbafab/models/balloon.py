@@ -16,16 +16,19 @@ volumes ul, forces mN.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE
 from sbafab.models import least_energy
 from sbafab.models.film_elements import (
+    Array,
     Elements,
     FlatFilm,
     air_volume,
@@ -38,13 +41,6 @@ from sbafab.models.film_elements import (
 )
 from sbafab.models.least_energy import Descent, NoEquilibrium, equilibrium
 from sbafab.process import one_blas_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from sbafab.models.film_elements import Array
 
 FILM_ELEMENTS = 24
 RIM_ELEMENTS = 5

@@ -13,23 +13,19 @@ construction. Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.film_elements import Array
 from sbafab.models.rippled import compressed_shapes, least_free_states, with_waves
 from sbafab.process import one_blas_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from sbafab.models.film_elements import Array
 
 DEGREE = 5
 PRESSURE_SPANS, HEIGHT_SPANS = 12, 12

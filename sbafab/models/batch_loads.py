@@ -9,17 +9,13 @@ Riccati recursion), at a cost in proportion to the levels. Lengths mm, forces mN
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sbafab.models.stack_loads import SMALL, WALL_POINTS, base_side
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.models.film_elements import Array
-    from sbafab.models.stack_loads import Load
+from sbafab.models.film_elements import Array
+from sbafab.models.stack_loads import SMALL, WALL_POINTS, Load, base_side
 
 STRAIGHT = 1e-24
 """Square of a tilt in rad that is taken for 0."""

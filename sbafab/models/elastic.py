@@ -10,14 +10,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from sbafab.errors import BeyondError, DesignError
+from sbafab.laminate.laminate import Laminate
 from sbafab.models import paper
 from sbafab.models.balloon import Balloon, Shapes, distinct, inflate
-from sbafab.models.balloon_map import MOST_STRETCH, stretch
+from sbafab.models.balloon_map import MOST_STRETCH, BalloonMap, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.figures import (
     Factors,
@@ -28,18 +30,12 @@ from sbafab.models.figures import (
     Relation,
     Trace,
 )
+from sbafab.models.film_elements import Array
 from sbafab.models.kinematics import Actuator
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, ModelId, Quantity, chamber_count
 from sbafab.models.rippled import compressed_shapes, free_shapes
 from sbafab.models.stack import MOST_PRESSURE, Motion, Plate, Pose, Stack, stack
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from sbafab.laminate.laminate import Laminate
-    from sbafab.models.balloon_map import BalloonMap
-    from sbafab.models.film_elements import Array
 
 Inflated = Mapping[Balloon, Shapes]
 ELASTIC = Model(

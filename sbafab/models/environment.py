@@ -4,24 +4,20 @@ reach a target.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.utils.seeding import np_random
 from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
+from sbafab.models.film_elements import Array
+from sbafab.models.pneumatics import Line
+from sbafab.models.stack import Motion, Stack
 from sbafab.models.stack_batch import StackBatch
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from sbafab.models.film_elements import Array
-    from sbafab.models.pneumatics import Line
-    from sbafab.models.stack import Motion, Stack
 
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):

@@ -5,9 +5,10 @@ work, inlet tubes, tip stiffness, and overall sizes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.design.records import Design, Discs, Form, Slots, Wrap
 from sbafab.errors import BeyondError, DesignError
@@ -24,9 +25,6 @@ from sbafab.models.intervals import factors_of
 from sbafab.models.lens import fullest
 from sbafab.models.paper import BALLOONS, counterpart
 from sbafab.models.quantity import ANYWHERE, ModelId, Quantity
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 class Bend(NamedTuple):

@@ -8,12 +8,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import TYPE_CHECKING
 
-from sbafab.design.records import Discs
+from sbafab.design.records import Design, Discs, Form
 from sbafab.laminate.assembly import folded_height
-from sbafab.laminate.burst import RADIUS
+from sbafab.laminate.burst import RADIUS, Burst
 from sbafab.laminate.films import PAPER_BURST, PAPER_THICKNESS
+from sbafab.laminate.laminate import Laminate
 from sbafab.models.calibrated import (
     DESIGN_UNKNOWNS,
     SHARE,
@@ -26,11 +26,6 @@ from sbafab.models.figures import EXTRAPOLATION, Factors, Figure, Flag, LeftOut
 from sbafab.models.paper import BALLOONS, CALIBRATED_MODELS
 from sbafab.models.quantity import FigureKey, Quantity
 from sbafab.models.unknowns import UNKNOWNS
-
-if TYPE_CHECKING:
-    from sbafab.design.records import Design, Form
-    from sbafab.laminate.burst import Burst
-    from sbafab.laminate.laminate import Laminate
 
 Items = Sequence[Figure | LeftOut]
 FLAT = "flat height"

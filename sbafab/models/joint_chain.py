@@ -10,14 +10,12 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from sbafab.models.film_elements import Array
 from sbafab.models.stack import GRAVITY, Stack
-
-if TYPE_CHECKING:
-    from sbafab.models.film_elements import Array
 
 JOINTS = ("tilt_x", "tilt_y", "rise", "tilt_y_upper", "tilt_x_upper")
 """Joints of a level from its lower plate up; the name of each begins with its level's."""

@@ -12,14 +12,12 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.models.parabola import BISECTIONS, inverse, within
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 MODEL = "the lens of two arcs"
 SHALLOW = 1e-3

@@ -8,19 +8,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.models.balloon import distinct
-from sbafab.models.balloon_map import LEAST_HEIGHT, LOW_PRESSURE
+from sbafab.models.balloon_map import LEAST_HEIGHT, LOW_PRESSURE, BalloonMap
+from sbafab.models.film_elements import Array
 from sbafab.models.rippled import compressed_shapes
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from sbafab.models.balloon_map import BalloonMap
-    from sbafab.models.film_elements import Array
 
 MOST_ERROR, CELL_ERROR = 0.03, 0.02
 """Share by which a map may miss, and that by which it may where a cell is checked, since it may

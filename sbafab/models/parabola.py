@@ -7,14 +7,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 BISECTIONS = 60
 ROUNDING = 1e-9

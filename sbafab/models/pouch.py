@@ -24,14 +24,11 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.models.parabola import BISECTIONS, inverse, within
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 MOTOR = "pouch motor"
 HINGE = "pouch hinge"

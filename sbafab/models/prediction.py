@@ -8,9 +8,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.actuators import build
 from sbafab.design.records import Design, Slots, Wrap
@@ -83,9 +84,6 @@ from sbafab.models.quantity import (
     chamber_count,
 )
 from sbafab.models.stack import Stack
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 SAMPLES = 61
 

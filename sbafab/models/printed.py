@@ -9,14 +9,11 @@ Lengths mm, volumes ul.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.models.parabola import fullest, inverse, within
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 MODEL = "Eq. 4"
 

@@ -17,26 +17,22 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.models import least_energy
-from sbafab.models.balloon import bonded_bending_stiffness
+from sbafab.models.balloon import Balloon, bonded_bending_stiffness
 from sbafab.models.film_elements import (
     ROOT_LENGTH,
+    Array,
     Elements,
     air_volume,
     assembled_gradient,
     assembled_tangent,
 )
 from sbafab.models.least_energy import Descent
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.models.balloon import Balloon
-    from sbafab.models.film_elements import Array
 
 OVERTONES = 5
 """Harmonics of a film in one ripple of the rim."""

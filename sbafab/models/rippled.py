@@ -11,20 +11,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon import Balloon, Shapes, inflate, ripples_at
+from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
 from sbafab.models.rim_modes import EDGE, PLACES, UP, R, Waves, Waving, Z
 from sbafab.process import one_blas_thread
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from sbafab.models.film_elements import Array
 
 WIDE = 4.0
 """Ring widths in a pocket's radius from which on films fall in step with the rim: strokes of

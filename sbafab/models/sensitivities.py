@@ -11,21 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sbafab.actuators import build
+from sbafab.design.records import Design
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, Rates, linearised
 from sbafab.models.figures import Factors
+from sbafab.models.film_elements import Array
 from sbafab.models.intervals import factors_of
 from sbafab.models.stack import MOST_PRESSURE, NO_LOAD, Pose, Stack, stack
 from sbafab.models.stack_loads import WALL_POINTS, Load, loaded_energy
-
-if TYPE_CHECKING:
-    from sbafab.design.records import Design
-    from sbafab.models.film_elements import Array
 
 KEYS = (
     "chamber.diameter",

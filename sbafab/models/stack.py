@@ -9,31 +9,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.actuators import build
+from sbafab.design.records import Design, Form
 from sbafab.errors import DesignError
-from sbafab.laminate.laminate import film_mass
+from sbafab.laminate.laminate import Laminate, film_mass
 from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.balloons import balloons_of
 from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.figures import Factors
+from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import Line
 from sbafab.models.reach import reach
 from sbafab.models.stack_loads import (
     vector_of,
 )
 from sbafab.models.stack_poses import NO_LOAD, Plate, Pose, PosedStack
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.design.records import Design, Form
-    from sbafab.laminate.laminate import Laminate
-    from sbafab.models.film_elements import Array
 
 __all__ = ["MOST_PRESSURE", "NO_LOAD", "Motion", "Plate", "Pose", "Stack", "stack"]
 

@@ -5,11 +5,11 @@ an outer plate.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sbafab.errors import DesignError
+from sbafab.models.film_elements import Array
 from sbafab.models.least_energy import (
     LARGEST_MOVE,
     SMALLEST_STEP,
@@ -18,11 +18,15 @@ from sbafab.models.least_energy import (
     newton_step,
     step_limit,
 )
-from sbafab.models.stack_loads import Load, LoadedEnergy, loaded_energy, with_diagonal_blocks
-
-if TYPE_CHECKING:
-    from sbafab.models.film_elements import Array
-    from sbafab.models.stack_loads import OuterPlate, PlateContact, Springs
+from sbafab.models.stack_loads import (
+    Load,
+    LoadedEnergy,
+    OuterPlate,
+    PlateContact,
+    Springs,
+    loaded_energy,
+    with_diagonal_blocks,
+)
 
 SOFT_PLATES = ((1e3, 1e5), (1e3, 1e4, 1e5), (1e4, 1e5))
 """Stiffness in mN/mm of an outer plate in the first solutions; ways, tried in turn."""

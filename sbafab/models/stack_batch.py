@@ -14,27 +14,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import refuse_outside
 from sbafab.models.batch_balance import Levels, LevelsAt, descended, step_share
 from sbafab.models.batch_loads import STRAIGHT, chain_of, solved
 from sbafab.models.batch_reach import BatchReach
+from sbafab.models.film_elements import Array
 from sbafab.models.pneumatics import ATMOSPHERE_KPA, Line
 from sbafab.models.reach import P0
-from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion
+from sbafab.models.stack import LONGEST_STEP, SCALE_PRESSURE, Motion, Stack
+from sbafab.models.stack_loads import Load
 from sbafab.models.stack_poses import NO_LOAD, Pose
 from sbafab.process import one_blas_thread
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from sbafab.models.film_elements import Array
-    from sbafab.models.stack import Stack
-    from sbafab.models.stack_loads import Load
 
 MOTION_STEPS = 16
 """Most of Newton's steps of a motion before a state is solved alone."""

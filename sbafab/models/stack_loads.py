@@ -9,22 +9,17 @@ curvature within a level. Arrays have a row a level.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, derivatives, horner
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from sbafab.models.balloon_map import BalloonMap
-    from sbafab.models.film_elements import Array
+from sbafab.models.balloon_map import DEGREE, PIECES_IN_ALL, BalloonMap, derivatives, horner
+from sbafab.models.film_elements import Array
 
 SMALL = 1e-8
 """Square of the angle below which functions of the angle are replaced by those at this one."""

@@ -17,12 +17,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.models.balloon_map import BalloonMap
+from sbafab.models.film_elements import Array
 from sbafab.models.map_range import holds_at
 from sbafab.models.paper import counterparts_of_pose
 from sbafab.models.stack_balance import free_equilibrium, loaded_equilibrium
@@ -37,11 +39,6 @@ from sbafab.models.stack_loads import (
     plate_chain,
     vector_of,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from sbafab.models.film_elements import Array
 
 RIM_POINTS = 24
 """Least number of points round a level's outline where its rims may meet the next level's."""

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.assemblies.build import Assembled
 from sbafab.assemblies.shapes import RGB, colours, placed_surface
 from sbafab.reports.canvas import INK, Buffer, draw_length_bar, rasterize, view_of
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from PIL.Image import Image
 
 ELEVATION, AZIMUTH = 22.0, -58.0
@@ -79,7 +80,6 @@ def _unit(v: Sequence[float]) -> list[float]:
 
 def _coloured(buffer: Buffer, paints: Sequence[RGB]) -> Image:
     """Lit colours, darker where one body or one step ends against another."""
-    import numpy as np
     from PIL import Image
 
     palette = np.array([*paints, (255, 255, 255)], dtype=float)
@@ -90,8 +90,6 @@ def _coloured(buffer: Buffer, paints: Sequence[RGB]) -> Image:
 
 
 def _edges(buffer: Buffer) -> NDArray[np.bool_]:
-    import numpy as np
-
     edges = np.zeros(buffer.body.shape, dtype=bool)
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
     for axis in (0, 1):

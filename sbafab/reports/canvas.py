@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from io import BytesIO
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.geometry.edges import Point
 from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw as Draw
     from PIL.ImageFont import FreeTypeFont, ImageFont
@@ -190,8 +191,6 @@ class View(NamedTuple):
 
     def flat(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (n, 3) as pixels right and down, and mm toward the eye."""
-        import numpy as np
-
         right, up, toward = (points @ self.axes.T).T
         x = self.centre[0] + self.scale * right
         y = self.centre[1] - self.scale * up
@@ -214,8 +213,6 @@ def view_of(
 
     The ``box`` is left, top, right, bottom in pixels.
     """
-    import numpy as np
-
     e, a = math.radians(elevation), math.radians(azimuth)
     toward = [math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)]
     right = [-math.sin(a), math.cos(a), 0.0]
@@ -243,8 +240,6 @@ def rasterize(
 
     Faces are lit one by one, or smoothly where ``normals`` (n, 3) of the points are given.
     """
-    import numpy as np
-
     size = width * height
     buffer = Buffer(
         np.full(size, -np.inf),
@@ -272,8 +267,6 @@ def _paint(
     lamp: NDArray[np.float64],
     smooth: NDArray[np.float64] | None,
 ) -> None:
-    import numpy as np
-
     corners = view.flat(surface.points)[surface.faces]
     # Pixels count downward: what faces the eye runs clockwise there.
     a, b, c = (corners[:, i, :2] for i in range(3))
@@ -300,8 +293,6 @@ def _light(
     corners: NDArray[np.float64], scale: float, lamp: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the light of a triangle, from its normal in the view (right, up, toward)."""
-    import numpy as np
-
     true = corners * np.array([1 / scale, -1 / scale, 1.0])
     normal = np.cross(true[:, 1] - true[:, 0], true[:, 2] - true[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -310,8 +301,6 @@ def _light(
 
 def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the light of what faces along normals (n, 3) in the view: from AMBIENT to 1."""
-    import numpy as np
-
     light: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normals @ lamp, 0, 1)
     return light
 
@@ -320,8 +309,6 @@ def _longest_first(
     corners: NDArray[np.float64], light: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Corners and their light turned so that the longest side comes first; its length in pixels."""
-    import numpy as np
-
     sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
     lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
     first = lengths.argmax(axis=1)
@@ -331,8 +318,6 @@ def _longest_first(
 
 
 def _power_of_two(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    import numpy as np
-
     return 2 ** np.ceil(np.log2(counts)).astype(np.int64)
 
 
@@ -349,8 +334,6 @@ def _sample(
     buffer: Buffer, corners: _Triangles, grid: tuple[int, int], size: tuple[int, int]
 ) -> None:
     """Points of each triangle: along its first side, and from there towards its third corner."""
-    import numpy as np
-
     s = np.linspace(0, 1, grid[0])[None, :, None, None]
     t = np.linspace(0, 1, grid[1])[None, None, :, None]
     a, b, c = (corners.corners[:, i][:, None, None, :] for i in range(3))

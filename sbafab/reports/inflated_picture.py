@@ -9,6 +9,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.assemblies.shapes import linear
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
@@ -29,8 +32,6 @@ from sbafab.reports.inflated import COARSE, InflatedPart, inflated, pressed
 from sbafab.reports.solid_png import solid_png
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from PIL.Image import Image
 
     from sbafab.models.stack import Pose, Stack
@@ -346,7 +347,6 @@ def rendered(
 
     ``view`` is of the picture ``width`` by ``height`` pixels.
     """
-    import numpy as np
     from PIL import Image
 
     x, y = view.centre
@@ -372,8 +372,6 @@ def rendered(
 
 def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
     """By what part places are darkened that lie behind what is round them."""
-    import numpy as np
-
     far = float(buffer.depth[buffer.body >= 0].min()) if (buffer.body >= 0).any() else 0.0
     depth = np.where(buffer.body < 0, far, buffer.depth)
     dark = np.zeros_like(depth)
@@ -385,8 +383,6 @@ def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
 
 def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
     """Means over squares about so many pixels wide, twice, for a soft edge."""
-    import numpy as np
-
     half = max(1, round(pixels / 2))
     for _ in range(2):
         for axis in (0, 1):
@@ -401,8 +397,6 @@ def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
 
 def _edges(buffer: Buffer) -> NDArray[np.bool_]:
     """Pixels at which one body ends against another, or steps back far."""
-    import numpy as np
-
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
     edges = np.zeros(depth.shape, dtype=bool)
     for axis in (0, 1):
@@ -415,8 +409,6 @@ def _shadow(
     surfaces: Sequence[Surface], view: View, size: tuple[int, int], ground: float
 ) -> NDArray[np.float64]:
     """Return the share of the light above that does not reach the ground, by pixel: 0 to 1."""
-    import numpy as np
-
     points = np.concatenate([surface.points for surface in surfaces])
     # Light comes from above, a little from the left of the picture, wherever the eye is.
     slant = 0.25 * view.axes[0] * np.array([1.0, 1.0, 0.0])

@@ -17,9 +17,11 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from zipfile import ZipFile
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from sbafab.as_built.check import FolderReadBack, as_designed, read_back
@@ -70,10 +72,6 @@ from sbafab.rules.finding import Finding, Place
 from sbafab.rules.nets import NETLIST, netlist_findings
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 from sbafab.version import GENERATOR
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 INDEX = "manifest.json"
 DESIGN_ERRORS = (DesignError, OutputError, GeometryError, ArithmeticError, LookupError)
@@ -559,7 +557,6 @@ def _tokens(text: str) -> Iterator[str]:
 
 def _picture_difference(actual: bytes, expected: bytes) -> str:
     """Compare the pixels of two pictures, since compression depends on the library."""
-    import numpy as np
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -701,8 +698,6 @@ def _body_difference(body: MeshBody, expected: MeshBody) -> str:
 
 
 def _unsound(surface: Surface) -> str:
-    import numpy as np
-
     points, faces = surface.points, surface.faces
     if not len(points) or not len(faces):
         return "it is empty"
@@ -714,8 +709,6 @@ def _unsound(surface: Surface) -> str:
 
 
 def _area(surface: Surface) -> float:
-    import numpy as np
-
     a, b, c = (surface.points[surface.faces[:, corner]] for corner in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
@@ -724,7 +717,6 @@ def _unmatched_point(
     points: NDArray[np.float64], reference: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     """Return a point farther than POINT_TOLERANCE from all reference points, or None."""
-    import numpy as np
 
     def cells(of: NDArray[np.float64], shift: NDArray[np.float64]) -> NDArray[np.int64]:
         return np.floor(of / (4 * POINT_TOLERANCE) + shift).astype(np.int64)
@@ -743,7 +735,6 @@ def _unmatched_point(
 
 
 def _stl(path: Path) -> list[MeshBody]:
-    import numpy as np
     from trimesh.exchange.stl import load_stl_binary
 
     with path.open("rb") as file:
@@ -758,8 +749,6 @@ def _stl(path: Path) -> list[MeshBody]:
 
 
 def _3mf(path: Path) -> list[MeshBody]:
-    import numpy as np
-
     with ZipFile(path) as archive:
         if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
             raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
@@ -772,7 +761,6 @@ def _3mf(path: Path) -> list[MeshBody]:
 
 
 def _glb(path: Path) -> list[MeshBody]:
-    import numpy as np
     import trimesh
 
     scene = trimesh.load_scene(path, process=False)

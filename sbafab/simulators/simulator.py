@@ -13,17 +13,16 @@ from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, cast
+from typing import Literal, NamedTuple, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Vector
 from sbafab.process import Progress
 from sbafab.simulators.coarse.rounds import pocket_radii, why_not_round
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
@@ -394,8 +393,6 @@ def overlap(
     on each other when flat are looked at one on the next, along the normal of their films, each
     for its share of the flat film.
     """
-    import numpy as np
-
     a, b, c = flat[triangles].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)[:, 2]
     turned = np.where((across < 0)[:, None], triangles[:, ::-1], triangles)

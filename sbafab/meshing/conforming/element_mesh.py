@@ -5,12 +5,12 @@ Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import OutputError
 from sbafab.meshing.conforming.crossing import check_apart
@@ -28,11 +28,6 @@ from sbafab.meshing.conforming.mesh import (
 from sbafab.meshing.conforming.plane import Plane
 from sbafab.meshing.conforming.round_tube import round_tube
 from sbafab.meshing.surface import Surface
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 # The sweep: nodes and prisms of every film.
 

@@ -12,9 +12,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.geometry.edges import Arc, Point
@@ -25,10 +26,6 @@ from sbafab.meshing.conforming.mesh import integrals
 from sbafab.meshing.conforming.plane import MISSING, Plane
 from sbafab.models.lens import fullest as fullest_slot
 from sbafab.models.parabola import fullest
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 # The lift of one film: Poisson's equation on the triangles of a pocket.
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.edges import Point, unit
@@ -15,9 +16,6 @@ from sbafab.geometry.region import Region, disc, polygon
 from sbafab.laminate.laminate import Chamber, Interface, Laminate, Layer
 from sbafab.meshing.conforming.plane import Plane, triangulation
 from sbafab.meshing.solid import body_bond, cavity_slabs, parted
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Element = Literal["wedge", "tet"]
 Symmetry = Literal["full", "half", "quarter", "sector"]
@@ -65,8 +63,6 @@ class Sector(NamedTuple):
 
     def on_planes(self, points: NDArray[np.float64]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         """Yield each plane's name and a mask of the points (n, 2) on it."""
-        import numpy as np
-
         for name, (x, y) in self.planes:
             across = np.abs(points[:, 1] * x - points[:, 0] * y) < ON_PLANE
             if name.startswith("symmetry_sector"):
@@ -450,8 +446,6 @@ def _void(
 
 def _check_apart(plane: Plane, ply: Ply) -> None:
     """Raises OutputError where two parts of a bond meet in a single point."""
-    import numpy as np
-
     triangles = plane.triangles[ply.bonded]
     middles, times = np.unique(triangles[:, 3:], return_counts=True)
     edge = np.isin(triangles[:, 3:], middles[times == 1])
@@ -492,8 +486,6 @@ def flat(layup: Layup) -> list[FormedFilm]:
 
 def level(layup: Layup, z: float) -> FormedFilm:
     """A film flat at one height in mm."""
-    import numpy as np
-
     plane = layup.plane.points
     up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), (len(plane), 3))
     return FormedFilm(np.column_stack([plane, np.full(len(plane), z)]), up)

@@ -10,14 +10,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.errors import DesignError
 from sbafab.meshing.surface import Surface
 
 if TYPE_CHECKING:
     import meshio
-    import numpy as np
     import pyvista
-    from numpy.typing import NDArray
 
 ElementKind = Literal["wedge15", "tetra10", "triangle6"]
 
@@ -85,8 +86,6 @@ def _monomials(kind: ElementKind) -> tuple[tuple[int, ...], ...]:
 @cache
 def _slopes(kind: ElementKind, integration: bool) -> NDArray[np.float64]:
     """Derivatives (places, nodes, dimensions) of the shape functions, at nodes or Gauss points."""
-    import numpy as np
-
     corners = np.array(_REFERENCE[kind], dtype=float)
     nodes = np.vstack([corners, [(corners[a] + corners[b]) / 2 for a, b in EDGES[kind]]])
     powers = np.array(_monomials(kind))
@@ -111,8 +110,6 @@ def jacobians(
 
     Places are the element's nodes, or its integration points.
     """
-    import numpy as np
-
     matrices: NDArray[np.float64] = np.einsum(
         "cni,pnj->cpij", points[cells], _slopes(kind, integration), optimize=True
     )
@@ -127,8 +124,6 @@ def scaled_jacobians(
     Determinant over the product of the lengths of its columns: 1 where edges are at right
     angles, 0.87 in an equilateral triangle, negative where the element is inverted.
     """
-    import numpy as np
-
     least = np.full(len(cells), np.inf)
     for integration in (False, True):
         matrices = jacobians(kind, points, cells, integration)
@@ -142,8 +137,6 @@ def volumes(
     kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Volume of each cell in mm3, or area in mm2 of triangles."""
-    import numpy as np
-
     determinants = _determinant(jacobians(kind, points, cells, integration=True))
     sizes: NDArray[np.float64] = np.sum(determinants, axis=1) * _GAUSS[kind][0]
     return sizes
@@ -153,8 +146,6 @@ def aspects(
     kind: ElementKind, points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """Longest edge over shortest of each cell, between its corners."""
-    import numpy as np
-
     lengths = np.stack(
         [np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in EDGES[kind]]
     )
@@ -163,8 +154,6 @@ def aspects(
 
 
 def _determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    import numpy as np
-
     m = matrices
     if m.shape[-2:] == (2, 2):
         flat: NDArray[np.float64] = m[..., 0, 0] * m[..., 1, 1] - m[..., 0, 1] * m[..., 1, 0]
@@ -185,8 +174,6 @@ def integrals(
     points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Stiffness (cells, 6, 6) and load (cells, 6) of Poisson's equation on plane triangles."""
-    import numpy as np
-
     matrices = jacobians("triangle6", points, cells, integration=True)
     sizes = _determinant(matrices) * _GAUSS["triangle6"][0]
     inverse = np.linalg.inv(matrices)
@@ -200,8 +187,6 @@ def integrals(
 
 def _values() -> NDArray[np.float64]:
     """Shape functions (places, 6) of the triangle at its integration points."""
-    import numpy as np
-
     r, s = np.array(_GAUSS["triangle6"][1]).T
     q = 1 - r - s
     corners = [q * (2 * q - 1), r * (2 * r - 1), s * (2 * s - 1)]
@@ -229,8 +214,6 @@ def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray
     ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts below
     the smaller number of two, so that neighbours agree.
     """
-    import numpy as np
-
     side = np.array(SIDE)
     ranked = np.argsort(corners, axis=1)
     is_even = (ranked[:, 1] - ranked[:, 0]) % 3 == 1
@@ -255,8 +238,6 @@ def split_wedges(corners: NDArray[np.int64]) -> NDArray[np.int64]:
 
     Which way a side is cut hangs on the lower nodes' numbers, so that neighbours agree.
     """
-    import numpy as np
-
     prisms = np.repeat(corners, 3, axis=1)
     prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
     return tetrahedra(prisms, corners[:, :3])[:, :4]
@@ -304,8 +285,6 @@ class Mesh:
 
     def cavity(self, name: str) -> tuple[Surface, NDArray[np.int64]]:
         """A cavity as a surface of its own, and the mesh's node of each of its points."""
-        import numpy as np
-
         nodes, faces = np.unique(self.cavities[name], return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
 
@@ -319,8 +298,6 @@ class Mesh:
 
     def cell_fields(self) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
         """Return ``part``, each cell's part from 1, and the face sets as 0 or 1 a cell."""
-        import numpy as np
-
         part = np.zeros(len(self.cells), dtype=np.int32)
         for number, cells in enumerate(self.parts.values(), start=1):
             part[cells] = number
@@ -373,8 +350,6 @@ class Mesh:
 
         Wedges become three tetrahedra each.
         """
-        import numpy as np
-
         count = CORNERS[self.kind]
         corners = self.cells[:, :count]
         owner = np.arange(len(corners))
@@ -386,8 +361,6 @@ class Mesh:
 
 
 def _marked(count: int, indices: NDArray[np.int64]) -> NDArray[np.uint8]:
-    import numpy as np
-
     marks = np.zeros(count, dtype=np.uint8)
     marks[indices] = 1
     return marks

@@ -6,9 +6,10 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
@@ -24,9 +25,6 @@ from sbafab.meshing.conforming.layup import FormedFilm, Layup, MeshSettings, Sym
 from sbafab.meshing.conforming.mesh import Mesh, aspects, jacobians, scaled_jacobians, volumes
 from sbafab.meshing.formats.registry import CONFORMING_ENDINGS, MESH_FORMATS
 from sbafab.meshing.mesh_files import MeshFile, MeshKind
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 HEIGHTS = {
     False: "Films lie on each other: heights are sums of the TPE films, without the masks.",

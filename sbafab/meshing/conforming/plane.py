@@ -6,7 +6,10 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, OutputError
 from sbafab.geometry.arrangement import Arrangement, by_owner
@@ -14,10 +17,6 @@ from sbafab.geometry.boolean import arranged
 from sbafab.geometry.edges import Arc, Edge, Point, edge_from_bulge
 from sbafab.geometry.region import Region
 from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 # The plane cut up by the edges of several regions, arcs as arcs.
 
@@ -167,7 +166,6 @@ def narrows(borders: Sequence[Border], h: float) -> list[float]:
     Straight out from each edge on both sides, the next edge that does not start or end where
     this one does must be two triangles away; tight arcs have sides of half a radian.
     """
-    import numpy as np
     import shapely
 
     tails, heads, owner = _chords(borders, h / 2)
@@ -199,8 +197,6 @@ def _chords(
     borders: Sequence[Border], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
     """The edges as chords of at most ``step`` mm: tails, heads, and the edge of each."""
-    import numpy as np
-
     tails, heads, owner = [], [], []
     for number, border in enumerate(borders):
         edge = border.edge
@@ -213,8 +209,6 @@ def _chords(
 
 
 def _end_numbers(borders: Sequence[Border]) -> NDArray[np.int64]:
-    import numpy as np
-
     numbers: dict[tuple[float, float], int] = {}
     rows = [
         [numbers.setdefault(end, len(numbers)) for end in (border.edge.start, border.edge.end)]
@@ -230,8 +224,6 @@ def _ray_lengths(
     heads: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Distance in mm from each origin along its normal, to either side, to its chord."""
-    import numpy as np
-
     a, b = tails - origins, heads - origins
     side_a = a[:, 0] * normals[:, 1] - a[:, 1] * normals[:, 0]
     side_b = b[:, 0] * normals[:, 1] - b[:, 1] * normals[:, 0]
@@ -278,8 +270,6 @@ def triangulation(regions: Sequence[Region], h: float) -> Plane:
     Triangles are smaller where edges run nearer to each other. Deterministic. Raises DesignError
     where Netgen is not installed, OutputError where it cannot mesh a cell.
     """
-    import numpy as np
-
     borders = arrangement(regions, h)
     labels, points, triangles, cells, sides = _netgen(borders, h)
     points, triangles, cells = _crossings_halved(points, triangles, cells, sides)
@@ -300,8 +290,6 @@ def _netgen(
     NDArray[np.int64],
 ]:
     """Labels of cells, points, triangles, each one's cell, and (start, end, border) of sides."""
-    import numpy as np
-
     try:
         from netgen.geom2d import SplineGeometry
         from netgen.meshing import MeshingParameters, SetMessageImportance
@@ -363,8 +351,6 @@ def _crossings_halved(
 
     Two films bonded at both ends of such an edge, but not along it, would share it otherwise.
     """
-    import numpy as np
-
     on_border = np.zeros(len(points), dtype=bool)
     on_border[sides[:, :2]] = True
     edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2))
@@ -399,8 +385,6 @@ def _sharp_corners(
     points: NDArray[np.float64], triangles: NDArray[np.int64], sides: NDArray[np.int64]
 ) -> set[tuple[int, int]]:
     """Edges across from a corner between two borders that is too sharp to halve."""
-    import numpy as np
-
     size = len(points)
     border_edges = np.sort(sides[:, :2])
     keys = border_edges[:, 0] * size + border_edges[:, 1]
@@ -431,8 +415,6 @@ def _second_order(
     borders: Sequence[Border],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangles with mid-edge nodes, and the mid-edge points: on the arc where an edge is one."""
-    import numpy as np
-
     count = len(points)
     heads = np.roll(corners, -1, axis=1)
     keys = np.minimum(corners, heads) * count + np.maximum(corners, heads)
@@ -452,8 +434,6 @@ def _second_order(
 
 def _straightened(plane: Plane) -> Plane:
     """The plane with chords for arcs round every triangle that a curved side would fold."""
-    import numpy as np
-
     points = plane.points.copy()
     nodes = plane.triangles
     for _ in range(4):

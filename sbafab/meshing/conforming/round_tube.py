@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.meshing.conforming.layup import FormedFilm, Layup, Ply, bodies
 from sbafab.meshing.wrap import TubeWrap, tube_wrap
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 SLACK = 1e-3
 """mm by which a film may seem to lie in the sheet, or past the middle between two balloons."""

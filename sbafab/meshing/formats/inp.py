@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.meshing.conforming.mesh import ElementKind, Mesh
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 TYPES: dict[ElementKind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "STRI65"}
 """Abaqus's names, which meshio knows too; CalculiX has the same but for STRI65, its S6."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.meshing.conforming.mesh import FACES, Mesh
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 NODE = "%d %.12g %.12g %.12g\n"
 POINT, TRIANGLE6, SQUARE8 = 15, 9, 16
@@ -73,8 +72,6 @@ def _elements(block: Block, first: int) -> str:
 
 
 def _walls(mesh: Mesh, faces: NDArray[np.int64], group: int) -> list[Block]:
-    import numpy as np
-
     kinds: dict[int, list[NDArray[np.int64]]] = {}
     for number, local in enumerate(FACES[mesh.kind]):
         nodes = mesh.cells[faces[faces[:, 1] == number, 0]][:, list(local)]

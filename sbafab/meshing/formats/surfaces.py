@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from sbafab.meshing.surface import Surface
 
 LinearRGB = tuple[float, float, float]
@@ -47,7 +49,6 @@ def write_glb(surface: Surface, path: Path, material: str = "TPE") -> None:
 
 def write_scene(nodes: Sequence[Node], path: Path) -> None:
     """Write GLB at true size, a node for each body: coordinates in mm, scaled by the node."""
-    import numpy as np
     from trimesh import Scene
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial

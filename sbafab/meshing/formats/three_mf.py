@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.meshing.surface import Surface
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -68,8 +66,6 @@ def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
 
 def _worded(numbers: NDArray[np.float64]) -> NDArray[np.bytes_]:
     """Each number with six decimals."""
-    import numpy as np
-
     # By their bits, which tell -0 from 0 as the words do.
     bits, place = np.unique(np.ascontiguousarray(numbers).view(np.int64), return_inverse=True)
     words: NDArray[np.bytes_] = np.array([b"%.6f" % n for n in bits.view(np.float64).tolist()])
@@ -78,8 +74,6 @@ def _worded(numbers: NDArray[np.float64]) -> NDArray[np.bytes_]:
 
 def _counted(count: int) -> NDArray[np.bytes_]:
     """The whole numbers from 0 on, ``count`` of them, NUL for zeros in front."""
-    import numpy as np
-
     width = len(str(count))
     digits = np.arange(count)[:, None] // 10 ** np.arange(width - 1, -1, -1)
     signs = (digits % 10 + ord("0")).astype(np.uint8)
@@ -90,8 +84,6 @@ def _counted(count: int) -> NDArray[np.bytes_]:
 
 def _rows(form: bytes, columns: Sequence[NDArray[np.bytes_]]) -> bytes:
     """The form once a row, its places filled with the words of the columns."""
-    import numpy as np
-
     first, *rest = (np.asarray(part) for part in form.split(b"%s"))
     fields = [first, *chain.from_iterable(zip(columns, rest, strict=True))]
     kinds = [(str(number), field.dtype) for number, field in enumerate(fields)]

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sbafab.meshing.conforming.mesh import VTK_TYPES, Mesh
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     Field = NDArray[np.float64] | NDArray[np.int64] | NDArray[np.int32] | NDArray[np.uint8]
 
 TYPE_NAMES = {"f8": "Float64", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
@@ -49,8 +49,6 @@ def write_fields(
     notes: Sequence[str] = (),
 ) -> None:
     """Write points, cells of one kind, and a field (n,) or (n, k) of points or cells by name."""
-    import numpy as np
-
     count, size = cells.shape
     lines = [
         '<?xml version="1.0"?>',
@@ -76,8 +74,6 @@ def write_fields(
 
 def _array(name: str, values: Field) -> str:
     """Return a data array in one compressed block."""
-    import numpy as np
-
     content = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     packed = zlib.compress(content, FAST)
     header = np.array([1, len(content), len(content), len(packed)], dtype="<u8").tobytes()

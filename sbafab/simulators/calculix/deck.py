@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError
 from sbafab.laminate.films import PAPER_TPE, Film, density_of, in_order
@@ -22,9 +23,6 @@ from sbafab.simulators.simulator import (
     SimulationRequest,
     chamber_pressures,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Procedure = Literal["dynamic", "static"]
 

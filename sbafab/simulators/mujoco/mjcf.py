@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sbafab.errors import DesignError
 from sbafab.models.derivatives import Linearised, linearised
+from sbafab.models.film_elements import Array
 from sbafab.models.joint_chain import (
     JOINTS,
     axis_of,
@@ -20,11 +21,8 @@ from sbafab.models.joint_chain import (
     numbers,
     plate_mass,
 )
+from sbafab.models.stack import Pose, Stack
 from sbafab.models.stack_loads import plate_chain
-
-if TYPE_CHECKING:
-    from sbafab.models.film_elements import Array
-    from sbafab.models.stack import Pose, Stack
 
 ACCURACY = 0.02
 """Largest error of the tip's place, as a share of the stack's length."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sbafab.errors import OutputError, VoidError
 from sbafab.laminate.laminate import Laminate
 from sbafab.process import Progress
@@ -153,8 +155,6 @@ class _Inflation:
     """The model's state, and the cavities that the pressures act on."""
 
     def __init__(self, mujoco: Any, model: Any, told: Mapping[str, Any]) -> None:
-        import numpy as np
-
         self.mujoco, self.model, self.told = mujoco, model, told
         self.data = mujoco.MjData(model)
         key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, told["start"])
@@ -170,8 +170,6 @@ class _Inflation:
 
     def step(self) -> None:
         """One time step under the pressures of this time, which follow the films."""
-        import numpy as np
-
         share = self._share(self.data.time + self.model.opt.timestep)
         forces = np.zeros_like(self.nodes)
         for name, triangles in self.cavities.items():
@@ -185,8 +183,6 @@ class _Inflation:
 
     def trouble(self, warnings: list[str]) -> str | None:
         """Why the state cannot be believed."""
-        import numpy as np
-
         if warnings:
             return f'MuJoCo says "{" ".join(warnings[0].split())[:200]}"'
         if any(warning.number for warning in self.data.warning):
@@ -211,8 +207,6 @@ class _Inflation:
         return State(time, pressures, height, (x, y, z), tilt_of(rim), self._volumes())
 
     def _volumes(self) -> dict[str, float]:
-        import numpy as np
-
         volumes = {}
         for name, triangles in self.cavities.items():
             a, b, c = self.nodes[triangles].transpose(1, 0, 2)
@@ -221,8 +215,6 @@ class _Inflation:
 
     def overlap(self) -> float:
         """The volume in ul in which films have passed through each other."""
-        import numpy as np
-
         model, films = self.model, []
         for flex in range(model.nflex):
             nodes = model.flex_vertbodyid[model.flex_vertadr[flex] :] - 1

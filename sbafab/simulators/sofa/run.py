@@ -9,9 +9,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.errors import DesignError, VoidError
 from sbafab.laminate.laminate import Laminate
@@ -48,9 +49,6 @@ from sbafab.simulators.sofa.scenes import (
     why_no_scene,
     write_scenes,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Scene = Literal["shell", "frames", "volume", "beam"]
 

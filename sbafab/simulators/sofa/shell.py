@@ -8,7 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sbafab.laminate.films import density_of
 from sbafab.laminate.laminate import Laminate
@@ -29,10 +32,6 @@ from sbafab.simulators.coarse.shell import (
     holding,
     nearly_flat,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 Reading = Literal["tip", "crowns"]
 """What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""
@@ -200,8 +199,6 @@ def _vectors(points: NDArray[np.float64]) -> tuple[Vector, ...]:
 
 def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The new number of each node, -1 for those between corners; and the triangles' corners."""
-    import numpy as np
-
     number = np.full(len(mesh.points), -1)
     used = np.unique(mesh.cells[:, :3])
     number[used] = np.arange(len(used))
@@ -210,8 +207,6 @@ def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def _walls(faces: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[Triangle, ...]:
     """A cavity's walls, normals out of the air."""
-    import numpy as np
-
     # Face 0 of a triangle looks down, face 1 up, each into the air that touches it.
     walls = corners[faces[:, 0]]
     return _rows(np.where(faces[:, 1:] == 0, walls, walls[:, ::-1]))
@@ -219,8 +214,6 @@ def _walls(faces: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[Triang
 
 def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
     """Return the properties of each cell, a row each: its films, one on the other, bonded."""
-    import numpy as np
-
     properties = np.zeros((len(mesh.cells), 5))
     thickness = np.zeros(len(mesh.cells))
     properties[:, LOWEST] = -1
@@ -243,8 +236,6 @@ def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
 
 
 def _membranes(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
-    import numpy as np
-
     kinds, kind = np.unique(cells[:, [STRETCH, RATIO]], axis=0, return_inverse=True)
     kind = kind.ravel()
     return tuple(
@@ -259,8 +250,6 @@ def _bending(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[Fi
     What begins with the same film lies side by side; films apart go together where they share
     no node.
     """
-    import numpy as np
-
     bins: list[tuple[float, set[int], list[NDArray[np.int64]]]] = []
     kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
     kind = kind.ravel()
@@ -282,8 +271,6 @@ def _bending(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[Fi
 
 def _marks(stack: Layup, mesh: Mesh, number: NDArray[np.int64]) -> tuple[int, ...]:
     """Nodes of the highest film: the axes of three stacks or more, or four round its middle."""
-    import numpy as np
-
     top = mesh.node_sets["tip"]
     top = top[number[top] >= 0]
     places = mesh.points[top][:, :2]
