@@ -1,1 +1,1 @@
-"""Designs of drawn layers from what others wrote: drawings, folders, laminates, circuits."""
+"""Import designs of drawn layers from drawings, folders, laminates and circuits."""

@@ -1,6 +1,6 @@
-"""Laminates as designs of drawn layers: from an output folder, or from a ``laminate.json`` alone.
+"""Import laminates as designs of drawn layers, from an output folder or a ``laminate.json``.
 
-Shapes are patterns of the ``laminate.json``, which lies beside the design, so that no edge changes.
+Shapes refer to patterns of the ``laminate.json`` beside the design, so no edge changes.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from sbafab.laminate.laminate import Chamber, Inlet, Laminate
 
 DESIGN = "design.toml"
 OF_A_RUN = ("must not be built; failed:", "waived:", "limits lowered:")
-"""Notes that a run adds by its findings, and adds again."""
+"""Notes that come from a run's findings; a new run adds them again."""
 NO_GLUE = "not stated"
 OF_FAMILIES = frozenset({"chamber", "stack"})
 """Sections that families extend, or that drawn layers do not have."""
 
 
 def import_folder(folder: Path) -> Imported:
-    """Return the design of drawn layers that an output folder's ``laminate.json`` holds.
+    """Return the design of drawn layers for an output folder with a ``laminate.json``.
 
-    Films, press, laser, rules and the other sections that all families share are those of its
+    Films, press, laser, rules and the other sections common to all families come from its
     ``design.toml``. Raises DesignError.
     """
     data = read_toml(folder / DESIGN)
@@ -73,9 +73,9 @@ def import_folder(folder: Path) -> Imported:
 
 
 def import_laminate(path: Path) -> Imported:
-    """Return the design of drawn layers that a ``laminate.json`` holds. Raises DesignError.
+    """Return the design of drawn layers for a ``laminate.json``. Raises DesignError.
 
-    What it does not say, of press, laser, rules and sheets, has its defaults.
+    Press, laser, rules and sheets are not in the file and keep their defaults.
     """
     laminate = read_laminate(path)
     remarks: list[str] = []
@@ -86,7 +86,7 @@ def import_laminate(path: Path) -> Imported:
         raise DesignError(f"{path.name} holds a film that no design takes: {error}") from None
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
         if stock[names[film.material]].shade != film.shade:
-            # Films that no layer is cut from count for the colours of the others.
+            # Films of no layer still count when the other films get their colours.
             remarks.append(f"film {film.material}: has another colour in pictures")
     tables: dict[str, Any] = {"name": file_name(laminate.name), "family": DRAWN, "kit": "paper"}
     if films:
@@ -122,7 +122,7 @@ def _beside(folder: Path) -> Path:
 
 
 def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
-    """The sections that every family has, as far as they differ from the kit and the defaults."""
+    """Sections common to all families, where they differ from the kit and the defaults."""
     rest = without_kit(plain_tables(design), design)
     shared = {
         key: rest[key]
@@ -130,7 +130,7 @@ def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
         if key in rest and key not in OF_FAMILIES and rest[key] != {}
     }
     if "films" in shared:
-        # Another product has none of the defaults, so that its table is whole.
+        # Another product does not share the defaults, so its table is written in full.
         shared["films"] = {name: plain_tables(design)["films"][name] for name in shared["films"]}
     if "inlet" in shared:
         shared["inlet"] = {k: v for k, v in shared["inlet"].items() if k in Inlets.model_fields}
@@ -145,7 +145,7 @@ def _drawn(
     drawings: dict[str, bytes],
     remarks: list[str],
 ) -> Imported:
-    """The laminate in the keys of drawn layers, on ``tables`` for all else."""
+    """Add the laminate, as keys of drawn layers, to ``tables``."""
     shapes = {pattern.lower(): {"file": FILE, "layer": pattern} for pattern in laminate.patterns}
     design = dict(tables)
     registration = dict(design.pop("registration", {}))
@@ -252,7 +252,7 @@ def _corners(chain: Sequence[Edge]) -> list[list[float]]:
 
 
 def angle_of(direction: Point) -> float:
-    """Return the angle in degrees from x of which a unit vector is made, to the last bit."""
+    """Return the angle in degrees from x of a unit vector, reproducing it to the last bit."""
     plain = math.degrees(math.atan2(direction[1], direction[0]))
     candidates = [round(plain, 9), plain]
     low = high = plain
@@ -267,7 +267,7 @@ def angle_of(direction: Point) -> float:
 
 
 def _pitch(laminate: Laminate) -> float:
-    """Distance between stacks along the sheet, or round the whole tube for one."""
+    """Distance between stacks along the sheet, or around the whole tube for a single stack."""
     centres = sorted(centre for chamber in laminate.chambers for centre in chamber.centres)
     if len(centres) > 1:
         return centres[1][0] - centres[0][0]
@@ -324,7 +324,7 @@ def _bond_table(bond: FaceBond) -> dict[str, Any]:
 
 
 def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:
-    """The film of each role's first layer, where it is not the usual one."""
+    """The film of each role's first layer, unless it is the usual one."""
     layup: dict[str, str] = {}
     for layer in laminate.layers:
         layup.setdefault(layer.role.replace("-", "_"), names[layer.film.material])

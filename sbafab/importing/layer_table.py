@@ -1,6 +1,6 @@
-"""A folder of drawings with a table of layers, and one of chambers, as a design.
+"""Import a folder of drawings with a table of layers and a table of chambers.
 
-``layers.csv`` has a row a layer, bottom to top; ``chambers.csv`` a row a pocket's centre.
+``layers.csv`` has one row per layer, bottom to top; ``chambers.csv`` one row per pocket centre.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ MOST_BYTES = 1_000_000
 
 
 class CsvRow(NamedTuple):
-    """A row of a table: its line in the file, and its cells by column, without empty ones."""
+    """A table row: its line in the file, and its non-empty cells by column."""
 
     place: str
     cells: Mapping[str, str]
@@ -56,11 +56,11 @@ class CsvRow(NamedTuple):
 
 
 def import_table(folder: Path) -> Imported:
-    """Return the design of a folder of DXF or SVG files and its tables. Raises DesignError.
+    """Return the design for a folder of DXF or SVG files and its tables. Raises DesignError.
 
-    A layer of polygons of foldable_robotics, by its number, is a drawing too, and so is one of a
-    popupCAD design, by "OPERATION/NUMBER". A ``kit.toml`` beside the tables gives films, press,
-    laser and limits.
+    A drawing may also be a layer of foldable_robotics polygons, by its number, or of a popupCAD
+    design, by "OPERATION/NUMBER". A ``kit.toml`` beside the tables gives films, press, laser and
+    limits.
     """
     rows = read_table(folder / LAYERS, LAYER_COLUMNS)
     shapes: dict[str, dict[str, Any]] = {}
@@ -102,7 +102,7 @@ def import_table(folder: Path) -> Imported:
 
 
 def read_table(path: Path, columns: Mapping[str, bool]) -> list[CsvRow]:
-    """Return the rows of a CSV file that has some of these columns.
+    """Return the rows of a CSV file; its columns are a subset of these.
 
     Separators are commas, semicolons or tabs. Raises DesignError with file, line and column.
     """
@@ -158,7 +158,7 @@ def _row(
 
 
 def _drawing(folder: Path, row: CsvRow) -> tuple[str, bytes, list[str]]:
-    """The name and content of a row's drawing, which must be one, and remarks on it."""
+    """The name and content of a row's only drawing, and remarks on it."""
     path, layer = folder / row.cells["file"], row.cells.get("layer", "")
     suffix = path.suffix.lower()
     if suffix not in (*DRAWINGS, *SUFFIXES, SUFFIX):
@@ -198,7 +198,7 @@ def _layer(row: CsvRow, shape: str) -> dict[str, Any]:
 
 
 def _chambers(path: Path) -> list[dict[str, Any]]:
-    """The chambers of a table: further rows of a name are further centres."""
+    """The chambers of a table; rows with the same name add centres to one chamber."""
     chambers: dict[str, dict[str, Any]] = {}
     for row in read_table(path, CHAMBER_COLUMNS):
         name, cells = row.cells["name"], row.cells

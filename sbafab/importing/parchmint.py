@@ -1,8 +1,8 @@
 """Circuits in ParchMint JSON (3DuF, Neptune) as designs of drawn layers, with their nets.
 
-Every layer of a circuit becomes a mask between two films: its channels, and its components as they
-are outlined. Ports of the circuit are holes in the outer films; what the circuit connects is a net.
-Lengths of the file are um, y runs down, and a component's place is its upper left corner.
+Each layer of a circuit becomes a mask between two films, with its channels and the outlines of its
+components. The circuit's ports are holes in the outer films; its connections are nets. In the file
+lengths are in um, y points down, and a component's position is its upper left corner.
 """
 
 from __future__ import annotations
@@ -27,21 +27,22 @@ from sbafab.importing.records import Imported, file_name, key_name, named, not_j
 from sbafab.laminate.netlist import NO_MASK, VIA, Spot, parchmint_labels, parchmint_nets
 
 MM = 0.001
-"""mm to a unit of the file."""
+"""mm per unit of the file."""
 MARGIN = 3.0
-"""Film past everything that is drawn, mm."""
+"""Film margin around everything drawn, mm."""
 OVERHANG = 0.5
-"""Mask past the hole of a port, mm, where its disc is that large."""
+"""Mask margin around a port's hole, mm, if its disc is that large."""
 LEAST_HOLE = 0.2
 MOST_BYTES = 20_000_000
 FARTHEST = 2_000_000.0
-"""No coordinate may be larger, um."""
+"""Largest coordinate, um."""
 UNPLACED = (-1, -1)
 PORT = "PORT"
 ROUND = {PORT: "portRadius", VIA: "radius", "VALVE3D": "valveRadius"}
-"""Components that are discs, and the parameter that is their radius."""
+"""Components that are discs, with the parameter that gives their radius."""
 PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
-"""Components whose outline is all that matters; of others the inside is not drawn."""
+"""Components whose outline is all that matters; for others a remark says the inside is not
+drawn."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class Circuit:
-    """A circuit as it is placed and routed; ``layers`` go bottom to top, by id."""
+    """A placed and routed circuit; ``layers`` go bottom to top, by id."""
 
     name: str
     layers: tuple[str, ...]
@@ -97,24 +98,24 @@ def import_parchmint(path: Path) -> Imported:
         raise DesignError(f"{path}: {error}") from None
 
 
-# Reading: every value is looked up with its place in the file.
+# Reading: each value is read together with its place in the file.
 
 
 class JsonPlace(NamedTuple):
-    """A value of the document, and its place there."""
+    """A value of the document and its place in it."""
 
     value: Any
     place: str
 
     def get(self, key: str) -> JsonPlace | None:
-        """Return the value of a key of an object, None if it is not there or null."""
+        """Return the value of a key of an object; None if it is missing or null."""
         if not isinstance(self.value, dict):
             raise DesignError(f"{self.place or 'the file'} is no object; export the circuit again")
         value = self.value.get(key)
         return None if value is None else JsonPlace(value, f"{self.place}.{key}".lstrip("."))
 
     def need(self, key: str) -> JsonPlace:
-        """Return the value of a key. Raises DesignError if it is not there."""
+        """Return the value of a key. Raises DesignError if it is missing."""
         node = self.get(key)
         if node is None:
             raise DesignError(f"{self.place or 'the file'} has no {key}; export the circuit again")
@@ -154,7 +155,7 @@ class JsonPlace(NamedTuple):
 
 
 def read_circuit(document: Any, stem: str) -> Circuit:
-    """Return the circuit of a document. Raises DesignError, which names the place in it."""
+    """Return the circuit of a document. Raises DesignError with the place in it."""
     root = JsonPlace(document, "")
     remarks: list[str] = []
     rows = [(row, _kind(row)) for row in root.need("layers").items()]
@@ -190,7 +191,9 @@ def read_circuit(document: Any, stem: str) -> Circuit:
 
 
 def _refuse_unplaced(root: JsonPlace, placed: Mapping[str, object]) -> None:
-    """Raises DesignError for a netlist alone: its components all lie on one spot, or nowhere."""
+    """Raises DesignError for a netlist without placement: all components at one point, or
+    nowhere.
+    """
     rows = [row for row in root.need("components").items() if row.need("id").text not in placed]
     params = [row.get("params") for row in rows]
     positions = {str(p and (at := p.get("position")) and at.value) for p in params}
@@ -218,7 +221,7 @@ def _title(row: JsonPlace) -> str:
 
 
 def _placed_features(root: JsonPlace) -> dict[str, tuple[Point, Point]]:
-    """Corner and span of components, um, where the circuit has them as features."""
+    """Corner and span of components, um, if the circuit has them as features."""
     features = root.get("features")
     placed = {}
     for row in features.items() if features is not None else ():
@@ -230,7 +233,7 @@ def _placed_features(root: JsonPlace) -> dict[str, tuple[Point, Point]]:
 
 
 def _routed_features(root: JsonPlace) -> dict[str, list[tuple[Point, Point, float]]]:
-    """Straight channels of connections, um, where the circuit has them as features."""
+    """Straight channels of connections, um, if the circuit has them as features."""
     features = root.get("features")
     routed: dict[str, list[tuple[Point, Point, float]]] = {}
     for row in features.items() if features is not None else ():
@@ -247,7 +250,7 @@ def _component(
     placed: Mapping[str, tuple[Point, Point]],
     remarks: list[str],
 ) -> Component | None:
-    """A component, or None for one that lies on no layer with channels."""
+    """A component, or None if it lies on no layer with channels."""
     name, entity = row.need("id").text, row.need("entity").text.upper()
     here = f"component {name} ({entity}, {row.place})"
     layers = tuple(layer.text for layer in row.need("layers").items())
@@ -343,7 +346,7 @@ def _connection(
 
 
 class _Frame(NamedTuple):
-    """Takes points of the file to mm, y upward, with the middle of all at (0, 0)."""
+    """Converts points of the file to mm, y upward, with the middle of the circuit at (0, 0)."""
 
     middle: Point
 
@@ -352,7 +355,7 @@ class _Frame(NamedTuple):
         return round(x, 6) + 0.0, round(y, 6) + 0.0
 
     def of_file(self, p: Point) -> Point:
-        """Return the point of the file, um, behind one in mm."""
+        """Return the point of the file, um, for a point in mm."""
         return self.middle[0] + p[0] / MM, self.middle[1] - p[1] / MM
 
 
@@ -413,7 +416,9 @@ def _design(circuit: Circuit) -> Imported:
 
 
 def _tube(circuit: Circuit, ports: Sequence[Mapping[str, Any]]) -> float | None:
-    """Outer diameter of a tube as wide as the widest port with a hole, mm; None without one."""
+    """Outer diameter of a tube as wide as the widest port with a hole, mm; None without such a
+    port.
+    """
     holes = {row["name"] for row in ports if row.get("kind") == "hole"}
     radii = [
         circuit.components[name].radius
@@ -428,7 +433,7 @@ def _film_role(number: int, top: int) -> str:
 
 
 def _middle(circuit: Circuit) -> Point:
-    """The middle of the box round all components and routes, um."""
+    """The middle of the bounding box of all components and routes, um."""
     points = [
         (component.corner[0] + share * component.span[0], component.corner[1] + share * span)
         for component in circuit.components.values()
@@ -456,7 +461,7 @@ def _mask(circuit: Circuit, layer: str, frame: _Frame) -> Region:
 
 
 def _refuse_touching(mask: Region, title: str, frame: _Frame) -> None:
-    """Raises DesignError where contours share a single point: nobody can say what it joins."""
+    """Raises DesignError if contours touch at a single point: whether they connect is ambiguous."""
     place = crossing(tuple(edge for contour in mask.contours for edge in contour.edges))
     if place is not None:
         x, y = frame.of_file(place)
@@ -492,7 +497,7 @@ def _ports(
     top: int,
     remarks: list[str],
 ) -> tuple[dict[int, list[Region]], list[dict[str, Any]]]:
-    """Holes by the film's number, and the ports: holes of tubes, and a place a component."""
+    """Holes by film number, and the ports: tube holes, and one place per component."""
     holes: dict[int, list[Region]] = {}
     rows = []
     for (layer, name), label in circuit.labels.items():
@@ -520,7 +525,7 @@ def _ports(
 
 
 def _refuse_without_holes(circuit: Circuit) -> NoReturn:
-    """Raises DesignError for a circuit that no tube can be joined to."""
+    """Raises DesignError if no tube can be joined to the circuit."""
     named_ports = [c.id for c in circuit.components.values() if c.entity == PORT]
     if not named_ports:
         raise DesignError("components holds no PORT, so no tube can be joined; add one")
@@ -537,5 +542,5 @@ def _refuse_without_holes(circuit: Circuit) -> NoReturn:
 
 
 def _hole(radius: float) -> float:
-    """Radius in mm of a hole that leaves one overhang of its mask's disc, where there is room."""
+    """Hole radius, mm, that leaves one overhang of its mask's disc if there is room."""
     return max(radius * MM - OVERHANG, min(LEAST_HOLE, radius * MM / 2))

@@ -1,7 +1,7 @@
-"""Layers of polygons that foldable_robotics saves.
+"""Read layers of polygons saved by foldable_robotics.
 
 A laminate of foldable_robotics is an object with ``layers``, bottom to top, each with ``geoms`` in
-well-known text (WKT), as JSON or YAML. It says nothing of films, roles or units: a table does.
+well-known text (WKT), as JSON or YAML. Films, roles and units come from a separate table.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 SUFFIXES = (".json", ".yaml", ".yml")
 MOST_BYTES = 20_000_000
 LAMINATE_TAGS = ("!Laminate", "!Layer")
-"""Tags that foldable_robotics gives its objects in YAML; what they mark are plain objects."""
+"""YAML tags of foldable_robotics' objects; they are read as plain objects."""
 
 
 def polygon_layer(path: Path, layer: str) -> Region:
-    """Return the polygons of a layer, counted from 1 at the bottom, at 1 mm a unit.
+    """Return the polygons of a layer, counted from 1 at the bottom, with 1 mm per unit.
 
-    Raises DesignError with the file, the layer and the geometry that cannot be read.
+    Raises DesignError with the file, the layer and the unreadable geometry.
     """
     layers = polygon_layers(path)
     if not layer.isdecimal() or not 1 <= int(layer) <= len(layers):
@@ -50,7 +50,7 @@ def polygon_layers(path: Path) -> list[list[str]]:
 
 
 def refuse_without_table(path: Path, table: str) -> DesignError:
-    """Return the error of a laminate of polygons that is imported without a table of its layers."""
+    """Return the error for a laminate of polygons imported without a table of its layers."""
     count = len(polygon_layers(path))
     return DesignError(
         f"{path} holds {count} layers of polygons and not what they are for; write {table} beside "
@@ -81,7 +81,7 @@ def _document(path: Path, text: str) -> Any:
         except (ValueError, RecursionError) as error:
             raise not_json(path, error) from None
     yaml = yaml_of(path)
-    # Objects of foldable_robotics are plain ones here, and no other is made.
+    # Objects of foldable_robotics are read as plain ones; no others are created.
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:
         loader.add_constructor(tag, lambda made, node: made.construct_mapping(node, deep=True))

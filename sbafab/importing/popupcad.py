@@ -1,10 +1,10 @@
-"""Layers of a popupCAD design (``.cad``): its operations carried out on exact profiles.
+"""Read layers of a popupCAD design (``.cad``) by running its operations on exact profiles.
 
 The file is YAML with tags of Python objects, lengths in mm: layers with material and thickness,
-sketches, operations that place sketches on layers and combine what earlier ones made, and other
-designs that are placed. Every object is read as a plain record; none is made, and no code is run.
-Circles stay circles, and offsets have true arcs where popupCAD lays chords. An operation that is
-not listed in ``OPERATIONS`` is refused by its number and name, and so is what rests on it.
+sketches, operations that place sketches on layers and combine earlier results, and placed
+subdesigns. Every object is read as a plain record; no object is created and no code is run. Circles
+stay circles, and offsets have true arcs where popupCAD uses chords. An operation that is not in
+``OPERATIONS`` is refused by its number and name, and so is every operation that depends on it.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from sbafab.importing.records import MOST_NAMED, read_text, yaml_of
 SUFFIX = ".cad"
 MOST_BYTES = 20_000_000
 FARTHEST = 100_000.0
-"""mm; no coordinate may be larger."""
+"""Largest coordinate, mm."""
 SAME = 1e-8
-"""mm within which popupCAD takes two points of a shape for one."""
+"""popupCAD merges two points of a shape within this distance, mm."""
 DEEPEST = 10
-"""Designs within designs."""
+"""Deepest nesting of designs within designs."""
 PYTHON = "tag:yaml.org,2002:python/"
 VERTICES = ("ShapeVertex", "DrawnPoint")
 OLD_UNIT = 1000.0
-"""Units to a mm of the first form of vertices."""
+"""Units per mm in the first form of vertices."""
 OLD_PLACES = ("_pos", "__pos", "_Vertex__pos")
 AREAS = frozenset({"GenericPoly", "GenericCircle", "GenericTwoPointRect"})
 LINES = frozenset({"GenericLine", "GenericPolyline"})
@@ -47,21 +47,21 @@ LINES = frozenset({"GenericLine", "GenericPolyline"})
 
 @dataclass(frozen=True, eq=False)
 class CadRecord:
-    """An object of the file: the last word of its class's name, and its attributes or items."""
+    """An object of the file: the last word of its class name, and its attributes or items."""
 
     kind: str
     values: dict[Any, Any] = field(default_factory=dict)
     items: list[Any] = field(default_factory=list)
 
     def need(self, key: str, place: str, kind: type | tuple[type, ...] = object) -> Any:
-        """Return an attribute of a type. Raises DesignError, which names the place."""
+        """Return an attribute of this type. Raises DesignError with the place."""
         value = self.values.get(key)
         if key not in self.values or not isinstance(value, kind):
             raise DesignError(f"{place} has no {key} that can be read; save the design again")
         return value
 
     def links(self, group: str, key: str, place: str) -> list[Any]:
-        """Return what an operation links under a key of a group; nothing where it has none."""
+        """Return the links of an operation under a key of a group; empty if it has none."""
         row = self.need(group, place, dict).get(key) or ()
         if not isinstance(row, list | tuple):
             raise DesignError(f"{place} has no list of {key} in {group}; save the design again")
@@ -69,7 +69,7 @@ class CadRecord:
 
 
 def _records(path: Path, text: str) -> Any:
-    """The document, with plain values and records alone. Raises DesignError."""
+    """The document, as plain values and records only. Raises DesignError."""
     yaml = yaml_of(path)
     loader: Any = type("Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
 
@@ -100,11 +100,11 @@ def _records(path: Path, text: str) -> Any:
         raise DesignError(f"{path} is no YAML of popupCAD: {line}; save it again") from None
 
 
-# Geometry of a layer: areas, and the lines and points that offsets make areas of.
+# Geometry of a layer: areas, and lines and points that offsets widen into areas.
 
 
 class Flat(NamedTuple):
-    """What lies on a layer; lines and points have no area until an offset widens them."""
+    """Geometry of a layer; lines and points have no area until an offset widens them."""
 
     region: Region = Region()
     lines: tuple[Line, ...] = ()
@@ -112,7 +112,7 @@ class Flat(NamedTuple):
 
 
 CadLayers = tuple[Flat, ...]
-"""What an operation makes, by layers from the bottom."""
+"""The result of an operation: its layers, from the bottom."""
 
 
 def _joined(flats: Iterable[Flat]) -> Flat:
@@ -123,7 +123,7 @@ def _joined(flats: Iterable[Flat]) -> Flat:
 
 
 def _combined(function: str, a: Flat, b: Flat, place: str) -> Flat:
-    """Two layers by a boolean function. Lines are cut at the other layer's edges."""
+    """Combine two layers with a boolean function. Lines are cut at the other layer's edges."""
     if function == "union":
         return _joined([a, b])
     if any(meeting_points(line, other) for line in a.lines for other in b.lines):
@@ -147,7 +147,7 @@ def _combined(function: str, a: Flat, b: Flat, place: str) -> Flat:
 
 
 def _cut(lines: Iterable[Line], region: Region, inside: bool) -> tuple[Line, ...]:
-    """The parts of lines that lie inside a region, or those outside."""
+    """The parts of lines inside a region, or outside it."""
     kept = []
     for line in lines:
         stops = {p for edge in region.edges for p in meeting_points(line, edge)}
@@ -164,7 +164,7 @@ def _sifted(points: Iterable[Point], region: Region, inside: bool) -> tuple[Poin
 
 
 def _offset(flat: Flat, distance: float) -> Flat:
-    """What lies within a distance, or further than that inside; lines have no inside."""
+    """Offset a layer outward, or inward if negative; lines have no inside."""
     grown = [grow(flat.region, distance)]
     if distance > 0:
         grown += [swept((line,), 2 * distance, True) for line in flat.lines]
@@ -184,7 +184,7 @@ def _number(value: Any, place: str) -> float:
 
 
 def _vertex(vertex: Any, place: str) -> Point:
-    """The place of a vertex, in any of the forms that popupCAD has saved."""
+    """The position of a vertex, in any of the forms that popupCAD has saved."""
     kind = vertex.kind if isinstance(vertex, CadRecord) else ""
     unit, pair = 1.0, None
     if kind.removesuffix("_1") in VERTICES and vertex.items:
@@ -199,7 +199,7 @@ def _vertex(vertex: Any, place: str) -> Point:
 
 
 def _points(vertices: Any, place: str) -> list[Point]:
-    """The places of vertices, without those that repeat the one before."""
+    """The positions of vertices, without consecutive repeats."""
     if not isinstance(vertices, list | tuple):
         raise DesignError(f"{place} has no list of vertices; save the design again")
     points: list[Point] = []
@@ -219,7 +219,7 @@ def _is_construction(shape: Any) -> bool:
 
 
 def _shape(shape: Any, place: str) -> Flat:
-    """A shape of a sketch. Raises DesignError for one that is not read, or crosses itself."""
+    """A shape of a sketch. Raises DesignError if it is not supported or crosses itself."""
     kind = shape.kind if isinstance(shape, CadRecord) else str(type(shape).__name__)
     if kind.startswith("DrawnPoint"):
         return Flat(points=(_vertex(shape, place),))
@@ -261,12 +261,12 @@ def _open(ring: Sequence[Point]) -> Sequence[Point]:
     return ring[:-1] if is_closed else ring
 
 
-# The design, and its operations one after another.
+# The design, with its operations in order.
 
 
 @dataclass(frozen=True)
 class CadLayer:
-    """A layer of a design: its material's name, and thickness in mm (None: not stated)."""
+    """A layer of a design: its material's name, and thickness in mm (None if not stated)."""
 
     material: str
     thickness: float | None
@@ -276,7 +276,7 @@ class CadLayer:
 class CadDesign:
     """A design: layers bottom to top, sketches and other designs by id, operations in order.
 
-    ``stacks`` are what operations have made, by index; ``remarks`` name what was read otherwise.
+    ``stacks`` are the results of operations, by index; ``remarks`` name what was interpreted.
     """
 
     place: str
@@ -315,11 +315,11 @@ class CadDesign:
         return [self.layer_numbers[link] for link in links]
 
     def linked_sketch(self, operation: CadRecord, key: str, place: str) -> list[tuple[str, Any]]:
-        """Return the shapes of the first sketch that an operation links under a key."""
+        """Return the shapes of the first sketch linked by an operation under a key."""
         return self.sketch(_first(operation.links("sketch_links", key, place)), place)
 
     def sketch(self, identity: Any, place: str) -> list[tuple[str, Any]]:
-        """Return the shapes of a sketch but for construction, each with its place."""
+        """Return the shapes of a sketch without construction lines, each with its place."""
         sketch = self.sketches.get(identity) if _is_id(identity) else None
         if not isinstance(sketch, CadRecord):
             raise DesignError(f"{place} takes a sketch that is not there; save the design again")
@@ -332,7 +332,7 @@ class CadDesign:
         ]
 
     def stack(self, index: int) -> CadLayers:
-        """Return what an operation makes. Raises DesignError at the first that is not read."""
+        """Return the result of an operation. Raises DesignError at the first unsupported one."""
         for number in sorted(self.needed(index) - self.stacks.keys()):
             operation, place = self.operations[number], self.named(number)
             if operation.kind not in OPERATIONS:
@@ -344,7 +344,7 @@ class CadDesign:
         return self.stacks[index]
 
     def needed(self, index: int) -> set[int]:
-        """Return the indices of an operation and of all that it rests on. Raises DesignError."""
+        """Return the indices of an operation and its dependencies. Raises DesignError."""
         needed = {index}
         for number in range(index, -1, -1):
             if number in needed:
@@ -352,7 +352,7 @@ class CadDesign:
         return needed
 
     def _parents(self, index: int) -> set[int]:
-        """The operations that one takes the layers of, which all stand before it."""
+        """The operations whose layers this one uses; all must come before it."""
         place = self.named(index)
         links = self.operations[index].values.get("operation_links")
         rows = links.values() if isinstance(links, dict) else ()
@@ -364,19 +364,19 @@ class CadDesign:
         return parents
 
     def parents(self, operation: CadRecord, key: str, place: str) -> list[CadLayers]:
-        """Return what the operations of a link have made."""
+        """Return the results of the operations of a link."""
         links = operation.links("operation_links", key, place)
         return [self.stacks[self.index_of(ref, place)] for ref in links]
 
     def parent(self, operation: CadRecord, place: str, key: str = "parent") -> CadLayers:
-        """Return what the operation that one changes has made. Raises DesignError."""
+        """Return the result of the operation that this one changes. Raises DesignError."""
         stacks = self.parents(operation, key, place)
         if not stacks:
             raise DesignError(f"{place} takes no operation; save the design again")
         return stacks[0]
 
     def spread(self, flats: Mapping[int, Flat]) -> CadLayers:
-        """Return a stack that is empty but on these layers."""
+        """Return a stack with these layers, all empty."""
         return tuple(flats.get(index, Flat()) for index in range(len(self.layers)))
 
 
@@ -429,7 +429,7 @@ def _layers(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
 
 
 def _values(operation: CadRecord, place: str) -> tuple[float, int]:
-    """A distance in mm, and the chords that popupCAD lays in a quarter of a circle."""
+    """A distance in mm, and popupCAD's number of chords per quarter circle."""
     values = [_number(v, place) for v in operation.need("values", place, (list, tuple))]
     if len(values) != 2:
         raise DesignError(f"{place} has {len(values)} values and not two; save the design again")
@@ -460,14 +460,14 @@ def _shifted(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
         stack = stack[::-1]
     shift = operation.need("shift", place, int)
     if operation.values.get("rotate"):
-        # A list from ``shift`` on and then from its beginning; more than its length moves nothing.
+        # Rotate a list by ``shift``; a shift beyond its length changes nothing.
         order = [*range(len(stack))]
         return design.spread(dict(zip(order[shift:] + order[:shift], stack, strict=False)))
     return _moved(design, stack, shift)
 
 
 def _moved(design: CadDesign, stack: CadLayers, shift: int) -> CadLayers:
-    """A stack moved up by so many layers, or down; what lies outside is dropped."""
+    """Move a stack up or down by a number of layers; layers that end up outside are dropped."""
     return design.spread({number + shift: flat for number, flat in enumerate(stack)})
 
 
@@ -500,7 +500,7 @@ def _placed(
     stack: CadLayers,
     source: Sequence[tuple[str, Any]],
 ) -> CadLayers:
-    """A stack laid from the first shape of a sketch onto each shape of another one."""
+    """Copy a stack from the first shape of a sketch to each shape of another one."""
     targets = design.linked_sketch(operation, "sketch_to", place)
     if not source:
         raise DesignError(f"{place} is laid from a sketch without a line; save the design again")
@@ -530,7 +530,7 @@ def _similar(
     place: str,
     stack: CadLayers,
 ) -> CadLayers:
-    """A stack moved, turned and scaled so that one line comes to lie on another."""
+    """Move, rotate and scale a stack so that one line maps to another."""
     ratio = math.dist(*second) / math.dist(*first)
     along, across = (
         _number(operation.values.get(f"scale{axis}"), place)
@@ -578,7 +578,7 @@ def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
 
 
 def _frozen(design: CadDesign, operation: CadRecord, place: str) -> CadLayers:
-    """What was saved of an operation when it was frozen."""
+    """The saved result of a frozen operation."""
     generic = operation.values.get("generic")
     geoms = generic.values.get("geoms") if isinstance(generic, CadRecord) else generic
     if not isinstance(geoms, dict):
@@ -605,7 +605,7 @@ OPERATIONS: Mapping[str, Callable[[CadDesign, CadRecord, str], CadLayers]] = {
     "TransformExternal": _placed_design,
     "Freeze": _frozen,
 }
-"""The operations that are read, by the names of their classes."""
+"""The supported operations, by class name."""
 
 
 def _design(root: Any, place: str, depth: int = 0) -> CadDesign:
@@ -636,7 +636,7 @@ def _layer(row: CadRecord) -> CadLayer:
     return CadLayer(str(row.values.get("name") or row.kind), thickness if is_number else None)
 
 
-# A layer of an operation, as a row of a table asks for it.
+# A layer of an operation, as a table row names it.
 
 
 @lru_cache(maxsize=4)
@@ -645,7 +645,7 @@ def _read(path: Path, text: str) -> CadDesign:
 
 
 def cad_design(path: Path) -> CadDesign:
-    """Return the design of a file, its operations not yet carried out. Raises DesignError."""
+    """Return the design of a file; its operations are not run yet. Raises DesignError."""
     return _read(path, read_text(path, MOST_BYTES))
 
 
@@ -698,7 +698,7 @@ def _operation(design: CadDesign, name: str, layer: str) -> int:
 
 
 def refuse_alone(path: Path, table: str) -> DesignError:
-    """Return the error of a design that is imported without a table of its layers."""
+    """Return the error for a design imported without a table of its layers."""
     design = cad_design(path)
     unread = [
         f"{index + 1} ({operation.kind})"

@@ -1,4 +1,4 @@
-"""What an import yields: the tables of a design file, and the drawings that lie beside it."""
+"""The result of an import: the tables of a design file, and the drawings beside it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from typing import Any
 from sbafab.errors import DesignError
 
 MOST_NAMED = 20
-"""Places of one kind that are named one by one."""
+"""At most this many places of one kind are named one by one."""
 
 
 @dataclass(frozen=True)
 class Imported:
     """A design of drawn layers as ``tables`` of its file, and the content of its ``drawings``.
 
-    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, place by place, what
-    was not carried over, and how what was not plain was read.
+    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, by place, what was not
+    carried over and how ambiguous input was read.
     """
 
     tables: Mapping[str, Any]
@@ -29,7 +29,7 @@ class Imported:
 
 
 def toml_text(tables: Mapping[str, Any], head: Iterable[str] = ()) -> str:
-    """Return a design file: single keys, lists of rows a line each, then tables."""
+    """Return a design file: single keys, lists with one row per line, then tables."""
     import tomli_w
 
     lines = [f"# {line}" for line in head]
@@ -57,7 +57,7 @@ def _inline(value: Any) -> str:
         return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, value)) + "]"
-    # A text in JSON without escapes beyond its own is one in TOML; so are numbers and truth values.
+    # A JSON string with only JSON's own escapes is a TOML string; so are numbers and booleans.
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -78,7 +78,9 @@ def file_name(text: str, fallback: str = "import") -> str:
 
 
 def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
-    """Return a text as a shape's or film's name that is not ``taken``: small letters, digits, -."""
+    """Return a text as a shape's or film's name, unique among ``taken``: small letters, digits,
+    -.
+    """
     stem = re.sub(r"[^a-z0-9-]+", "-", text.lower()).strip("-")[:24]
     if not stem or not stem[0].isalpha():
         stem = f"{fallback}{stem}"
@@ -91,7 +93,7 @@ def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
 
 
 def named(what: str, places: list[str]) -> list[str]:
-    """Return a remark for each of the places, the many in one."""
+    """Return a remark for each of the places, or one for all if they are many."""
     remarks = [f"{place}: {what}" for place in places[:MOST_NAMED]]
     if len(places) > MOST_NAMED:
         remarks.append(f"and {len(places) - MOST_NAMED} more places: {what}")
@@ -99,7 +101,9 @@ def named(what: str, places: list[str]) -> list[str]:
 
 
 def read_text(path: Path, most_bytes: int) -> str:
-    """Return the text of a file in UTF-8. Raises DesignError if it is none, or too large."""
+    """Return the text of a UTF-8 file. Raises DesignError for other encodings or too large a
+    file.
+    """
     try:
         size = path.stat().st_size
         text = path.read_text(encoding="utf-8-sig") if size <= most_bytes else ""
@@ -112,7 +116,7 @@ def read_text(path: Path, most_bytes: int) -> str:
 
 
 def yaml_of(path: Path) -> Any:
-    """Return PyYAML, for a file that needs it. Raises DesignError without the extra."""
+    """Return PyYAML. Raises DesignError if the extra is not installed."""
     try:
         import yaml
     except ImportError:

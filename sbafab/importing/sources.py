@@ -1,4 +1,4 @@
-"""The formats that are imported: by which sign a source is known, and what reads it."""
+"""The import formats: how a source is recognised, and which function reads it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sbafab.importing.records import Imported, not_json, read_text
 
 
 class SourceFormat(NamedTuple):
-    """A format: its name in messages, whether a source is of it, and what reads such a source."""
+    """A format: its name in messages, a test for sources, and a reader."""
 
     name: str
     matches: Callable[[Path], bool]
@@ -26,7 +26,7 @@ class SourceFormat(NamedTuple):
 
 
 def import_source(source: Path) -> tuple[str, Imported]:
-    """Return the format of a file or folder, and what it holds. Raises DesignError."""
+    """Return the format of a file or folder, and its content. Raises DesignError."""
     if not source.exists():
         raise DesignError(f"{source} does not exist; give a file or folder to import")
     for entry in FORMATS:
@@ -41,7 +41,7 @@ def import_source(source: Path) -> tuple[str, Imported]:
 
 
 def _refuse_broken_json(source: Path) -> None:
-    """Raises DesignError for a file that no program can read as JSON."""
+    """Raises DesignError if the file is not valid JSON."""
     try:
         json.loads(read_text(source, MOST_BYTES))
     except (json.JSONDecodeError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Writing an imported design and its drawings: all of it or nothing, and never over a file."""
+"""Write an imported design and its drawings: all or nothing, never over an existing file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from sbafab.importing.records import Imported, file_name, toml_text
 from sbafab.laminate.laminate import Laminate
 
 FOLDER = "-drawings"
-"""Ending of the folder beside a design that holds its drawings."""
+"""Suffix of the folder for drawings beside a design."""
 
 
 class Written(NamedTuple):
-    """An imported design on disk: its file, the record and the laminate that it makes."""
+    """An imported design on disk: its file, record and laminate."""
 
     file: Path
     design: Design
@@ -30,8 +30,8 @@ class Written(NamedTuple):
 def write_imported(imported: Imported, file: Path, source: str) -> Written:
     """Write a design file and the folder of its drawings beside it.
 
-    The design is read and its laminate is made before anything comes to lie there. Raises
-    DesignError where the design cannot be built, OutputError where a file is in the way.
+    The design is read and its laminate built before anything is written. Raises DesignError if the
+    design cannot be built, OutputError if a file already exists.
     """
     folder = file.with_name(f"{file.stem}{FOLDER}")
     for path in (file, folder) if imported.drawings else (file,):
@@ -68,7 +68,7 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
 
 
 def default_file(imported: Imported) -> Path:
-    """Return the design file in this folder that an import writes unless it is told another."""
+    """Return the default path of an imported design file in this folder."""
     return Path(f"{file_name(str(imported.tables['name']))}.toml")
 
 
@@ -77,14 +77,14 @@ def _built(file: Path) -> tuple[Design, Laminate]:
         design = load_design(file)
         return design, build(design)
     except DesignError as error:
-        # The folder that it names is gone when the message is read.
+        # The folder in the message is gone by the time it is read.
         raise DesignError(str(error).replace(f"{file.parent}/", "")) from None
 
 
 def _in_folder(
     tables: Mapping[str, Any], drawings: Mapping[str, bytes], folder: str
 ) -> dict[str, Any]:
-    """The tables with the paths of drawings from the design file on."""
+    """The tables with the drawings' paths relative to the design file."""
 
     def place(value: Any) -> Any:
         return f"{folder}/{value}" if value in drawings else value

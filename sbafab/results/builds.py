@@ -1,4 +1,4 @@
-"""Designs as they were recorded, with what they promise: figures and the share of good builds."""
+"""Recorded designs with their predictions: figures and the share of good builds."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ MEASURED: Mapping[str, tuple[Quantity, Conditions]] = {
     "height_mm": (Quantity.FOLDED_HEIGHT, ANYWHERE),
     "mass_g": (Quantity.MASS, ANYWHERE),
 }
-"""By measured quantity: the figure that it is held against, by the model to design with."""
+"""For each measured quantity, the predicted figure, from the model to design with."""
 
 
 @dataclass(frozen=True)
 class Build:
-    """A design that was recorded, with what was predicted of it.
+    """A recorded design with its predictions.
 
-    ``predicted``: quantity to value and model. ``good_builds``: of how many random builds how many
-    keep every limit. ``actuator_sha256`` is the hash of what is built, the same for designs that
-    differ in how many, or on what sheets.
+    ``predicted``: quantity to value and model. ``good_builds``: how many random builds keep every
+    limit, of how many. ``actuator_sha256`` is the hash of the actuator, equal for designs that
+    differ only in counts or sheets.
     """
 
     sha256: str
@@ -62,10 +62,10 @@ class Build:
 
     @cached_property
     def design(self) -> Design | None:
-        """The design as this version reads it; None of an assembly and of what it cannot read.
+        """The design as this version reads it; None for an assembly or if it cannot be read.
 
-        All that its kit gave stands in the record, so the kit's file is not asked for. A drawn
-        outline does not: the file at its path may be another by now.
+        The record holds the kit's values, so the kit's file is not needed. It does not hold drawn
+        outlines: the file at that path may have changed.
         """
         try:
             tables = tomllib.loads(self.toml)
@@ -79,22 +79,22 @@ class Build:
 
     @cached_property
     def actuator(self) -> str:
-        """The hash that actuators are grouped by, as this version counts it.
+        """The hash that groups actuators, as this version computes it.
 
-        So an earlier version's record groups with today's, also where keys were added since.
+        So an earlier version's record groups with today's, even if keys were added since.
         """
         return self.actuator_sha256 if self.design is None else actuator_sha256(self.design)
 
 
 def recorded_sha256(built: Design | Assembled) -> str:
-    """Return the hash of what was built."""
+    """Return the hash of the actuator."""
     return design_sha256(built) if isinstance(built, Design) else assembly_sha256(built)
 
 
 def promised(built: Design | Assembled) -> Build:
-    """Return what was built with its predictions and yield. Raises DesignError.
+    """Return the built design with its predictions and yield. Raises DesignError.
 
-    An assembly is good if every part is; no figure is predicted of it.
+    An assembly is good if every part is; no figure is predicted for it.
     """
     if isinstance(built, Design):
         name, family, toml = built.name, built.family, design_toml(built)
@@ -122,7 +122,7 @@ def promised(built: Design | Assembled) -> Build:
 
 
 def _predicted(design: Design) -> dict[str, tuple[float, str]]:
-    """Return value and model of each quantity that a lab measures."""
+    """Return value and model of each quantity measured in the lab."""
     request = PredictionRequest(usual_pressures(design.form)[-1:])
     figures = [figure for figure in predict(design, request).figures if not figure.other]
     return {

@@ -1,4 +1,4 @@
-"""Records of a lab as evidence: curves of all actuators that build the same design."""
+"""Use a lab's records as evidence: curves over all actuators of one design."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ RECORDED = {
     "mass_g": _Recorded("mass_g"),
     "burst_kpa": _Recorded("burst_kpa"),
 }
-"""Recorded numbers that are evidence, as ``sbafab record`` defines them; x is 0 if it is named."""
+"""Recorded quantities used as evidence, named as in ``sbafab record``; x is 0 if it is named."""
 
 
 def from_lab_records(lab: Lab) -> Evidence:
-    """Return a curve for each design and recorded quantity, one value an actuator.
+    """Return a curve for each design and recorded quantity, with one value per actuator.
 
-    No error of a value is recorded; that of the curve is the scatter of its actuators. An actuator
-    that was repaired counts by its first attempt. Raises DesignError where no number is recorded.
+    Records have no measurement error, so a curve's error is the scatter of its actuators. A
+    repaired actuator counts by its first attempt. Raises DesignError if no number is recorded.
     """
     records, _, builds = lab.contents()
     by_design: dict[str, list[Built]] = defaultdict(list)
@@ -95,7 +95,7 @@ def _id(text: str) -> str:
 
 
 def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
-    """Return the curves with a number behind ids that several designs of a name share."""
+    """Return the curves, with a number appended to ids that designs of one name share."""
     counts: dict[str, int] = defaultdict(int)
     renamed = []
     for curve in curves:
@@ -106,13 +106,13 @@ def _renamed(curves: Sequence[MeasuredCurve]) -> tuple[MeasuredCurve, ...]:
 
 
 RECORDS = (".sqlite", ".db")
-"""Endings of a lab's build records."""
+"""File suffixes of a lab's build records."""
 
 
 def load_source(source: str | Path) -> Evidence:
-    """Return the evidence of a source that ships, of a file (.toml, .csv), or of build records.
+    """Return the evidence of a bundled source, a file (.toml, .csv), or build records.
 
-    Raises DesignError with one sentence for what is no such source.
+    Raises DesignError with one sentence if the source does not exist.
     """
     if Path(source).suffix.lower() in RECORDS:
         return from_lab_records(Lab(Path(source)))

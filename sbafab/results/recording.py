@@ -1,4 +1,4 @@
-"""Rows of what was built: recorded from values and files, found again, written as CSV and JSON."""
+"""Record built actuators from values and files, find their rows, write them as CSV and JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sbafab.version import GENERATOR
 
 
 def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> Design | Assembled:
-    """Return the design, or the assembly put together, of a template, a file or a run's folder."""
+    """Return the design or assembly of a template, a file or a run's folder."""
     if isinstance(source, Design):
         return source.with_(*changes) if changes else source
     resolved = Path(source) / "design.toml"
@@ -41,10 +41,10 @@ def built_from(source: str | Path | Design, changes: Sequence[Change] = ()) -> D
 def record(
     lab: Lab, built: Design | Assembled, rows: Sequence[Row], is_again: bool = False
 ) -> list[Row]:
-    """Store rows about devices of what was built, with what it promises; all or none.
+    """Store rows about built devices, with the design's predictions; all or none.
 
-    Results get the kit of the design. ``is_again``: as new attempts of devices that were mended and
-    tested again. Raises DesignError, OutputError.
+    Results get the design's kit. ``is_again``: store as new attempts of repaired and retested
+    devices. Raises DesignError, OutputError.
     """
     designs = [built] if isinstance(built, Design) else [part.design for part in built.designs]
     kit = ", ".join(dict.fromkeys(kit_of(design).name for design in designs))
@@ -61,7 +61,7 @@ def _with_kit(row: Row, kit: str) -> Row:
 
 
 def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
-    """Return the tables of the record page of what was built; of an assembly its tests."""
+    """Return the tables of the record page of a design; for an assembly, its tests."""
     if not isinstance(built, Design):
         return (TESTS_TABLE,)
     laminate = laminate_of(built)
@@ -72,7 +72,7 @@ def record_sheet(built: Design | Assembled) -> tuple[RecordTable, ...]:
 
 
 def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]:
-    """Return a line of history for each serial of ``values``, by column.
+    """Return one history entry per serial of ``values``, by column.
 
     Serials are a list, or a text with commas between them. Raises DesignError.
     """
@@ -86,10 +86,10 @@ def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]
 
 
 def read_batch(path: Path) -> list[Record]:
-    """Return a result for each row of a batch's table, as it was filled in.
+    """Return a result for each row of a batch's filled-in table.
 
-    Its columns are some of those of a Record. Several errors stand in one cell, separated by
-    blanks. Raises DesignError with the line.
+    Its columns are a subset of a Record's. Several errors share one cell, separated by blanks.
+    Raises DesignError with the line.
     """
     records = [row_of(Record, row, where) for where, row in _csv_rows(path)]
     if not records:
@@ -101,11 +101,11 @@ def read_batch(path: Path) -> list[Record]:
 
 
 def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
-    """Return the lines of history in a file, with ``defaults`` where it states nothing else.
+    """Return the history entries of a file, with ``defaults`` for values that it omits.
 
-    CSV has a row a line, and its columns are some of those of a HistoryEntry. TOML and JSON have a
-    list ``entry``, and beside it values that go for all of them. Photographs are found beside the
-    file. Raises DesignError with the line or the entry.
+    A CSV file has one row per entry; its columns are a subset of a HistoryEntry's. TOML and JSON
+    have a list ``entry``, and beside it values shared by all entries. Photographs are looked up
+    beside the file. Raises DesignError with the line or the entry.
     """
     rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _table_rows(path)
     entries: list[HistoryEntry] = []
@@ -120,9 +120,9 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the filled rows below the header, with their places; ``#`` begins a remark.
+    """Yield the filled rows below the header, with their places; ``#`` begins a comment.
 
-    Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas.
+    Columns are separated by commas, semicolons or tabs; with the latter two, decimal commas work.
     """
     lines = [
         (f"{path}, line {number}", line)
@@ -152,7 +152,7 @@ _PARSERS: Mapping[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json":
 
 
 def _table_rows(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the tables of the list ``entry`` with what goes for all, with their places."""
+    """Yield the tables of the list ``entry``, merged with the shared values, with their places."""
     parser = _PARSERS.get(path.suffix.lower())
     if parser is None:
         raise DesignError(f"{path} ends in none of .csv, {', '.join(_PARSERS)}; save it as one")
@@ -174,9 +174,8 @@ def matching(
 ) -> list[Row]:
     """Return the rows of the design whose hash (eight digits or more of it) the text holds.
 
-    With them come those of other designs that build the same actuator. Else those of a serial or of
-    a design of that name, or the one of that number; of these only those of ``serial``, if one is
-    given.
+    Rows of other designs of the same actuator are included. Otherwise the text is a serial, a
+    design's name or a row's number; ``serial``, if given, filters these rows.
     """
     text = text.strip()
     hashes = re.findall(r"\b[0-9a-f]{8,64}\b", text.lower())
@@ -195,7 +194,7 @@ def matching(
     return [row for row in matches if serial in ("", row.serial)]
 
 
-# Rows written out. The same rows give the same bytes.
+# Writing rows. The same rows give the same bytes.
 
 
 HEAD = ("row", "recorded", "design", "design_sha256", "attempt", "corrects", "withdrawn")
@@ -203,9 +202,9 @@ CSV_COLUMNS = tuple(dict.fromkeys((*HEAD, *columns(HistoryEntry), "expired", *co
 
 
 def write_history(contents: Contents, path: Path) -> int:
-    """Write rows as CSV or JSON, by the file's ending, swapped in; return the number of devices.
+    """Write rows as CSV or JSON, by the file's suffix, atomically; return the number of devices.
 
-    Raises DesignError for another ending, and OutputError.
+    Raises DesignError for another suffix, and OutputError.
     """
     writers = {".csv": csv_history, ".json": json_history}
     writer = writers.get(path.suffix.lower())
@@ -217,7 +216,7 @@ def write_history(contents: Contents, path: Path) -> int:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file beside an old one and swap it in. Raises OutputError."""
+    """Write a temporary file and swap it in. Raises OutputError."""
     try:
         replace_text(path, text)
     except OSError as error:
@@ -225,7 +224,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def _devices(contents: Contents) -> list[Sequence[LabRow]]:
-    """Return the rows of each device, entries first, as the work goes; sorted by design, serial."""
+    """Return the rows of each device, entries first, in order of work; sorted by design, serial."""
     rows: dict[tuple[str, str], list[LabRow]] = defaultdict(list)
     for row in (*contents.entries, *contents.records):
         build = contents.builds[row.design_sha256]
@@ -237,7 +236,7 @@ def _devices(contents: Contents) -> list[Sequence[LabRow]]:
 
 
 def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
-    """Return a document with a device's rows together."""
+    """Return a document with the rows grouped by device."""
     listed = []
     for rows in devices:
         build = builds[rows[0].design_sha256]
@@ -250,7 +249,7 @@ def json_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) 
 
 
 def csv_history(devices: Sequence[Sequence[LabRow]], builds: dict[str, Build]) -> str:
-    """Return a table with a row each of a device's."""
+    """Return a table with one row per row of each device."""
     cells = [_cells(row, builds[rows[0].design_sha256].name) for rows in devices for row in rows]
     return csv_text([CSV_COLUMNS, *([each.get(c) for c in CSV_COLUMNS] for each in cells)])
 

@@ -1,4 +1,4 @@
-"""Rows of a lab's file: results of built actuators, and lines of their history."""
+"""Rows of a lab's file: results of built actuators, and entries of their history."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ NUMBERS = {
     "mass_g": "g",
     "proof_kpa": "kPa",
 }
-"""Measured once an attempt, with their units; ``docs/recording.md`` says how."""
+"""Measured once per attempt, with their units; see ``docs/recording.md``."""
 ERRORS = ("offset_mm", "turn_deg", "cut_mm")
-"""Measured any number of times, without sign."""
+"""Measured any number of times; unsigned."""
 READINGS = ("kerf_mm", "temperature_c", "press_force_n", "minutes")
-"""Numbers of a line of history."""
+"""Numbers of a history entry."""
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _DECIMAL = re.compile(r"\d+(?:[.,]\d*)?|[.,]\d+", re.ASCII)
 
@@ -82,22 +82,22 @@ ErrorSize = Annotated[FiniteFloat, BeforeValidator(_number), Field(ge=0)]
 
 
 class LabRow(BaseModel):
-    """A row about the device ``serial``; a field that it does not state is empty.
+    """A row about the device ``serial``; fields without a value are empty.
 
-    The file adds the row's number ``id``, when it was ``recorded`` (UTC) and of which design. Of
-    two rows the one that ``corrects`` the other counts. ``attempt`` is 1, and one more each time
-    that the device was mended and tested again.
+    The file adds the row's number ``id``, the time ``recorded`` (UTC) and the hash of the design. A
+    row replaces the one that it ``corrects``. ``attempt`` is 1, plus one for each time that the
+    device was repaired and retested.
     """
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", str_strip_whitespace=True, coerce_numbers_to_str=True
     )
     NOUN: ClassVar[str]
-    """The row in messages, and its table in the file."""
+    """The row's name in messages, and its table in the file."""
     SIGN: ClassVar[str] = ""
-    """Stands before the number."""
+    """Prefix of the number."""
     GROUPS: ClassVar[Mapping[str, Iterable[str]]]
-    """Measured numbers, which stand together in JSON."""
+    """Measured numbers, grouped in JSON."""
 
     id: int = 0
     recorded: str = ""
@@ -109,12 +109,12 @@ class LabRow(BaseModel):
 
     @property
     def number(self) -> str:
-        """The number as it is shown and typed: 3 of a result, e3 of a line of history."""
+        """The number as it is shown and typed: 3 of a result, e3 of a history entry."""
         return f"{self.SIGN}{self.id}"
 
     @property
     def stated(self) -> dict[str, Any]:
-        """The values by column, without empty ones and those that the file adds."""
+        """The values by column, without empty ones and those added by the file."""
         return {name: value for name in columns(type(self)) if (value := getattr(self, name))}
 
     @property
@@ -126,11 +126,11 @@ class LabRow(BaseModel):
         }
 
     def group(self, name: str) -> dict[str, Any]:
-        """Return the stated numbers of a group."""
+        """Return the non-empty numbers of a group."""
         return {column: v for column in self.GROUPS[name] if (v := getattr(self, column))}
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the row for JSON; units stand in the keys."""
+        """Return the row for JSON; keys name the units."""
         grouped = {column for names in self.GROUPS.values() for column in names}
         groups = {name: self.group(name) for name in self.GROUPS}
         return {**self.model_dump(exclude=grouped), **groups}
@@ -140,7 +140,7 @@ class LabRow(BaseModel):
         raise NotImplementedError
 
     def _problems(self) -> Iterator[str]:
-        """Yield sentences on fields that need another one."""
+        """Yield sentences on fields that need another field."""
         raise NotImplementedError
 
     @model_validator(mode="after")
@@ -152,7 +152,7 @@ class LabRow(BaseModel):
 
 class Record(LabRow):
     """A result of an actuator: "pass" or "fail" of its ``leak`` test, the ``operator`` who built it
-    and the ``kit``, and what was measured; units stand in the names.
+    the ``kit``, and the measured values; field names include their units.
     """
 
     NOUN: ClassVar[str] = "record"
@@ -180,7 +180,7 @@ class Record(LabRow):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """What was measured once, by column, each in the unit of its name."""
+        """Values measured once, by column, each in the unit of its name."""
         return self.group("numbers")
 
     @property
@@ -208,11 +208,11 @@ class Record(LabRow):
 
 
 class HistoryEntry(LabRow):
-    """A line of a device's history.
+    """An entry of a device's history.
 
     ``date`` is the day of the work, ``step`` a press step's number or a test's name, ``item`` a
     film or the adhesive with its ``lot`` and last day ``expires``. ``photograph`` is the name of a
-    file in the folder beside the lab's file. Units stand in the names.
+    file in the folder beside the lab's file. Field names include their units.
     """
 
     NOUN: ClassVar[str] = "entry"
@@ -241,7 +241,9 @@ class HistoryEntry(LabRow):
 
     @property
     def is_expired(self) -> bool:
-        """True if the lot had expired on the day of the work, or else of the record."""
+        """True if the lot had expired on the day of work, or on the day of recording if none is
+        given.
+        """
         return bool(self.expires) and self.expires < (self.date or self.recorded[:10])
 
     def as_dict(self) -> dict[str, Any]:
@@ -282,7 +284,7 @@ Row = TypeVar("Row", bound=LabRow)
 
 @cache
 def columns(kind: type[LabRow]) -> tuple[str, ...]:
-    """Return the columns of a table of rows, which are the fields that a user states."""
+    """Return the columns of a table of rows: the fields that a user fills in."""
     added = ("id", "recorded", "design_sha256", "corrects", "withdrawn", "attempt")
     return tuple(name for name in kind.model_fields if name not in added)
 
@@ -301,12 +303,12 @@ def row_of(kind: type[Row], values: Mapping[str, Any], where: str = "") -> Row:
     try:
         return checked(kind, stated, {}, place)
     except DesignError as error:
-        # A sentence on the whole row begins where a field's name would stand.
+        # A sentence on the whole row begins where a field's name would be.
         raise DesignError(" ".join(str(error).split())) from None
 
 
 def standing(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows that no other one corrects and none withdraws."""
+    """Return the rows that are neither corrected nor withdrawn."""
     rows = list(rows)
     corrected = {row.corrects for row in rows}
     return [row for row in rows if row.id not in corrected and not row.withdrawn]

@@ -1,7 +1,7 @@
 """Evaluation of a lab's records: success, and measured against predicted.
 
-Designs that build the same actuator (``Build.actuator``) count as one. An actuator that was mended
-and tested again counts by its first attempt.
+Designs that build the same actuator (``Build.actuator``) count as one. A repaired and retested
+actuator counts by its first attempt.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ UNSAID = "not said"
 
 @dataclass(frozen=True)
 class Built:
-    """An actuator that was built: its ``records`` by attempt, the ``build`` that the first is of,
-    and the name of that ``design`` in the report.
+    """A built actuator: its ``records`` by attempt, the ``build`` of the first record, and the name
+    of that ``design`` in the report.
     """
 
     design: str
@@ -38,12 +38,12 @@ class Built:
     records: tuple[Record, ...]
 
     def first(self, name: str) -> str:
-        """Return the first text of this name that a record states; empty without one."""
+        """Return the first non-empty text of this name; empty if there is none."""
         return next((text for record in self.records if (text := getattr(record, name))), "")
 
     @property
     def numbers(self) -> dict[str, float]:
-        """What was measured, at the first attempt that states it."""
+        """Measured values, from the first attempt that has them."""
         return {k: v for record in reversed(self.records) for k, v in record.numbers.items()}
 
     @property
@@ -53,16 +53,16 @@ class Built:
 
     @property
     def passed_later(self) -> bool:
-        """True if a test of a later attempt passed alone."""
+        """True if only a later attempt passed the leak test."""
         return not self.passed and any(record.leak == PASS for record in self.records)
 
 
 @dataclass(frozen=True)
 class Success:
-    """Actuators of a group that passed the leak test at once, of those that were tested.
+    """Actuators of a group that passed the leak test at the first attempt, of those tested.
 
-    ``passed_later`` more passed at a later attempt. ``promised`` is the share of good builds by
-    rule registration-yield, None of a group of several designs.
+    ``passed_later`` counts those that passed at a later attempt. ``promised`` is the share of good
+    builds by rule registration-yield; None for a group of several designs.
     """
 
     by: By
@@ -74,10 +74,11 @@ class Success:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The mean of a quantity of a design against what was predicted, all in ``unit``.
+    """The measured mean of a quantity of a design against its prediction, all in ``unit``.
 
-    ``mean`` is that of ``count`` actuators; ``low`` and ``high``, its 95 % interval, are None for a
-    single measurement, ``predicted`` and ``ratio``, measured over predicted, without a model.
+    ``mean`` is over ``count`` actuators. ``low`` and ``high``, its 95 % interval, are None for a
+    single measurement; ``predicted`` and ``ratio``, measured over predicted, are None without a
+    model.
     """
 
     design: str
@@ -95,7 +96,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Report:
-    """All of it; ``records`` counts every row, ``items`` the actuators."""
+    """The whole report; ``records`` counts every row, ``items`` the actuators."""
 
     records: int
     items: int
@@ -119,7 +120,7 @@ class SuccessDocument(Document):
 
 
 class ReportDocument(Document):
-    """A report; every value has its unit beside it or is a share."""
+    """A report; every value is a share or has its unit beside it."""
 
     SCHEMA = "sbafab/report@1"
 
@@ -142,7 +143,7 @@ def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:
 
 
 def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]:
-    """Return the actuators, by what was built and serial, in the order of their first record."""
+    """Return the actuators, by design and serial, in the order of their first record."""
     groups: dict[tuple[str, str], list[Record]] = defaultdict(list)
     for record in standing(records):
         groups[builds[record.design_sha256].actuator, record.serial].append(record)
@@ -156,7 +157,7 @@ def items(records: Iterable[Record], builds: Mapping[str, Build]) -> list[Built]
 
 
 def _names(builds: Mapping[str, Build]) -> dict[str, str]:
-    """Names of what was built, by hash: of several with one name also the hash's first digits."""
+    """Names of built designs, by hash; designs of the same name get the hash's first digits."""
     names: dict[str, dict[str, None]] = defaultdict(dict)
     for build in builds.values():
         names[build.actuator][build.name] = None
@@ -228,15 +229,15 @@ def interval_of(values: Sequence[float]) -> tuple[float, float] | None:
 
 
 RECENT = 20
-"""Actuators of the moving share."""
+"""Number of actuators in the moving share."""
 MOST_DRAWN = 400
-"""Points of a curve; of more actuators every second, third ... is drawn."""
+"""Most points of a curve; with more actuators only every second, third ... is drawn."""
 
 
 def success_svg(records: Sequence[Record], builds: Mapping[str, Build]) -> str:
     """Return the chart of success over the actuators, in the order of their first records.
 
-    It shows the share of all so far with its 95 % interval, and that of the last RECENT. Raises
+    It shows the cumulative share with its 95 % interval, and the share of the last RECENT. Raises
     DesignError without a leak test.
     """
     passed = [item.passed for item in items(records, builds) if item.first("leak")]

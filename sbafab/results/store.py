@@ -1,7 +1,7 @@
 """A lab's records in one SQLite file, written by any number of processes, and its photographs.
 
-A write is one transaction, and writers wait for each other. Rows are added: one that corrects
-another names it, and no row is corrected twice.
+A write is one transaction, and writers wait for each other. Rows are only added: a correction names
+the row it replaces, and no row is corrected twice.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sbafab.results.records import HistoryEntry, LabRow, Record, Row, row_of, st
 
 APPLICATION, VERSION = 0x5BAFAB, 4
 PATIENCE = 10.0
-"""Seconds that a writer waits for others."""
+"""Timeout for other writers, s."""
 KINDS: tuple[type[LabRow], ...] = (Record, HistoryEntry)
 _SCHEMA = (
     "CREATE TABLE design (sha256 TEXT NOT NULL, generator TEXT NOT NULL, content TEXT NOT NULL, "
@@ -43,9 +43,9 @@ _SCHEMA = (
 
 
 class Contents(NamedTuple):
-    """All rows of a lab, those that were corrected too, and their designs by sha256.
+    """All rows of a lab, including corrected ones, and their designs by sha256.
 
-    A design stands as the newest version that recorded it predicts it.
+    Each design has the predictions of the newest version that recorded it.
     """
 
     records: list[Record]
@@ -58,10 +58,10 @@ class Contents(NamedTuple):
 
 
 class Lab:
-    """The records of the file ``path``, which the first record makes.
+    """The records in the file ``path``, which the first record creates.
 
-    Methods raise DesignError for what contradicts the records and OutputError, with one sentence,
-    where the file is locked, closed to us, damaged, another program's or of another version.
+    Methods raise DesignError for rows that contradict the records, and OutputError, with one
+    sentence, if the file is locked, unreadable, damaged, another program's or of another version.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Lab:
         self.path, self.patience, self.clock = path, patience, clock
 
     def contents(self) -> Contents:
-        """Return all that is stored; a file that may only be read will do."""
+        """Return all rows; a read-only file suffices."""
         if not self.path.is_file():
             raise OutputError(
                 f"{self.path} is no file of records; record something first, or name the lab's "
@@ -86,9 +86,9 @@ class Lab:
     def add(
         self, sha256: str, build: Build | None, rows: Sequence[Row], is_again: bool = False
     ) -> list[Row]:
-        """Store rows of a design, all or none; ``build`` where it is not known yet.
+        """Store rows of a design, all or none; ``build`` is added if it is not stored yet.
 
-        ``is_again``: of devices that were recorded, mended and tested again, as a new attempt.
+        ``is_again``: store as a new attempt of recorded devices that were repaired and retested.
         Photographs are copied into the folder beside the lab's file first.
         """
         if is_again and not self.path.exists():
@@ -108,8 +108,8 @@ class Lab:
             ]
 
     def correct(self, kind: type[Row], number: int, change: Mapping[str, Any]) -> Row:
-        """Store a row that repeats row ``number`` of its kind but for what ``change`` states, by
-        column; ``withdrawn`` among them.
+        """Store a correction of row ``number``: a copy with the values of ``change``, by column,
+        which may include ``withdrawn``.
         """
         if not self.path.exists():
             raise OutputError(f"{self.path} does not exist, so there is no {kind.NOUN} to correct")
@@ -147,7 +147,7 @@ class Lab:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """One transaction, in a file that is made where there is none."""
+        """One transaction; the file is created if it is missing."""
         with self._sqlite_errors(), closing(self._open()) as file:
             file.execute("BEGIN IMMEDIATE")
             try:
@@ -169,7 +169,7 @@ class Lab:
         )
 
     def _is_filled(self, file: sqlite3.Connection) -> bool:
-        """Return False for an empty file. Raises OutputError for one not ours."""
+        """Return False for an empty file. Raises OutputError for another program's file."""
         (version,) = file.execute("PRAGMA user_version").fetchone()
         (application,) = file.execute("PRAGMA application_id").fetchone()
         (tables,) = file.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -196,7 +196,7 @@ class Lab:
         except sqlite3.Error as error:
             raise OutputError(f"{self.path} {_reason(error)}") from error
         except (ValidationError, UnicodeDecodeError) as error:
-            # SQLite's own message may quote what is no text any more.
+            # SQLite's own message may quote bytes that are no longer text.
             raise OutputError(f"{self.path} {_REASONS['CORRUPT']}") from error
 
 
@@ -216,7 +216,7 @@ _REASONS = {
 
 def _reason(error: sqlite3.Error) -> str:
     name = getattr(error, "sqlite_errorname", None) or ""
-    # Python itself raises an error without a name for a text that is none.
+    # Python itself raises an error without a name for bytes that are not text.
     code = name.removeprefix("SQLITE_").partition("_")[0] or "CORRUPT"
     return _REASONS.get(code, f"cannot be used as a file of records: {error}")
 
@@ -232,7 +232,7 @@ def _rows(file: sqlite3.Connection, kind: type[Row]) -> Iterator[Row]:
 
 
 class _Devices:
-    """The rows that stand in an open file, by serial."""
+    """The valid rows of an open file, by serial."""
 
     def __init__(self, file: sqlite3.Connection, contents: Contents, now: datetime) -> None:
         self.file, self.builds = file, contents.builds
@@ -242,7 +242,7 @@ class _Devices:
             self.rows[row.serial].append(row)
 
     def of(self, sha256: str, serial: str) -> list[LabRow]:
-        """Return the rows of a device: of this design, and of others that build the same."""
+        """Return the rows of a device: of this design, and of others of the same actuator."""
         return [
             row
             for row in self.rows[serial]
@@ -261,7 +261,7 @@ class _Devices:
         return max(attempts, default=1) + is_again
 
     def put(self, row: Row) -> Row:
-        """Add a row. Raises DesignError for one that contradicts or repeats another one."""
+        """Add a row. Raises DesignError if it contradicts or repeats another one."""
         for stored in () if row.withdrawn else self.of(row.design_sha256, row.serial):
             is_other = stored.attempt == row.attempt and stored.id != row.corrects
             if type(stored) is type(row) and is_other and (problem := row.conflict(stored)):
@@ -279,11 +279,11 @@ class _Devices:
 
 
 MOST_PHOTOGRAPH = 20_000_000
-"""Bytes."""
+"""Largest photograph, bytes."""
 _PICTURE = re.compile(
     rb"(?P<jpg>\xff\xd8\xff)|(?P<png>\x89PNG\r\n\x1a\n)|(?P<webp>RIFF.{4}WEBP)", re.DOTALL
 )
-"""The first bytes of a picture, by the ending of its file."""
+"""The first bytes of a picture, by file suffix."""
 _STORED = re.compile(r"[0-9a-f]{64}\.(jpg|png|webp)")
 
 
@@ -308,7 +308,7 @@ def store_photograph(lab: Path, content: bytes, where: str) -> str:
 
 
 def with_photograph(lab: Path, row: Row) -> Row:
-    """Return the row with its photograph's file, if it names one, stored. Raises DesignError."""
+    """Return the row; its photograph, if it names one, is stored first. Raises DesignError."""
     if not isinstance(row, HistoryEntry) or not row.photograph or _STORED.fullmatch(row.photograph):
         return row
     path = Path(row.photograph)
