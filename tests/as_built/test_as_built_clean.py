@@ -25,6 +25,8 @@ DROP = (
 EARS = "registration.method=ears"
 FEW_BUILDS = "rules.yield_builds=100"
 KERF = ("laser.kerf_tpe=0.2", "laser.kerf_ptfe=0.12")
+SHARP = 'rules.waive=["film-limits"]'
+"""Without a fillet lobes meet in points of less than 30 degrees."""
 UNEVEN = "laser.kerf_tpe=[0.2, 0.1]"
 PINS = "sheets.ptfe.pins=[[30, 30, 3], [120, 120, 3]]"
 ROLLS = ("sheets.tpe.roll=true", "sheets.ptfe.roll=true", "sheets.tpe.length=400")
@@ -50,7 +52,7 @@ MORE: list[tuple[str, tuple[str, ...], DxfProfile]] = [
     ("3dof-15mm", ("stack.balloons=6",), "bulges"),
     ("3dof-15mm", ("stack.balloons=2",), "arcs"),
     ("1dof-5mm", ("stack.balloons=2", *KERF), "chords"),
-    ("3dof-15mm", ("fillet.radius=0", "stack.balloons=2", *KERF), "bulges"),
+    ("3dof-15mm", (SHARP, "fillet.radius=0", "stack.balloons=2", *KERF), "bulges"),
     ("3dof-15mm", ("chamber.count=5", "stack.balloons=1"), "bulges"),
     ("3dof-15mm", ("chamber.count=4", "stack.balloons=2"), "bulges"),
     ("radial-15mm", ("chamber.count=2", *KERF), "arcs"),

@@ -157,7 +157,7 @@ def _pocket(gap: Interface, axis: Point) -> float:
     if radius is None or (disc(axis, radius) - gap.mask - disc(axis, bore + ON_AXIS)).area > 1e-4:
         x, y = axis
         raise DesignError(
-            f"{SUPPORTED}; the pocket in layer {gap.masks[0].index} at x {x:.3f}, y {y:.3f} is "
+            f"{SUPPORTED}; the pocket below layer {gap.above.index} at x {x:.3f}, y {y:.3f} is "
             "drawn otherwise: use a chamber.diameter in place of chamber.outline"
         )
     return radius
