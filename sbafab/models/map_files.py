@@ -74,7 +74,7 @@ class BalloonSizes(Document):
     poisson: Number = at("balloon.poisson")
 
 
-Grid = list[list[Short | None]]
+MapGrid = list[list[Short | None]]
 
 
 class MappedBalloon(BalloonSizes):
@@ -84,9 +84,9 @@ class MappedBalloon(BalloonSizes):
 
     pressure: list[Short]
     height: list[Short]
-    force: Grid
-    volume: Grid
-    potential: Grid
+    force: MapGrid
+    volume: MapGrid
+    potential: MapGrid
 
 
 class MapDocument(Document):

@@ -77,7 +77,7 @@ def _several(value: object) -> object:
 LINE = AfterValidator(_one_line)
 Text = Annotated[str, Field(max_length=400), LINE]
 Day = Annotated[str, AfterValidator(_day)]
-Number = Annotated[FiniteFloat, BeforeValidator(_number), Field(gt=0)]
+LabNumber = Annotated[FiniteFloat, BeforeValidator(_number), Field(gt=0)]
 ErrorSize = Annotated[FiniteFloat, BeforeValidator(_number), Field(ge=0)]
 
 
@@ -161,12 +161,12 @@ class Record(LabRow):
     operator: Annotated[str, Field(max_length=80), LINE] = ""
     kit: Annotated[str, Field(max_length=120), LINE] = ""
     leak: Annotated[Literal["", "pass", "fail"], BeforeValidator(lambda v: str(v).lower())] = ""
-    burst_kpa: Annotated[Number, Field(le=10_000)] | None = None
-    stroke_mm: Annotated[Number, Field(le=10_000)] | None = None
-    force_n: Annotated[Number, Field(le=10_000)] | None = None
-    height_mm: Annotated[Number, Field(le=10_000)] | None = None
-    mass_g: Annotated[Number, Field(le=100_000)] | None = None
-    proof_kpa: Annotated[Number, Field(le=10_000)] | None = None
+    burst_kpa: Annotated[LabNumber, Field(le=10_000)] | None = None
+    stroke_mm: Annotated[LabNumber, Field(le=10_000)] | None = None
+    force_n: Annotated[LabNumber, Field(le=10_000)] | None = None
+    height_mm: Annotated[LabNumber, Field(le=10_000)] | None = None
+    mass_g: Annotated[LabNumber, Field(le=100_000)] | None = None
+    proof_kpa: Annotated[LabNumber, Field(le=10_000)] | None = None
     offset_mm: Annotated[
         tuple[Annotated[ErrorSize, Field(le=10)], ...], BeforeValidator(_several)
     ] = ()
@@ -224,10 +224,10 @@ class HistoryEntry(LabRow):
     item: Annotated[str, Field(max_length=60), LINE] = ""
     lot: Annotated[str, Field(max_length=60), LINE] = ""
     expires: Day = ""
-    kerf_mm: Annotated[Number, Field(le=1)] | None = None
-    temperature_c: Annotated[Number, Field(le=400)] | None = None
-    press_force_n: Annotated[Number, Field(le=1_000_000)] | None = None
-    minutes: Annotated[Number, Field(le=10_000)] | None = None
+    kerf_mm: Annotated[LabNumber, Field(le=1)] | None = None
+    temperature_c: Annotated[LabNumber, Field(le=400)] | None = None
+    press_force_n: Annotated[LabNumber, Field(le=1_000_000)] | None = None
+    minutes: Annotated[LabNumber, Field(le=10_000)] | None = None
     decision: Literal["", "accept", "reject", "rework"] = ""
     reason: Annotated[str, Field(max_length=200), LINE] = ""
     photograph: Text = ""

@@ -76,9 +76,9 @@ class Success:
 class Comparison:
     """The measured mean of a quantity of a design against its prediction, all in ``unit``.
 
-    ``mean`` is over ``count`` actuators. ``low`` and ``high``, its 95 % interval, are None for a
-    single measurement; ``predicted`` and ``ratio``, measured over predicted, are None without a
-    model.
+    ``mean`` is over ``count`` actuators. ``low`` and ``high``, the ends of its 95 % interval in
+    that unit, are None for a single measurement; ``predicted`` and ``ratio``, measured over
+    predicted, are None without a model.
     """
 
     design: str

@@ -37,8 +37,8 @@ from sbafab.rules.seam_overlaps import Overlap
 if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
 
-Quantity = Literal["bond", "overhang"]
-QUANTITIES: tuple[Quantity, ...] = ("bond", "overhang")
+MarginKind = Literal["bond", "overhang"]
+QUANTITIES: tuple[MarginKind, ...] = ("bond", "overhang")
 
 SHARP: Final = 30.0
 """Degrees: a sharper corner is a bond that tapers to nothing. Blunter ones are where a strip leaves
@@ -75,7 +75,7 @@ class Margin(NamedTuple):
     distance apart along ``normal`` is ``nominal``.
     """
 
-    quantity: Quantity
+    quantity: MarginKind
     nominal: float
     start: Point
     end: Point
@@ -107,7 +107,7 @@ class InterfaceMargins:
     """
 
     interfaces: tuple[Interface, ...]
-    places: Mapping[Quantity, Places]
+    places: Mapping[MarginKind, Places]
 
     @property
     def first(self) -> Interface:
@@ -234,7 +234,7 @@ def narrow_places(
     limits: Limits,
     reaches: Sequence[Sequence[tuple[Edge, Reach]]],
     overlaps: Sequence[Sequence[Overlap]],
-) -> list[dict[Quantity, Places]]:
+) -> list[dict[MarginKind, Places]]:
     """All margins that could become the least under the tolerances, or come short of a limit.
 
     ``reaches`` are the masks' reaches past film edges, for each group of interfaces, ``overlaps``
@@ -246,7 +246,7 @@ def narrow_places(
     for group, slack in zip(groups, slacks, strict=True):
         bond = group.interfaces[0].whole_bond
         widest[bond] = max(slack, widest.get(bond, 0.0))
-    queries: list[tuple[int, Quantity, BondQuery | OverhangQuery]] = []
+    queries: list[tuple[int, MarginKind, BondQuery | OverhangQuery]] = []
     flush = limits.mask_overhang
     for number, (group, slack) in enumerate(zip(groups, slacks, strict=True)):
         interface = group.interfaces[0]
@@ -273,7 +273,7 @@ def narrow_places(
             films_and_masks = profiles[: 2 + len(interface.masks)]
             overhang = OverhangQuery(interface.mask, free, group.loss, films_and_masks)
             queries.append((number, "overhang", overhang))
-    by_group: list[dict[Quantity, Places]] = [{} for _ in groups]
+    by_group: list[dict[MarginKind, Places]] = [{} for _ in groups]
     results = places_of([query for *_, query in queries])
     for (number, quantity, _), places in zip(queries, results, strict=True):
         by_group[number][quantity] = places
@@ -281,7 +281,7 @@ def narrow_places(
         if of_seams:
             places = _of_overlaps(groups[number].interfaces[0], of_seams)
             bonds = by_group[number].pop("bond", None)
-            joined: dict[Quantity, Places] = {"bond": bonds.joined(places) if bonds else places}
+            joined: dict[MarginKind, Places] = {"bond": bonds.joined(places) if bonds else places}
             by_group[number] = joined | by_group[number]
     return by_group
 
@@ -698,7 +698,7 @@ class MarginRun(NamedTuple):
     """
 
     group: int
-    quantity: Quantity
+    quantity: MarginKind
     first: int
 
 
@@ -739,7 +739,7 @@ class LinearForms(NamedTuple):
     pinned_loss: Floats
     cut_edges: Floats
 
-    def by_quantity(self, values: Mapping[Quantity, float]) -> Floats:
+    def by_quantity(self, values: Mapping[MarginKind, float]) -> Floats:
         """A value for each margin."""
         return np.array([values[run.quantity] for run in self.runs], dtype=float)[self.run]
 

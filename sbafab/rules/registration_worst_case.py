@@ -20,8 +20,8 @@ from sbafab.rules.limits import Limits, Tolerances, at, holds, least_passing
 from sbafab.rules.margins import (
     InterfaceMargins,
     Margin,
+    MarginKind,
     Push,
-    Quantity,
     bonding_seams,
     pushes,
 )
@@ -31,8 +31,8 @@ from sbafab.rules.seam_overlaps import EdgeBond
 
 NAME = "registration-worst-case"
 
-WHAT: dict[Quantity, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
-REMEDY: dict[Quantity, str] = {
+WHAT: dict[MarginKind, str] = {"bond": "bond", "overhang": "overhang of a mask past a film edge"}
+REMEDY: dict[MarginKind, str] = {
     "bond": "make bond.width larger, or draw the bond wider",
     "overhang": "make mask.overhang larger, or draw the mask so",
 }
@@ -54,7 +54,7 @@ class Remaining(NamedTuple):
 
     worst: float
     pinned: float
-    quantity: Quantity
+    quantity: MarginKind
     group: InterfaceMargins
     number: int
 
@@ -144,7 +144,7 @@ RULE = Rule(
 
 
 def _finding(
-    quantity: Quantity, limit: float, remaining: Iterable[Remaining], measures: Measures
+    quantity: MarginKind, limit: float, remaining: Iterable[Remaining], measures: Measures
 ) -> Finding:
     places = [place for place in remaining if place.quantity == quantity]
     if not places:
@@ -266,7 +266,7 @@ def _why(pinned: float) -> str:
     return f"though pins and cutting alone leave {_mm(pinned)}"
 
 
-def _remedy(quantity: Quantity, dearest: Iterable[Push], laminate: Laminate) -> str:
+def _remedy(quantity: MarginKind, dearest: Iterable[Push], laminate: Laminate) -> str:
     """Remedy for the hand's errors."""
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:

@@ -18,7 +18,7 @@ from sbafab.laminate.laminate import Interface, Laminate
 from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.freedoms import EARS, Freedom, Freedoms
 from sbafab.rules.limits import TOLERANCE, Limits, Tolerances
-from sbafab.rules.margins import QUANTITIES, LinearForms, Owner, Quantity, seated
+from sbafab.rules.margins import QUANTITIES, LinearForms, MarginKind, Owner, seated
 from sbafab.rules.measures import Measures
 from sbafab.rules.rule import Explanation, Rule
 
@@ -61,7 +61,7 @@ class RowKind(NamedTuple):
     """
 
     group: int
-    quantity: Quantity
+    quantity: MarginKind
     errors: Sequence[Error]
     signs: tuple[float, float]
 
@@ -123,7 +123,7 @@ def rows_of(forms: LinearForms, layers: Sequence[Sequence[int]], limits: Limits)
     )
 
 
-def _sign(quantity: Quantity, owner: Owner) -> float:
+def _sign(quantity: MarginKind, owner: Owner) -> float:
     """More film widens a bond, more mask an overhang."""
     if not owner.is_cut:
         return 0.0
@@ -226,7 +226,7 @@ class Yield:
 
     whole: Share
     interfaces: dict[int, Share]
-    quantities: dict[Quantity, Share]
+    quantities: dict[MarginKind, Share]
 
 
 def check(measures: Measures) -> list[Finding]:

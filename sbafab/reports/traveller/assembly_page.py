@@ -25,7 +25,7 @@ from sbafab.reports.traveller.bench import Tool
 from sbafab.reports.traveller.bill import THREAD, Item
 from sbafab.reports.traveller.job import HERE, Action, Work, frame
 from sbafab.reports.traveller.page import (
-    Caution,
+    PageWarning,
     cautions,
     code_svg,
     context,
@@ -186,15 +186,15 @@ def _parts(job: AssemblyJob) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _cautions(job: AssemblyJob) -> list[Caution]:
-    warnings: list[Caution] = []
+def _cautions(job: AssemblyJob) -> list[PageWarning]:
+    warnings: list[PageWarning] = []
     if job.waived:
         messages = " / ".join(finding.message for finding in job.findings if finding.by_user)
         words = f"made although the assembly waives {', '.join(job.waived)}. Findings: {messages}"
-        warnings.append(Caution("Waived checks", words))
+        warnings.append(PageWarning("Waived checks", words))
     if job.lowered:
         words = f"{CHECKED_AGAINST}{', '.join(job.lowered)}."
-        warnings.append(Caution("Lowered limits", words))
+        warnings.append(PageWarning("Lowered limits", words))
     for design in job.works:
         for caution in cautions(design.work):
             of = f" ({design.name})" if caution.of_design else ""
@@ -204,7 +204,7 @@ def _cautions(job: AssemblyJob) -> list[Caution]:
             "small and brittle; they snap together. Keep them away from anything that a magnet "
             "harms."
         )
-        warnings.append(Caution("Magnets", words))
+        warnings.append(PageWarning("Magnets", words))
     every = [
         *job.findings,
         *(finding for design in job.works for finding in design.work.job.findings),

@@ -309,7 +309,7 @@ def code_svg(text: str) -> str:
 # Warnings; the rules' findings have their own page.
 
 
-class Caution(NamedTuple):
+class PageWarning(NamedTuple):
     """A warning of a page: a short title, its text, and whether it is of one design alone."""
 
     title: str
@@ -317,12 +317,12 @@ class Caution(NamedTuple):
     of_design: bool = False
 
 
-def cautions(work: Work) -> list[Caution]:
+def cautions(work: Work) -> list[PageWarning]:
     """Return every warning once."""
     return list(dict.fromkeys(_all(work)))
 
 
-def for_the_designer(findings: Iterable[Finding]) -> list[Caution]:
+def for_the_designer(findings: Iterable[Finding]) -> list[PageWarning]:
     """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
     any.
     """
@@ -333,26 +333,26 @@ def for_the_designer(findings: Iterable[Finding]) -> list[Caution]:
         f"{units.count(len(rules), 'rule')} {'warns' if len(rules) == 1 else 'warn'}. "
         "findings.html gives places and remedies; at the press follow the steps."
     )
-    return [Caution("For the designer", words)]
+    return [PageWarning("For the designer", words)]
 
 
-def _all(work: Work) -> Iterator[Caution]:
+def _all(work: Work) -> Iterator[PageWarning]:
     job, schedule = work.job, work.schedule
     films = list(dict.fromkeys(layer.film for layer in work.laminate.layers))
     materials = [film.material for film in films]
     for film in films:
         if film.warning:
             title = "PTFE fumes" if film.material == "PTFE" else f"Cutting {film.material}"
-            yield Caution(title, film.warning)
+            yield PageWarning(title, film.warning)
     if job.waived:
-        yield Caution(
+        yield PageWarning(
             "Waived rules",
             f"made although the design waives {', '.join(job.waived)}: ask the designer whether "
             "this is intended (findings.html).",
             of_design=True,
         )
     if job.lowered:
-        yield Caution(
+        yield PageWarning(
             "Lowered limits",
             f"{CHECKED_AGAINST}{', '.join(job.lowered)}. A pass here may be a failure at the usual "
             "limits: ask the designer whether this is intended.",
@@ -360,13 +360,13 @@ def _all(work: Work) -> Iterator[Caution]:
         )
     nominal = [material for material, _, measured in kerf_states(job, materials) if not measured]
     if nominal:
-        yield Caution(
+        yield PageWarning(
             f"{joined_words(nominal)} kerf uncalibrated",
             "edges are nominal, so outlines come out smaller and holes larger by half a kerf. A "
             "calibration piece tells by how much (bench.html).",
         )
     if job.underlay is not None:
-        yield Caution(
+        yield PageWarning(
             "Toner on the underlay",
             "laser toner softens in the press and may mark the release film or stick to it: print "
             "with ink if you can. Each print goes into the press once: paper dries there and "
@@ -375,4 +375,4 @@ def _all(work: Work) -> Iterator[Caution]:
     for caution in schedule.cautions:
         if not caution.at_step:
             tell = "; tell the designer" if caution.remedy else ""
-            yield Caution("Press schedule", f"{caution.words}{tell}", of_design=True)
+            yield PageWarning("Press schedule", f"{caution.words}{tell}", of_design=True)
