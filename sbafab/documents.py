@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import (
     AfterValidator,
+    AliasChoices,
     AliasPath,
     BaseModel,
     ConfigDict,
@@ -23,8 +24,12 @@ class Document(BaseModel):
 
     model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True, defer_build=True)
 
-    SCHEMA: ClassVar[str] = ""
+    SCHEMA: ClassVar[str]
     """Id of a document that is written by itself."""
+
+    def __init_subclass__(cls, schema: str = "", **settings: Any) -> None:
+        cls.SCHEMA = schema
+        super().__init_subclass__(**settings)
 
     @classmethod
     def read(cls, record: object, **more: object) -> Self:
@@ -34,7 +39,7 @@ class Document(BaseModel):
     @classmethod
     def of(cls, record: object, **more: object) -> dict[str, Any]:
         """Return the document of a record as JSON."""
-        keys = cls.read(record, **more).model_dump(mode="json", exclude_unset=True)
+        keys = cls.read(record, **more).model_dump(mode="json", by_alias=True, exclude_unset=True)
         return {"schema": cls.SCHEMA, **keys} if cls.SCHEMA else keys
 
 
@@ -56,14 +61,18 @@ class _Joined:
         return getattr(self._record, name)
 
 
-def at(path: str) -> Any:
-    """Return a field that stands elsewhere in the record: a dotted path to it."""
+def attribute(path: str) -> Any:
+    """Return a field that stands elsewhere in the record: a dotted path to it.
+
+    It is None if an attribute on the path is.
+    """
     first, *rest = path.split(".")
-    places = (int(name) if name.isdigit() else name for name in rest)
-    return Field(validation_alias=AliasPath(first, *places))
+    places = [int(name) if name.isdigit() else name for name in rest]
+    paths = (AliasPath(first, *places[:count]) for count in range(len(places), -1, -1))
+    return Field(validation_alias=AliasChoices(*paths))
 
 
-Number = Annotated[int | float, WithJsonSchema({"type": "number"})]
+PlainNumber = Annotated[int | float, WithJsonSchema({"type": "number"})]
 """A number as it stands in the record: 6 is not written as 6.0."""
 
 

@@ -133,13 +133,9 @@ def _run_check(request: CheckRequest) -> bool:
     outcome = _check_folder(request) if request.is_folder else _check_source(request)
     advice = None if request.target is None else _advice(request, request.target)
     if request.as_json:
-        document = checks(outcome.findings, outcome.kind, outcome.name, outcome.designs)
-        if outcome.sizes:
-            document["sizes"] = outcome.sizes
-        document["notes"] = list(outcome.notes)
-        if advice:
-            document["advice"] = advice.as_dict()
-        print_json(document)
+        more: dict[str, object] = {"sizes": outcome.sizes} if outcome.sizes else {}
+        more |= {"notes": outcome.notes} | ({"advice": advice} if advice else {})
+        print_json(checks(outcome.findings, outcome.kind, outcome.name, outcome.designs, **more))
     else:
         _print(outcome, advice, request.verbose)
     return has_failed(outcome.findings)

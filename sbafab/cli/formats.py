@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, get_args, get_type_hints
 
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from sbafab import actuators
 from sbafab.assemblies.records import Assembly
 from sbafab.cli.explain import DesignKey
 from sbafab.cli.kerf import KerfDocument
+from sbafab.cli.nest import NestedDocument
+from sbafab.cli.run import RunDocument
+from sbafab.cli.sweep import SweepDocument
 from sbafab.design.laminate_file import SCHEMA as LAMINATE_SCHEMA
 from sbafab.design.laminate_file import LaminateDocument
 from sbafab.documents import json_schema
@@ -27,7 +30,7 @@ from sbafab.models.map_files import MapDocument
 from sbafab.models.quantity import ModelId, Quantity
 from sbafab.models.sensitivities import SensitivityRow
 from sbafab.output import schema_ids as ids
-from sbafab.output.checked import CHECKS_SCHEMA
+from sbafab.output.checked import Checks
 from sbafab.output.manifest import AssemblyManifest, JobManifest, Manifest
 from sbafab.output.swap import ASSEMBLY_SCHEMA, JOB_SCHEMA, SCHEMA
 from sbafab.pressing.schedule import Schedule
@@ -37,10 +40,11 @@ from sbafab.reproduction.comparison import ComparisonDocument
 from sbafab.reproduction.page import ReproductionDocument
 from sbafab.results.records import HistoryEntry, LabRow, Record
 from sbafab.results.report import ReportDocument
-from sbafab.rules.finding import Finding, Place, Verdict
 from sbafab.rules.rule import Explanation
+from sbafab.search.compare import CompareDocument
 from sbafab.search.find import Binding, RangeEnd, Spare
 from sbafab.search.quantities import QuantityName
+from sbafab.search.target_yield import YieldEntry
 from sbafab.simulators.simulator import NAMES as SIMULATORS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -76,56 +80,16 @@ def array(item: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "array", "items": dict(item)}
 
 
-def finding() -> dict[str, Any]:
-    """Return the schema of a finding."""
-    where = of(
-        Place,
-        interface={"type": ["integer", "null"], "description": "counted from 1, bottom to top"},
-        layers=array(COUNT),
-        x={**number("null"), "description": "mm"},
-        y={**number("null"), "description": "mm"},
-    )
-    return of(Finding, "by_user", "remedy", "interval", "design", where=where)
-
-
 # Runs, records, measurements.
 
 
 YES = {"type": "boolean"}
-PATHS = {**array(TEXT), "description": "what lies in the folder"}
 
 
-def _run() -> dict[str, Any]:
-    run = table(
-        schema={"const": ids.RUN_SCHEMA},
-        folder=TEXT,
-        failed=YES,
-        findings=array(finding()),
-        notes=array(TEXT),
-        files=PATHS,
-    )
-    word_or_mm = {"type": ["number", "string"]}
-    reached = table(
-        target_yield=number(),
-        changes=array(table(**{"key": TEXT, "from": word_or_mm, "to": word_or_mm})),
-        measured=number("null"),
-        interval={"type": ["array", "null"], "items": number()},
-        message=TEXT,
-        figures=array(_figure_of_two()),
-    )
-    described = {**reached, "description": "of --target-yield; figures as given and as changed"}
-    return and_perhaps(run, **{"yield": described})
+class YieldRunDocument(RunDocument, schema=RunDocument.SCHEMA):
+    """A folder, and of --target-yield what was changed; figures as given and as changed."""
 
-
-def _nested() -> dict[str, Any]:
-    one = table(name=TEXT, failed=YES, findings=array(finding()), notes=array(TEXT))
-    return table(
-        schema={"const": ids.NESTED_SCHEMA},
-        folder=TEXT,
-        failed=YES,
-        designs=array(one),
-        files=PATHS,
-    )
+    reached: YieldEntry | None = Field(None, alias="yield")
 
 
 UTC = {**TEXT, "description": "UTC"}
@@ -164,19 +128,6 @@ def _records() -> dict[str, Any]:
 def _history() -> dict[str, Any]:
     device = table(serial=TEXT, design=TEXT, actuator_sha256=TEXT, **_rows())
     return table(schema={"const": ids.HISTORY_SCHEMA}, devices=array(device))
-
-
-def _sweep() -> dict[str, Any]:
-    counts = {"type": "object", "additionalProperties": COUNT}
-    return table(
-        schema={"const": ids.SWEEP_SCHEMA},
-        folder=TEXT,
-        designs=COUNT,
-        measured_now=COUNT,
-        no_longer_asked=COUNT,
-        outcomes={**counts, "description": "designs by what became of them"},
-        files=PATHS,
-    )
 
 
 def _explain() -> dict[str, Any]:
@@ -239,37 +190,6 @@ def _manifest(record: type[Manifest | JobManifest], identity: str) -> dict[str, 
     body = record.model_json_schema(by_alias=True)
     body["properties"]["schema"] = {"const": identity}
     return body
-
-
-def _checks() -> dict[str, Any]:
-    counts = dict.fromkeys(get_args(Verdict), COUNT)
-    advice = table(
-        target_yield=number(),
-        bond_width={**number("null"), "description": "mm"},
-        mask_overhang={**number("null"), "description": "mm"},
-        measured=number("null"),
-        interval={"type": ["array", "null"], "items": number()},
-        message=TEXT,
-    )
-    sizes = {"type": "object", "additionalProperties": number()}
-    printed = {
-        "sizes": {
-            "description": "mm by name, of each design by its name",
-            "type": "object",
-            "additionalProperties": sizes,
-        },
-        "notes": array(TEXT),
-        "advice": {**advice, "description": "of --target-yield"},
-    }
-    found = table(
-        schema={"const": CHECKS_SCHEMA},
-        design={**TEXT, "description": "name of the design or assembly, or the folder's path"},
-        source={"enum": ["design", "as-built"]},
-        summary=table(holds={"type": "boolean"}, **counts),
-        kits=array({"type": "object"}),
-        findings=array(finding()),
-    )
-    return and_perhaps(found, **printed)
 
 
 def _laminate() -> dict[str, Any]:
@@ -476,47 +396,6 @@ def _find() -> dict[str, Any]:
     )
 
 
-def _two(item: Mapping[str, Any]) -> dict[str, Any]:
-    return {**array(item), "minItems": 2, "maxItems": 2}
-
-
-TEXT_OR_NULL = {"type": ["string", "null"]}
-
-
-def _figure_of_two() -> dict[str, Any]:
-    return table(
-        name=TEXT,
-        unit=TEXT,
-        main={"type": "boolean", "description": "whether the command prints it"},
-        differs=YES,
-        values=_two(number("null")),
-        intervals={
-            **_two({**array(number()), "type": ["array", "null"]}),
-            "description": "90 % intervals, where a calibration says so",
-        },
-        models=_two(TEXT_OR_NULL),
-    )
-
-
-def _compare() -> dict[str, Any]:
-    design = table(name=TEXT, source=TEXT, family=TEXT, design_sha256=TEXT, failed=array(TEXT))
-    rule = table(
-        rule=TEXT,
-        unit=TEXT,
-        verdicts=_two(TEXT_OR_NULL),
-        margins={**_two(number("null")), "description": "what is left to the limit"},
-        measured=_two(number("null")),
-    )
-    found = table(
-        schema={"const": ids.COMPARE_SCHEMA},
-        designs=_two(design),
-        keys=array(table(key=TEXT, values=_two({}))),
-        rules=array(rule),
-        figures=array(_figure_of_two()),
-    )
-    return and_perhaps(found, folder=TEXT)
-
-
 # All formats.
 
 
@@ -530,7 +409,7 @@ class Format(NamedTuple):
 
 FORMATS: Mapping[str, Format] = {
     "design": Format(ids.DESIGN_SCHEMA, "design and assembly files (TOML)", _design),
-    "checks": Format(CHECKS_SCHEMA, "`checks.json`, and what `check --json` prints", _checks),
+    "checks": Format(Checks.SCHEMA, "`checks.json`, and what `check --json` prints", Checks),
     "laminate": Format(
         LAMINATE_SCHEMA, "`laminate.json`: layers with exact edges, films, inlets", _laminate
     ),
@@ -555,15 +434,17 @@ FORMATS: Mapping[str, Format] = {
         _predict,
     ),
     "find": Format(ids.FIND_SCHEMA, "what `find --json` prints", _find),
-    "compare": Format(ids.COMPARE_SCHEMA, "what `compare --json` prints", _compare),
+    "compare": Format(CompareDocument.SCHEMA, "what `compare --json` prints", CompareDocument),
     "run": Format(
-        ids.RUN_SCHEMA, "what `generate`, `cut`, `press` and `mesh` print with `--json`", _run
+        RunDocument.SCHEMA,
+        "what `generate`, `cut`, `press` and `mesh` print with `--json`",
+        YieldRunDocument,
     ),
-    "nested": Format(ids.NESTED_SCHEMA, "what `nest --json` prints", _nested),
+    "nested": Format(NestedDocument.SCHEMA, "what `nest --json` prints", NestedDocument),
     "records": Format(ids.RECORDS_SCHEMA, "what `record --json` prints of records", _records),
     "history": Format(ids.HISTORY_SCHEMA, "what `record --export FILE.json` writes", _history),
     "report": Format(ReportDocument.SCHEMA, "what `record --report --json` prints", ReportDocument),
-    "sweep": Format(ids.SWEEP_SCHEMA, "what `sweep --json` prints", _sweep),
+    "sweep": Format(SweepDocument.SCHEMA, "what `sweep --json` prints", SweepDocument),
     "simulate": Format(
         ids.SIMULATE_SCHEMA,
         "`result.json` of a simulator's folder, and what `simulate --json` prints",

@@ -18,7 +18,7 @@ from sbafab.cutting.calibration import (
     read_measurements,
 )
 from sbafab.design.films import FILM_NAME, is_kerf
-from sbafab.documents import Document, at
+from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 
 
@@ -27,18 +27,16 @@ class KerfEstimate(Document):
 
     kerf: Value
     scale: Value | None
-    scaled: bool = at("is_scaled")
+    scaled: bool = attribute("is_scaled")
     offsets: Mapping[str, Value]
     """mm that each instrument reads too much; empty where it cannot be told"""
     count: int
 
 
-class KerfDocument(Document):
+class KerfDocument(Document, schema="sbafab/kerf@1"):
     """What ``kerf --json`` prints."""
 
-    SCHEMA = "sbafab/kerf@1"
-
-    all: KerfEstimate = at("overall")
+    all: KerfEstimate = attribute("overall")
     x: KerfEstimate | None
     y: KerfEstimate | None
     difference: Value | None

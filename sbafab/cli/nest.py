@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import click
 
 from sbafab.actuators import load_design
@@ -19,7 +22,8 @@ from sbafab.cli.printing import (
 from sbafab.cli.progress import shown_progress
 from sbafab.cli.run import add_batch, finish
 from sbafab.cutting.properties import Curves
-from sbafab.output.schema_ids import NESTED_SCHEMA
+from sbafab.documents import Document, attribute
+from sbafab.output.checked import FindingEntry
 from sbafab.runs.run import Run, RunRequest, generate
 
 
@@ -60,20 +64,26 @@ def print_job(job: Run) -> None:
         print_passed(job.folder.name, groups_of(job.checked), written=job.folder)
 
 
-def job_json(job: Run) -> dict[str, object]:
+class NestedDesign(Document):
+    """One of the designs."""
+
+    name: str = attribute("design.name")
+    failed: bool
+    findings: list[FindingEntry]
+    notes: list[str]
+
+
+class NestedDocument(Document, schema="sbafab/nested@1"):
+    """What ``nest --json`` prints."""
+
+    folder: Path
+    failed: bool
+    designs: list[NestedDesign]
+    files: list[str]
+    """what lies in the folder"""
+
+
+def job_json(job: Run) -> dict[str, Any]:
     """Return a job as JSON."""
-    return {
-        "schema": NESTED_SCHEMA,
-        "folder": str(job.folder),
-        "failed": job.failed,
-        "designs": [
-            {
-                "name": checked.design.name,
-                "failed": checked.failed,
-                "findings": [finding.as_dict() for finding in checked.findings],
-                "notes": notes_of([checked]),
-            }
-            for checked in job.checked
-        ],
-        "files": sorted(job.manifest.get("files", ())),
-    }
+    designs = [NestedDesign.read(each, notes=notes_of([each])) for each in job.checked]
+    return NestedDocument.of(job, designs=designs, files=sorted(job.manifest.get("files", ())))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,7 +24,8 @@ from sbafab.cli.printing import (
 )
 from sbafab.cli.progress import shown_progress
 from sbafab.cutting.properties import TRUE_ARCS, Curves
-from sbafab.output.schema_ids import RUN_SCHEMA
+from sbafab.documents import Document
+from sbafab.output.checked import FindingEntry
 from sbafab.pressing.cycles import batch_times, design_runs
 from sbafab.runs.run import Conforming, Run, RunRequest, generate
 
@@ -257,13 +259,18 @@ def film_text(film: Mapping[str, Any], sheets: Sequence[Mapping[str, Any]], copi
     )
 
 
-def run_json(run: Run) -> dict[str, object]:
+class RunDocument(Document, schema="sbafab/run@1"):
+    """What commands print of a folder that they write."""
+
+    folder: Path
+    failed: bool
+    findings: list[FindingEntry]
+    notes: list[str]
+    files: list[str]
+    """what lies in the folder"""
+
+
+def run_json(run: Run) -> dict[str, Any]:
     """Return a run as JSON."""
-    return {
-        "schema": RUN_SCHEMA,
-        "folder": str(run.folder),
-        "failed": run.failed,
-        "findings": [finding.as_dict() for finding in run.findings],
-        "notes": notes_of(run.checked),
-        "files": [] if run.kept else sorted(run.manifest["files"]),
-    }
+    files = [] if run.kept else sorted(run.manifest["files"])
+    return RunDocument.of(run, notes=notes_of(run.checked), files=files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -11,7 +12,7 @@ from sbafab.cli.exit import print_error
 from sbafab.cli.options import PRESSURE, Request, finite, run_options
 from sbafab.cli.printing import print_json, print_verdict
 from sbafab.cli.progress import shown_progress
-from sbafab.output.schema_ids import SWEEP_SCHEMA
+from sbafab.documents import Document, attribute
 from sbafab.search import sweep as search
 from sbafab.search.sweep import SweepRequest, SweptDesigns
 from sbafab.search.vary import read_varied
@@ -93,21 +94,22 @@ def sweep(
         )
         raise
     if request.as_json:
-        print_json(_as_json(designs))
+        print_json(SweepDocument.of(designs))
     else:
         _print(sweep_request, designs)
 
 
-def _as_json(designs: SweptDesigns) -> dict[str, object]:
-    return {
-        "schema": SWEEP_SCHEMA,
-        "folder": str(designs.folder),
-        "designs": designs.designs,
-        "measured_now": designs.measured,
-        "no_longer_asked": designs.no_longer_asked,
-        "outcomes": designs.outcomes,
-        "files": list(designs.files),
-    }
+class SweepDocument(Document, schema="sbafab/sweep@1"):
+    """What ``sweep --json`` prints."""
+
+    folder: Path
+    designs: int
+    measured_now: int = attribute("measured")
+    no_longer_asked: int
+    outcomes: dict[str, int]
+    """designs by what became of them"""
+    files: list[str]
+    """what lies in the folder"""
 
 
 def _print(request: SweepRequest, designs: SweptDesigns) -> None:

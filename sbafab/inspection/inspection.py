@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from sbafab.cutting.calibration import COLUMNS, INSTRUMENT, Value, student_t
-from sbafab.documents import Document, at
+from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.inspection.cut_sheet import DrawnSheet
 from sbafab.inspection.edges import EdgeFit, fitted
@@ -72,25 +72,23 @@ class Inspection:
         return int((self.fit.weights > 0).sum())
 
 
-class InspectionDocument(Document):
+class InspectionDocument(Document, schema="sbafab/inspection@1"):
     """An inspection; lengths in mm."""
 
-    SCHEMA = "sbafab/inspection@1"
-
-    sheet: str = at("sheet.name")
-    film: str = at("sheet.film")
-    picture: str = at("picture.path.name")
-    picture_sha256: str = at("picture.sha256")
-    shows: Content = at("location.content")
-    from_below: bool = at("location.from_below")
+    sheet: str = attribute("sheet.name")
+    film: str = attribute("sheet.film")
+    picture: str = attribute("picture.path.name")
+    picture_sha256: str = attribute("picture.sha256")
+    shows: Content = attribute("location.content")
+    from_below: bool = attribute("location.from_below")
     kerf: Value
-    kerf_in_file: str = at("sheet.kerf")
+    kerf_in_file: str = attribute("sheet.kerf")
     scale: Scale
     edges: int
     rms: float
     within_95: float
     pixel: float
-    blur: float = at("fit.blur")
+    blur: float = attribute("fit.blur")
     failed: bool
     pieces: list[PieceFinding]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sbafab.documents import Document, Number, Short, at
+from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.models.balloon_map import DEGREE, HEIGHT_SPANS, PIECES, PRESSURE_SPANS
 from sbafab.models.joint_chain import urdf_text
 from sbafab.models.map_range import holds_at, map_range
@@ -66,12 +66,12 @@ def _csv(stack: Stack, points: int) -> str:
 class BalloonSizes(Document):
     """Sizes of a balloon, and its film."""
 
-    pocket_radius_mm: Number = at("balloon.pocket")
-    neck_radius_mm: Number = at("balloon.neck")
-    bore_radius_mm: Number = at("balloon.bore")
-    film_mm: Number = at("balloon.thickness")
-    modulus_kpa: Number = at("balloon.modulus")
-    poisson: Number = at("balloon.poisson")
+    pocket_radius_mm: PlainNumber = attribute("balloon.pocket")
+    neck_radius_mm: PlainNumber = attribute("balloon.neck")
+    bore_radius_mm: PlainNumber = attribute("balloon.bore")
+    film_mm: PlainNumber = attribute("balloon.thickness")
+    modulus_kpa: PlainNumber = attribute("balloon.modulus")
+    poisson: PlainNumber = attribute("balloon.poisson")
 
 
 MapGrid = list[list[Short | None]]
@@ -89,16 +89,14 @@ class MappedBalloon(BalloonSizes):
     potential: MapGrid
 
 
-class MapDocument(Document):
+class MapDocument(Document, schema="sbafab/balloon-map@1"):
     """The balloons of a design."""
-
-    SCHEMA = "sbafab/balloon-map@1"
 
     design: str
     units: dict[str, str]
     levels: list[int]
     """which of the balloons stands there, from 1"""
-    flat_level_mm: Short = at("pitch")
+    flat_level_mm: Short = attribute("pitch")
     chamber_axes_mm: list[list[Short]]
     balloons: list[MappedBalloon]
 

@@ -87,16 +87,6 @@ class Advice:
             "(registration.plate_made_by, registration.hand_placement, registration.seam_error)."
         )
 
-    def as_dict(self) -> dict[str, object]:
-        return {
-            "target_yield": self.target,
-            "bond_width": self.bond,
-            "mask_overhang": self.overhang,
-            "measured": None if self.share is None else self.share.value,
-            "interval": None if self.share is None else list(self.share.interval),
-            "message": self.sentence,
-        }
-
 
 def advise(design: Design, target: float, progress: Progress = ignore_progress) -> Advice:
     """The smallest bond and overhang whose interval of 95 % lies at or above ``target``, from the
@@ -168,18 +158,6 @@ class YieldDesign:
             f"written: {reached}; ask for less, cut or place more exactly "
             f"(registration.cutting_error, registration.hand_placement){free}"
         )
-
-    def as_dict(self) -> dict[str, object]:
-        return {
-            "target_yield": self.target,
-            "changes": [
-                {"key": key, "from": value_of(self.given, key), "to": value}
-                for key, value in self.changes.items()
-            ],
-            "measured": None if self.share is None else self.share.value,
-            "interval": None if self.share is None else list(self.share.interval),
-            "message": self.sentence,
-        }
 
 
 def _said(changes: Mapping[str, Any]) -> str:

@@ -36,8 +36,8 @@ from sbafab.models.figures import Prediction
 from sbafab.nesting.nest import PLACES, as_dict
 from sbafab.nesting.records import Nest
 from sbafab.output.checked import (
-    CHECKS_SCHEMA,
     Checked,
+    Checks,
     DesignPlan,
     RunPart,
     checks,
@@ -530,7 +530,7 @@ ARTEFACTS: tuple[Artefact, ...] = (
         is_page=True,
     ),
     Artefact(FINDINGS, "preview", "the page for the designer", _findings, is_page=True),
-    Artefact("checks.json", "", "what the rules found", _checks, CHECKS_SCHEMA),
+    Artefact("checks.json", "", "what the rules found", _checks, Checks.SCHEMA),
     Artefact(
         LAMINATE_FILE,
         "",

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
 
 from sbafab.actuators import build
 from sbafab.actuators.stacking import used_films
@@ -16,6 +18,7 @@ from sbafab.design.films import KerfWidth, Sheet, material
 from sbafab.design.identity import citation, design_sha256
 from sbafab.design.recipes import recipes_for
 from sbafab.design.records import Design
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.errors import DesignError, GeometryError
 from sbafab.geometry.offset import Kerf, widths
 from sbafab.geometry.region import Region
@@ -28,7 +31,7 @@ from sbafab.pressing.cycles import design_runs
 from sbafab.pressing.schedule import Schedule, plate_holes, schedule
 from sbafab.process import Progress
 from sbafab.rules.deck import has_failed, run_deck
-from sbafab.rules.finding import Finding, summary
+from sbafab.rules.finding import Finding, Verdict, summary
 from sbafab.rules.limits import CHECKED_AGAINST, USUAL, Limits, Tolerances, lowered
 from sbafab.simulators.simulator import Name
 from sbafab.version import GENERATOR
@@ -37,7 +40,31 @@ if TYPE_CHECKING:
     from sbafab.meshing.conforming.meshes import ConformingMeshes
     from sbafab.models.figures import Prediction
 
-CHECKS_SCHEMA = "sbafab/checks@1"
+Micrometres = Annotated[float, AfterValidator(lambda value: round(value, 4))]
+
+
+class PlaceEntry(Document):
+    """Where a value was found."""
+
+    interface: int | None
+    """counted from 1, bottom to top"""
+    layers: list[int]
+    x: Micrometres | None
+    """mm"""
+    y: Micrometres | None
+    """mm"""
+
+
+class FindingEntry(Document):
+    """A finding."""
+
+    rule: str
+    verdict: Verdict
+    limit: PlainNumber | None
+    measured: PlainNumber | None
+    unit: str
+    where: PlaceEntry
+    message: str
 
 
 # A design with its laminate and findings.
@@ -76,21 +103,63 @@ def check(design: Design, progress: Progress | None = None) -> Checked:
         raise DesignError(f"design {design.name} cannot be resolved: {error}") from None
 
 
+class Summary(Document):
+    """The overall verdict, and the number of rules by verdict."""
+
+    holds: bool
+    passed: int = Field(alias="pass")
+    warn: int
+    waived: int
+    fail: int
+
+
+class AdviceEntry(Document):
+    """The least bond and overhang, mm, that reach a yield, and the share that they give."""
+
+    target_yield: PlainNumber = attribute("target")
+    bond_width: float | None = attribute("bond")
+    mask_overhang: float | None = attribute("overhang")
+    measured: float | None = attribute("share.value")
+    interval: tuple[float, float] | None = attribute("share.interval")
+    message: str = attribute("sentence")
+
+
+class Checks(Document, schema="sbafab/checks@1"):
+    """What the rules found, as ``checks.json`` holds it."""
+
+    design: str
+    """name of the design or assembly, or the folder's path"""
+    source: Literal["design", "as-built"]
+    summary: Summary
+    kits: list[dict[str, Any]]
+    findings: list[FindingEntry]
+    sizes: Mapping[str, Mapping[str, float]] = {}
+    """mm by name, of each design by its name"""
+    notes: Sequence[str] = ()
+    advice: AdviceEntry | None = None
+    """of --target-yield"""
+
+
 def checks(
-    findings: Sequence[Finding], source: str, name: str, designs: Sequence[Design] = ()
+    findings: Sequence[Finding],
+    source: str,
+    name: str,
+    designs: Sequence[Design] = (),
+    **printed: object,
 ) -> dict[str, Any]:
     """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
 
     ``source`` is "design" or "as-built", ``designs`` are those that were checked.
     """
-    return {
-        "schema": CHECKS_SCHEMA,
-        "design": name,
-        "source": source,
-        "summary": summary(findings),
-        "kits": [{"design": design.name, **citation(design)} for design in designs],
-        "findings": [finding.as_dict() for finding in findings],
-    }
+    return Checks.of(
+        None,
+        design=name,
+        source=source,
+        summary=summary(findings),
+        kits=[{"design": design.name, **citation(design)} for design in designs],
+        findings=findings,
+        **printed,
+    )
 
 
 # A design's sections as the settings that rules, cutting and pressing take.

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-RUN_SCHEMA = "sbafab/run@1"
-NESTED_SCHEMA = "sbafab/nested@1"
 RECORDS_SCHEMA = "sbafab/records@1"
 HISTORY_SCHEMA = "sbafab/history@1"
-SWEEP_SCHEMA = "sbafab/sweep@1"
 EXPLAIN_SCHEMA = "sbafab/explain@1"
 EXPLAINED_SCHEMA = "sbafab/explained@1"
 SIMULATE_SCHEMA = "sbafab/simulate@2"
@@ -16,4 +13,3 @@ CALIBRATE_SCHEMA = "sbafab/calibrate@1"
 TEMPLATES_SCHEMA = "sbafab/templates@1"
 DESIGN_SCHEMA = "sbafab/design@1"
 FIND_SCHEMA = "sbafab/find@1"
-COMPARE_SCHEMA = "sbafab/compare@1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from sbafab.documents import Document, at
+from sbafab.documents import Document, attribute
 from sbafab.evidence.files import load_evidence
 from sbafab.evidence.records import MeasuredCurve
 from sbafab.models.calibrated import ModelCalibration, load_calibration
@@ -144,8 +144,8 @@ class HeldOut(Document):
 class CalibratedDocument(Document):
     """The section for programs."""
 
-    calibration: str = at("calibration.name")
-    held_out: HeldOut = at("calibration")
-    discrepancy: dict[str, float] = at("calibration.discrepancy")
+    calibration: str = attribute("calibration.name")
+    held_out: HeldOut = attribute("calibration")
+    discrepancy: dict[str, float] = attribute("calibration.discrepancy")
     """relative standard deviation that the models miss, by group"""
     curves: list[CurveDocument]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from sbafab.calibration.curve_intervals import curve_intervals, uncertainty_for
 from sbafab.calibration.model_values import NoModel, model_values
-from sbafab.documents import Document, Short, at
+from sbafab.documents import Document, Short, attribute
 from sbafab.evidence.records import Evidence, MeasuredCurve
 from sbafab.models.calibrated import Ends, ModelCalibration
 from sbafab.models.figures import Factors
@@ -188,24 +188,24 @@ class PointDocument(Document):
     """model minus measured"""
     interval: ShortEnds
     """90 % interval of the measured value"""
-    within: bool | None = at("is_within")
+    within: bool | None = attribute("is_within")
 
 
 class CurveDocument(Document):
     """A curve with its points."""
 
     source: str
-    curve: str = at("curve.id")
-    quantity: str = at("curve.quantity")
-    unit: str = at("curve.y_unit")
-    place: str = at("curve.place")
-    x_name: str = at("curve.x_name")
-    comparable: bool = at("curve.comparable")
-    reason: str = at("curve.reason")
-    unknown: list[str] = at("curve.unknown")
+    curve: str = attribute("curve.id")
+    quantity: str = attribute("curve.quantity")
+    unit: str = attribute("curve.y_unit")
+    place: str = attribute("curve.place")
+    x_name: str = attribute("curve.x_name")
+    comparable: bool = attribute("curve.comparable")
+    reason: str = attribute("curve.reason")
+    unknown: list[str] = attribute("curve.unknown")
     model: str
     assumptions: list[str]
-    no_model: str = at("reason")
+    no_model: str = attribute("reason")
     points: list[PointDocument]
 
 
@@ -218,10 +218,8 @@ class SourceDocument(Document):
     missing: list[str]
 
 
-class ComparisonDocument(Document):
+class ComparisonDocument(Document, schema="sbafab/comparison@1"):
     """Curves of sources beside the models."""
-
-    SCHEMA = "sbafab/comparison@1"
 
     calibration: str
     """name of the models' calibration, or none"""

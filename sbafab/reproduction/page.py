@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from sbafab.documents import Document, Number, Short, at
+from sbafab.documents import Document, PlainNumber, Short, attribute
 from sbafab.errors import OutputError
 from sbafab.models.figures import Prediction, Relation
 from sbafab.reports.charts import relation_svg
@@ -122,19 +122,17 @@ class RowDocument(Document):
 
     section: str
     figure: str
-    unit: str = at("measured.unit")
-    where: str = at("measured.where")
-    paper: Number | None
-    error: Number | None
+    unit: str = attribute("measured.unit")
+    where: str = attribute("measured.where")
+    paper: PlainNumber | None
+    error: PlainNumber | None
     predicted: Short | None
     model: str
     why: str
 
 
-class ReproductionDocument(Document):
+class ReproductionDocument(Document, schema="sbafab/reproduction@1"):
     """The contents of ``reproduction.json``."""
-
-    SCHEMA = "sbafab/reproduction@1"
 
     rows: list[RowDocument]
     calibrated: CalibratedDocument

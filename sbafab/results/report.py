@@ -15,7 +15,7 @@ from statistics import fmean, stdev
 from typing import Literal
 
 from sbafab.cutting.calibration import student_t
-from sbafab.documents import Document, at
+from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError
 from sbafab.reports.charts import ChartCurve, Panel, chart_svg
 from sbafab.results.builds import Build
@@ -109,25 +109,23 @@ class SuccessDocument(Document):
 
     by: By
     name: str
-    passed: int = at("share.good")
-    tested: int = at("share.builds")
-    share: float = at("share.value")
-    low: float = at("share.interval.0")
-    high: float = at("share.interval.1")
+    passed: int = attribute("share.good")
+    tested: int = attribute("share.builds")
+    share: float = attribute("share.value")
+    low: float = attribute("share.interval.0")
+    high: float = attribute("share.interval.1")
     promised: float | None
     """by registration-yield; null of several designs"""
     passed_later: int
 
 
-class ReportDocument(Document):
+class ReportDocument(Document, schema="sbafab/report@1"):
     """A report; every value is a share or has its unit beside it."""
 
-    SCHEMA = "sbafab/report@1"
-
     records: int
-    actuators: int = at("items")
+    actuators: int = attribute("items")
     success: list[SuccessDocument]
-    measured: list[Comparison] = at("comparisons")
+    measured: list[Comparison] = attribute("comparisons")
 
 
 def report(records: Sequence[Record], builds: Mapping[str, Build]) -> Report:

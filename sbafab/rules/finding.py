@@ -52,23 +52,6 @@ class Finding:
         if isinstance(self.measured, float):
             object.__setattr__(self, "measured", round(self.measured, 6))
 
-    def as_dict(self) -> dict[str, object]:
-        """The finding as ``checks.json`` holds it."""
-        return {
-            "rule": self.rule,
-            "verdict": self.verdict,
-            "limit": self.limit,
-            "measured": self.measured,
-            "unit": self.unit,
-            "where": {
-                "interface": self.where.interface,
-                "layers": list(self.where.layers),
-                "x": None if self.where.x is None else round(self.where.x, 4),
-                "y": None if self.where.y is None else round(self.where.y, 4),
-            },
-            "message": self.message,
-        }
-
 
 def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
     """Return the finding that decides each rule's verdict, in the order of the rules.
@@ -84,7 +67,7 @@ def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
     return deciding
 
 
-def summary(findings: Iterable[Finding]) -> dict[str, object]:
+def summary(findings: Iterable[Finding]) -> dict[str, int]:
     """The overall verdict and the number of rules by verdict, as ``checks.json`` holds it."""
     counts = Counter(finding.verdict for finding in decisive(findings).values())
     verdicts: tuple[Verdict, ...] = ("pass", "warn", "waived", "fail")

@@ -15,8 +15,10 @@ from sbafab.actuators import load_design, records
 from sbafab.design.files import Change, override, shown
 from sbafab.design.identity import design_sha256
 from sbafab.design.records import Design, keys_of, validated
+from sbafab.documents import Document, attribute
 from sbafab.errors import DesignError, OutputError
 from sbafab.models.balloons import has_balloons
+from sbafab.models.calibrated import Ends
 from sbafab.models.drawn_pockets import model_form
 from sbafab.models.figures import Figure, PredictionRequest
 from sbafab.models.formulas import refuse_beyond_burst, usual_pressures
@@ -25,7 +27,6 @@ from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
 from sbafab.models.stack import stack
 from sbafab.output.checked import Checked, check
-from sbafab.output.schema_ids import COMPARE_SCHEMA
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
 from sbafab.reports.html_templates import environment
@@ -73,6 +74,11 @@ class ComparedDesign:
     def design(self) -> Design:
         """The design that was checked."""
         return self.checked.design
+
+    @property
+    def design_sha256(self) -> str:
+        """Hash of the design."""
+        return design_sha256(self.design)
 
     @property
     def failed(self) -> list[str]:
@@ -153,45 +159,74 @@ class DesignComparison:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``compare --json``."""
-        return {
-            "schema": COMPARE_SCHEMA,
-            "designs": [
-                {
-                    "name": each.design.name,
-                    "source": each.source,
-                    "family": each.design.family,
-                    "design_sha256": design_sha256(each.design),
-                    "failed": each.failed,
-                }
-                for each in self.designs
-            ],
-            "keys": [{"key": row.key, "values": list(row.values)} for row in self.keys],
-            "rules": [_rule_dict(row) for row in self.rules],
-            "figures": [_figure_dict(pair) for pair in self.figures],
-        }
+        rules, figures = map(_rule_entry, self.rules), map(figure_entry, self.figures)
+        return CompareDocument.of(self, rules=[*rules], figures=[*figures])
 
 
-def _rule_dict(row: RuleDifference) -> dict[str, Any]:
-    return {
-        "rule": row.rule,
-        "unit": next(margin.unit for margin in row.margins if margin is not None),
-        "verdicts": [margin and margin.verdict for margin in row.margins],
-        "margins": [margin and margin.margin for margin in row.margins],
-        "measured": [margin and margin.measured for margin in row.margins],
-    }
+NumberOrNone = float | None
+TextOrNone = str | None
 
 
-def _figure_dict(pair: FigurePair) -> dict[str, Any]:
+class DesignEntry(Document):
+    """One of the two designs."""
+
+    name: str = attribute("design.name")
+    source: str
+    family: str = attribute("design.family")
+    design_sha256: str
+    failed: list[str]
+
+
+class RuleEntry(Document):
+    """A rule of both designs."""
+
+    rule: str
+    unit: str
+    verdicts: tuple[TextOrNone, TextOrNone]
+    margins: tuple[NumberOrNone, NumberOrNone]
+    """what is left to the limit"""
+    measured: tuple[NumberOrNone, NumberOrNone]
+
+
+class FigureEntry(Document):
+    """A figure of both designs."""
+
+    name: str
+    unit: str
+    main: bool = attribute("is_main")
+    """whether the command prints it"""
+    differs: bool
+    values: tuple[NumberOrNone, NumberOrNone]
+    intervals: tuple[Ends | None, Ends | None]
+    """90 % intervals, where a calibration says so"""
+    models: tuple[TextOrNone, TextOrNone]
+
+
+class CompareDocument(Document, schema="sbafab/compare@1"):
+    """What ``compare --json`` prints."""
+
+    designs: tuple[DesignEntry, DesignEntry]
+    keys: list[KeyDifference]
+    rules: list[RuleEntry]
+    figures: list[FigureEntry]
+    folder: str = ""
+
+
+def _rule_entry(row: RuleDifference) -> RuleEntry:
+    return RuleEntry.read(
+        row,
+        unit=next(margin.unit for margin in row.margins if margin is not None),
+        verdicts=[margin and margin.verdict for margin in row.margins],
+        margins=[margin and margin.margin for margin in row.margins],
+        measured=[margin and margin.measured for margin in row.margins],
+    )
+
+
+def figure_entry(pair: FigurePair) -> FigureEntry:
+    """Return a figure of both designs as a document has it."""
     each = [figure.as_dict() if figure is not None else None for figure in pair.figures]
-    return {
-        "name": pair.name,
-        "unit": pair.unit,
-        "main": pair.is_main,
-        "differs": pair.differs,
-        "values": [figure and figure["value"] for figure in each],
-        "intervals": [figure and figure["interval"] for figure in each],
-        "models": [figure and figure["model"] for figure in each],
-    }
+    columns = ("value", "interval", "model")
+    return FigureEntry.read(pair, **{f"{c}s": [row and row[c] for row in each] for c in columns})
 
 
 def load_compared(source: str | Path, changes: Iterable[Change] = ()) -> Design:

@@ -6,11 +6,20 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import AliasPath, Field
+
 from sbafab.design.records import Design
+from sbafab.documents import Document, PlainNumber, attribute
 from sbafab.output import advice
 from sbafab.output.advice import YieldDesign, value_of
 from sbafab.process import Progress, ignore_progress
-from sbafab.search.compare import DesignComparison, KeyDifference, compare
+from sbafab.search.compare import (
+    DesignComparison,
+    FigureEntry,
+    KeyDifference,
+    compare,
+    figure_entry,
+)
 
 DESIGNS = "as given", "changed"
 
@@ -43,10 +52,34 @@ class ReachedYield:
             for key, value in self.found.changes.items()
         )
 
+    @property
+    def figures(self) -> list[FigureEntry]:
+        """The main figures of both designs."""
+        pairs = self.comparison.figures if self.comparison is not None else ()
+        return [figure_entry(pair) for pair in pairs if pair.is_main]
+
     def as_dict(self) -> dict[str, Any]:
         """Return the entry ``yield`` of ``generate --json``."""
-        figures = self.comparison.as_dict()["figures"] if self.comparison is not None else []
-        return {**self.found.as_dict(), "figures": [each for each in figures if each["main"]]}
+        return YieldEntry.of(self)
+
+
+class ChangeEntry(Document):
+    """A key, and its values as given and as changed."""
+
+    key: str
+    given: Any = Field(validation_alias=AliasPath("values", 0), serialization_alias="from")
+    changed: Any = Field(validation_alias=AliasPath("values", 1), serialization_alias="to")
+
+
+class YieldEntry(Document):
+    """Of --target-yield; figures as given and as changed."""
+
+    target_yield: PlainNumber = attribute("found.target")
+    changes: list[ChangeEntry]
+    measured: float | None = attribute("found.share.value")
+    interval: tuple[float, float] | None = attribute("found.share.interval")
+    message: str = attribute("sentence")
+    figures: list[FigureEntry]
 
 
 def reach_yield(

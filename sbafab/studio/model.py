@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from sbafab import api
+from sbafab.output.checked import FindingEntry
 
 if TYPE_CHECKING:
     from sbafab.assemblies.build import Assembled, PlacedPart
@@ -143,7 +144,7 @@ def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[s
 
 def finding_model(finding: Finding) -> dict[str, Any]:
     """A finding as ``checks.json`` has it; of a part's design without that name in its message."""
-    model = {**finding.as_dict(), "by_user": finding.by_user}
+    model = {**FindingEntry.of(finding), "by_user": finding.by_user}
     if finding.design:
         message = finding.message.removeprefix(f"{finding.design}: ")
         model |= {"design": finding.design, "message": message}

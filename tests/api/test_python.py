@@ -16,7 +16,7 @@ import shapely
 
 import sbafab
 from sbafab.errors import DesignError, OutputError
-from sbafab.rules.finding import Finding, Place
+from sbafab.rules.finding import Finding, Findings, Place
 from sbafab.runs.run import Run
 from tests.importing.test_parchmint import circuit
 
@@ -146,7 +146,7 @@ def test_findings_and_figures_are_rows() -> None:
 
 def test_a_measured_value_is_shown_as_what_it_is_compared_as() -> None:
     found = Finding("bond-width", "pass", 0.75, 0.7499999999, "mm", Place(), "")
-    assert (found.measured, found.as_dict()["measured"]) == (0.75, 0.75)
+    assert (found.measured, Findings((found,)).rows[0]["measured"]) == (0.75, 0.75)
     short = Finding("bond-width", "fail", 0.75, 0.748, "mm", Place(), "")
     assert short.measured == 0.748
 

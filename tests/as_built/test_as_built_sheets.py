@@ -17,6 +17,7 @@ from sbafab.cutting.dxf_write import Surroundings, dxf_text
 from sbafab.cutting.order import cutting_order
 from sbafab.errors import OutputError
 from sbafab.geometry.region import Region, disc
+from sbafab.output.checked import FindingEntry
 from sbafab.runs.check_folder import check_folder
 from sbafab.runs.run import RunRequest, generate
 from tests.as_built.doctoring import Doctor
@@ -188,7 +189,7 @@ def test_a_sheet_of_an_earlier_run_is_told(doctor: Doctor) -> None:
 
 def test_the_command_tells_sheets_as_findings(doctor: Doctor) -> None:
     redraw(doctor, lambda pieces: [*pieces, disc((130.0, 130.0), 2.0)])
-    found = [finding.as_dict() for finding in check_folder(doctor.folder)]
+    found = [FindingEntry.of(finding) for finding in check_folder(doctor.folder)]
     stranger = next(f for f in found if "no piece of" in str(f["message"]))
     assert (stranger["rule"], stranger["verdict"]) == ("manifest-claims", "fail")
     assert json.loads(json.dumps(stranger["where"]))["x"] == 130.0

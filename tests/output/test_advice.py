@@ -11,9 +11,10 @@ from sbafab.cli import main
 from sbafab.design.records import Design
 from sbafab.laminate.base_plate import for_a_cnc_mill
 from sbafab.output.advice import CHECK_SEED, SEED, YieldDesign, advise, reach_yield
-from sbafab.output.checked import check, limits
+from sbafab.output.checked import AdviceEntry, check, limits
 from sbafab.rules.deck import has_failed, run_deck
 from sbafab.rules.registration_yield import simulate
+from sbafab.search.target_yield import ReachedYield
 
 SMALL = ("1dof-5mm", "stack.balloons=2", "rules.yield_builds=1000")
 
@@ -48,7 +49,7 @@ def test_where_nothing_helps_it_says_so() -> None:
     advice = advise(design, 0.99)
     assert advice.share is None
     assert "ears" in advice.sentence
-    assert advice.as_dict()["bond_width"] is None
+    assert AdviceEntry.of(advice)["bond_width"] is None
 
 
 # A design changed as little as a yield needs.
@@ -85,7 +86,7 @@ def test_the_order_of_stacking_changes_before_any_film() -> None:
     found = reached(0.945)
     assert found.changes == {"registration.sequence": "middle-first"}
     assert is_good(found)
-    assert found.as_dict()["changes"] == [
+    assert ReachedYield(found, None).as_dict()["changes"] == [
         {"key": "registration.sequence", "from": "bottom-first", "to": "middle-first"}
     ]
 

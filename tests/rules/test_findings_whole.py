@@ -9,6 +9,7 @@ import pytest
 
 from sbafab.geometry.region import disc, rectangle
 from sbafab.laminate.laminate import Laminate, Pin
+from sbafab.output.checked import FindingEntry
 from sbafab.rules import press_fit, registration_nominal
 from sbafab.rules.deck import run_rule
 from sbafab.rules.finding import Finding, Place
@@ -222,7 +223,7 @@ def test_a_finding_as_a_record_is_rounded() -> None:
     found = Finding(
         "bond-width", "fail", 0.75, 0.123456789, "mm", Place(3, (5, 6), 1.23456, -2.00004), "short"
     )
-    assert found.as_dict() == {
+    assert FindingEntry.of(found) == {
         "rule": "bond-width",
         "verdict": "fail",
         "limit": 0.75,
@@ -234,6 +235,6 @@ def test_a_finding_as_a_record_is_rounded() -> None:
 
 
 def test_a_finding_without_value_and_place_as_a_record() -> None:
-    record = Finding("tube-fit", "pass", None, None, "mm", Place(), "nothing").as_dict()
+    record = FindingEntry.of(Finding("tube-fit", "pass", None, None, "mm", Place(), "nothing"))
     assert record["measured"] is None
     assert record["where"] == {"interface": None, "layers": [], "x": None, "y": None}

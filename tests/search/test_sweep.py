@@ -15,7 +15,7 @@ import pytest
 from scipy.stats import binomtest
 
 import sbafab
-from sbafab.cli.sweep import _as_json
+from sbafab.cli.sweep import SweepDocument
 from sbafab.design.identity import design_sha256
 from sbafab.errors import OutputError
 from sbafab.models.quantity import Conditions, FigureKey, ModelId, Quantity
@@ -132,7 +132,7 @@ def test_parquet_holds_what_the_csv_holds(found: SweptDesigns) -> None:
 
 
 def test_what_is_printed_is_of_its_schema(found: SweptDesigns) -> None:
-    hold("sweep", _as_json(found))
+    hold("sweep", SweepDocument.of(found))
 
 
 def test_the_page_stands_alone_and_counts_right(found: SweptDesigns) -> None:
