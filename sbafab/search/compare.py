@@ -25,7 +25,7 @@ from sbafab.models.formulas import refuse_beyond_burst, usual_pressures
 from sbafab.models.intervals import factors_of
 from sbafab.models.prediction import predict
 from sbafab.models.quantity import ANYWHERE, Conditions, Quantity
-from sbafab.models.stack import stack
+from sbafab.models.stack import MOST_PRESSURE, stack
 from sbafab.output.checked import Checked, check
 from sbafab.output.swap import replace_text
 from sbafab.process import Progress, ignore_progress
@@ -451,7 +451,8 @@ def _inflated(comparison: DesignComparison) -> PicturePair:
             continue
         try:
             refuse_beyond_burst(laminate, pressure)
-            together = stack(design, laminate, factors=factors_of(design), form=form)
+            most = max(MOST_PRESSURE, pressure)
+            together = stack(design, laminate, most, factors_of(design), form)
             rest = together.chambers - 1
             pose = together.pose((pressure, *(0.0,) * rest))
         except DesignError as error:

@@ -185,3 +185,10 @@ def test_pictures_have_one_scale() -> None:
     (alone,) = map(inked, pictures_at_one_scale(bodies[:1], wish))
     assert small < 0.8 * alone
     assert small < large
+
+
+def test_pictures_go_to_the_pressure_that_is_compared() -> None:
+    """As far as predict: the paper's pockets burst at 367 kPa."""
+    designs = (sbafab.load("1dof-5mm", stack={"balloons": balloons}) for balloons in (1, 2))
+    page = compare_html(sbafab.compare(*designs, pressures_kpa=[150.0]))
+    assert "balloon's map" not in page
