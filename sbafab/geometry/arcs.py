@@ -24,14 +24,14 @@ Curve = Callable[[float], tuple[Point, Point]]
 TOLERANCE = 0.0005
 """Farthest a fitted arc may lie from its curve, in mm."""
 SAMPLES = 24
-"""Points of a span that are compared with its two arcs."""
+"""Points of a span at which its two arcs are checked."""
 STRAIGHT = 1e-6
 """An arc that bulges less than this, in mm, is written as a line."""
 LEAST_TURN = 1e-7
 """Radians: an arc that turns less is written as a line; no offset of it differs from a line's."""
 MOST_ARCS = 2000
 MOST_TRIALS = 40
-"""Doublings and halvings of one span: more than these leave nothing of any curve."""
+"""Doublings and halvings of one span, more than any curve needs."""
 LARGEST_TURN = math.radians(80)
 """Farthest the tangent may turn along one arc."""
 
@@ -72,7 +72,7 @@ def ellipse(centre: Point, major: Point, minor: Point) -> Curve:
 def elliptical_arc(
     centre: Point, major: Point, minor: Point, first: float, last: float
 ) -> tuple[Edge, ...]:
-    """Edges along centre + major cos t + minor sin t; exact where the half axes are a circle's."""
+    """Edges along centre + major cos t + minor sin t; exact if the half axes are a circle's."""
     if last < first:
         forward = elliptical_arc(centre, major, minor, last, first)
         return tuple(edge.reversed() for edge in reversed(forward))
@@ -92,15 +92,15 @@ def fit_arcs(
 ) -> tuple[Edge, ...]:
     """Arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to ``last``.
 
-    Neighbours share a tangent, and each biarc reaches as far as the tolerance lets it. Raises
-    FitError where the curve has a cusp, or is far too long or rugged.
+    Neighbours share a tangent, and each biarc reaches as far as the tolerance allows. Raises
+    FitError if the curve has a cusp, or is far too long or rugged.
     """
     edges: list[Edge] = []
     at, step = first, (last - first) / 4
     while at < last:
         reach, fitted = _longest_span(curve, at, last, step, tolerance)
         if reach < last and last - reach < (reach - at) / 2:
-            # Two even spans in place of a long one and a sliver.
+            # Split evenly, to avoid a sliver at the end.
             middle = (at + last) / 2
             even = _biarc(curve, at, middle, tolerance)
             reach, fitted = (middle, even) if even else (reach, fitted)
@@ -132,7 +132,7 @@ def _longest_span(
 
 
 def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Edge]:
-    """Two edges that touch the curve at both parameters; none if they stray from it between."""
+    """Two edges tangent to the curve at both parameters; empty if they stray from it between."""
     start, u = curve(first)[0], _unit_tangent(curve, first, last)
     end, v = curve(last)[0], _unit_tangent(curve, last, first)
     edges = biarc(start, u, end, v)
@@ -146,7 +146,7 @@ def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Ed
 
 
 def biarc(start: Point, u: Point, end: Point, v: Point, straight: float = STRAIGHT) -> list[Edge]:
-    """Two edges from start along ``u`` to end along ``v``; none where these turn too far apart.
+    """Two edges from start along ``u`` to end along ``v``; empty if these turn too far apart.
 
     An arc that bulges less than ``straight`` mm is a line, which leaves a kink where they join.
     """

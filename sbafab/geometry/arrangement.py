@@ -31,14 +31,14 @@ CELLS = 16
 
 
 ASLANT = 0.7548776662466927
-"""Slope of a line along which points of drawings hardly ever lie side by side."""
+"""Slope of a line on which few points of a drawing share a projection."""
 
 
 class PointPool:
-    """Clusters of points that hang together by steps shorter than ``same``, in any order.
+    """Clusters of points linked by steps shorter than ``same``, independent of their order.
 
-    A cluster is represented by its first point (least x, then least y) among ``ends``, or by its
-    first among ``inner`` where it holds no end.
+    A cluster is represented by its first point (least x, then least y) among ``ends``, or among
+    ``inner`` if it holds no end.
     """
 
     def __init__(
@@ -58,14 +58,14 @@ class PointPool:
             self._add(p)
 
     def _maybe_near(self, points: Sequence[Point]) -> set[Point]:
-        """Return the points that may lie within the tolerance of another, and some more.
+        """Return a superset of the points that lie within the tolerance of another.
 
-        Compared by their distance along a line at an angle that is rare in drawings.
+        Points are projected on a line at an angle that is rare in drawings.
         """
         reach = 1.01 * math.hypot(1, ASLANT) * self._same
         near: set[Point] = set()
         along = [p[0] + ASLANT * p[1] for p in points]
-        # Mostly there is none.
+        # Usually empty.
         if all(u - t >= reach for t, u in pairwise(sorted(along))):
             return near
         for a, b in pairwise(sorted(zip(along, points, strict=True))):
@@ -98,20 +98,20 @@ class PointPool:
         self._leader[second] = first
 
 
-# Overlays: edges cut where they meet, and those that coincide made one piece.
+# Overlays: edges cut where they meet; coincident edges become one piece.
 
 
 _Entry = tuple[float, int, Edge, int]
 """Offset of an edge's middle from its chord, the edge's number, the edge, its turns."""
 DIGIT = 16
-"""Bits of one owner's digit in a whole number that holds the winding numbers of several owners."""
+"""Bits per owner in the integer that packs the winding numbers of several owners."""
 ROUNDS = 4
-"""Most times that edges are cut again."""
+"""Maximum number of passes in which bent edges are cut again."""
 
 
 class Piece(NamedTuple):
-    """An edge that meets others at its ends only, with the winding number of its left minus that of
-    its right. ``by_owner`` separates the digits of several owners.
+    """An edge that meets others at its ends only, with the winding number on its left minus the one
+    on its right. ``by_owner`` separates the digits of several owners.
     """
 
     edge: Edge
@@ -119,14 +119,14 @@ class Piece(NamedTuple):
 
 
 class Overlay(NamedTuple):
-    """Pieces, and True if some were bent: these may cross where none was cut."""
+    """Pieces, and True if some were bent and may therefore cross uncut."""
 
     pieces: list[Piece]
     bent: bool
 
 
 def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Overlay:
-    """Return the edges of all owners, each place once, cut where they meet.
+    """Return the edges of all owners without duplicates, cut where they meet.
 
     An edge that was bent to meet another is cut again, because it may now meet a third.
     """
@@ -139,10 +139,10 @@ def overlay(
     tolerance: float = EPSILON,
     chain: Sequence[int] | None = None,
 ) -> Overlay:
-    """Return edges that each count so many turns, each place once, cut where they meet.
+    """Return edges, each with its number of turns, without duplicates, cut where they meet.
 
-    ``chain`` numbers the closed chain of each edge that stays clear of itself; it is negative for
-    other edges.
+    ``chain`` holds, for each edge, the number of its closed chain if that stays clear of itself,
+    otherwise a negative number.
     """
     bent = True
     for _ in range(ROUNDS):
@@ -173,7 +173,7 @@ class Split(NamedTuple):
 def split_edges(
     edges: Sequence[Edge], tolerance: float = EPSILON, chain: Sequence[int] | None = None
 ) -> Split:
-    """Return each edge cut where it meets another; points nearer than 2 ``tolerance`` become one.
+    """Return each edge cut where it meets another; points closer than 2 ``tolerance`` are merged.
 
     The order of the edges does not change the cuts. Meeting points of an arc are searched along its
     circle, so an arc that was bent before is replaced by one through both ends.
@@ -182,7 +182,7 @@ def split_edges(
     cuts: list[list[Point]] = [[] for _ in edges]
     meeting: list[tuple[int, int]] = []
     bounds = [edge.bounds for edge in edges]
-    # An arc may leave the box of its ends by as much as these are off its circle.
+    # An arc may leave the box of its ends by the distance of these ends from its circle.
     near = [widened(box, tolerance + BENT) for box in bounds]
     for i, j in close_pairs(bounds, tolerance):
         if chain is not None and chain[i] == chain[j] >= 0:
@@ -222,11 +222,11 @@ def split_edges(
 
 
 def _stay_apart(a: Edge, b: Edge, tolerance: float) -> bool:
-    """Return True if two arcs lie on circles that come nowhere near each other."""
+    """Return True if two arcs lie on circles that do not come near each other."""
     if not (isinstance(a, Arc) and isinstance(b, Arc)):
         return False
     gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
-    # Their ends may be as much as BENT off their circles.
+    # Their ends may be off their circles by up to BENT.
     return max(gap - r - s, abs(r - s) - gap) > tolerance + 2 * BENT
 
 
@@ -294,7 +294,7 @@ def _stops(edge: Edge, points: Sequence[Point], pool: PointPool) -> list[Point]:
 
 
 def _merged(edges: Iterable[tuple[Edge, int]], tolerance: float) -> list[Piece]:
-    """Cut edges, those that coincide as one; none where both sides have one winding number."""
+    """Merge coincident cut edges; drop those with the same winding number on both sides."""
     between: dict[tuple[Point, Point], list[tuple[int, Edge, int]]] = defaultdict(list)
     for number, entry in enumerate(edges):
         edge, turns = entry
@@ -339,9 +339,9 @@ def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
 
 
 def _plainest(entry: _Entry) -> tuple[float, Point, int]:
-    """Lines first, then arcs by radius: the same choice in any order, and along a whole circle.
+    """Sort key: lines first, then arcs by radius, so that the choice does not depend on the order.
 
-    Of edges that are equal but for their direction, the first.
+    Among edges that differ in direction only, the first is chosen.
     """
     _, number, edge, _ = entry
     if isinstance(edge, Arc):
@@ -351,13 +351,13 @@ def _plainest(entry: _Entry) -> tuple[float, Point, int]:
 
 # Winding numbers of closed chains laid over each other.
 #
-# The winding number beside one piece of each connected group is computed and then carried round
-# common points, from face to face: wherever two ways lead to a face they must agree, so the result
-# is consistent or an error.
+# The winding number beside one piece of each connected group is computed, then carried from face to
+# face round common points. Two paths to one face must agree, so the result is consistent or an
+# error.
 
 
 NEAR = 0.05
-"""Radians: edges that leave a point at less than this angle are compared farther on."""
+"""Radians: edges that leave a point at a smaller angle are compared farther along."""
 
 
 class _Leaving:
@@ -409,9 +409,9 @@ class Arrangement:
         self._by_place: EdgeIndex | None = None
         self.tangled: set[Point] = set()
         """Points where pieces leave in nearly one direction, so that rounding could order them
-        wrongly; every point, where pieces were bent and may cross between their ends.
+        wrongly; all points if pieces were bent and may cross between their ends.
         """
-        # Two follow each other either way.
+        # Two halves need no sorting.
         self.rings = {
             p: self._in_order(halves) if len(halves) > 2 else halves for p, halves in rings.items()
         }
@@ -484,7 +484,7 @@ class Arrangement:
     def _verify(self) -> None:
         """Check the winding number beside one piece of each part that clear points connect.
 
-        Raises InconsistentError where it differs from the number that was carried there.
+        Raises InconsistentError if it differs from the number that was carried there.
         """
         visited: set[int] = set()
         for first in range(len(self.pieces)):
@@ -523,10 +523,10 @@ class Arrangement:
         """Return a half with the plane outside its group on its left, and its leftmost point."""
         edge = self._drawn[number]
         p = min(edge.start, edge.end)
-        # Where an arc bulges by a rounding only, a piece at its end may lie farther left.
+        # If an arc bulges by a rounding only, a piece at its end may lie farther left.
         if isinstance(edge, Arc) and x < p[0] - 2 * EPSILON:
             return 2 * number + int(edge.ccw), (x, edge.centre[1])
-        # All leave to the right of it, so the last of those that leave upwards most.
+        # All leave to the right, so take the last of the steepest.
         halves = self.rings[p] if len(self.rings[p]) > 2 else self._in_order(self.rings[p])
         ring = [_leaving(half, self._drawn[half >> 1]) for half in halves]
         upward = max(leaving.heading for leaving in ring) - NEAR
@@ -605,11 +605,11 @@ class Arrangement:
 
 
 def _by_side(a: _Leaving, b: _Leaving) -> int:
-    """Compare by side: negative where ``b`` runs to the left of ``a``.
+    """Compare by side: negative if ``b`` runs to the left of ``a``.
 
-    Where the shorter ends it is clear of the other, or it would have been cut there. Where both
-    end in one point they are compared half way: the difference at the start and the distance at the
-    end have the other sign only by rounding.
+    The shorter one ends clear of the other, since it would have been cut there otherwise. If both
+    end in one point they are compared halfway: the difference at the start and the distance at the
+    end differ in sign only by rounding.
     """
     short, long = (a, b) if a.chord <= b.chord else (b, a)
     offset = long.to_left(short.end)

@@ -1,8 +1,8 @@
-"""Boolean operations on contours of lines and arcs, exact but for points within SAME made one.
+"""Boolean operations on contours of lines and arcs, exact except that points within SAME merge.
 
-Contours that meet are laid over each other; a piece stays if the result lies on one side of it
-only; the pieces that stay are chained into contours. Contours that meet no other stay or fall
-whole. Nothing is flattened on the way.
+Contours that meet are overlaid; a piece is kept if the result lies on only one side of it, and
+the kept pieces are chained into contours. Contours that meet no other are kept or dropped
+whole. Nothing is flattened.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ CountedContour = tuple[Contour, int]
 """A contour, and how many times it counts."""
 
 TOLERANCES = (1, 4, 16, 64)
-"""Multiples of EPSILON with which edges are cut where they meet, tried in turn; with the last,
-points within a quarter of a micrometre are one.
+"""Cutting tolerances as multiples of EPSILON, tried in turn; the last one merges points within
+a quarter of a micrometre.
 """
 
 
 def more_than(turns: int) -> Membership:
-    """Membership of places that chains wind round more than so many times."""
+    """Membership of places with a winding number above ``turns``."""
     return partial(lt, turns)
 
 
@@ -51,7 +51,7 @@ def combined(
 ) -> list[tuple[Contour, ...]]:
     """Return the contours of a region for each membership, in reading order.
 
-    Raises GeometryError where no tolerance gives one answer.
+    Raises GeometryError if no tolerance gives a consistent result.
     """
     results: list[list[Contour]] = [[] for _ in memberships]
     for group in grouped(chains_of(contours)):
@@ -65,7 +65,7 @@ def combined(
 
 
 def _whole(chain: ClosedChain, outside: int, is_in: Membership) -> list[Contour]:
-    """A chain that nothing meets, with the material on its left; nothing if it bounds none."""
+    """A chain that nothing meets, with the material on its left; empty if it bounds none."""
     contour = chain.contour
     inside = outside + (-chain.turns if contour.is_hole else chain.turns)
     if is_in(inside) == is_in(outside):
@@ -82,7 +82,7 @@ def _cut(
 
 
 def bounding(arrangement: Arrangement, is_in: Membership, outside: int = 0) -> list[Contour]:
-    """Contours round the faces of a membership, all of which lie inside ``outside`` more turns."""
+    """Contours round the faces of a membership; ``outside`` is added to their winding numbers."""
     turns = {turns for turns in set(arrangement.left) if is_in(turns + outside)}
     loops = map(tidy, arrangement.loops(arrangement.edging(turns)))
     return [settled(contour) for contour in loops if contour is not None]
@@ -91,13 +91,13 @@ def bounding(arrangement: Arrangement, is_in: Membership, outside: int = 0) -> l
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Result]) -> Result:
     """Return ``read`` of the closed chains of edges of all owners, laid over each other.
 
-    Raises GeometryError where no tolerance gives one answer.
+    Raises GeometryError if no tolerance gives a consistent result.
     """
     return _in_some_way(lambda tolerance: read(Arrangement(overlaid(owners, tolerance))))
 
 
 def _in_some_way(read: Callable[[float], Result]) -> Result:
-    """Return ``read`` of the finest tolerance for cutting edges that gives one answer."""
+    """Return ``read`` at the finest cutting tolerance that gives a consistent result."""
     place: Point | None = None
     for coarser in TOLERANCES:
         try:
@@ -113,20 +113,20 @@ def _in_some_way(read: Callable[[float], Result]) -> Result:
 
 # Groups of closed chains that meet, and their nesting.
 #
-# Bores, lumens and outlines one inside the other make most of a laminate. Chains that stay clear
-# of all others are not cut and need no arrangement: the winding number of the others round one of
-# their points gives those on both sides.
+# Most of a laminate consists of nested bores, lumens and outlines. Chains that stay clear of all
+# others are not cut and need no arrangement: the winding number of the others round one of their
+# points gives the numbers on both sides.
 
 
 FAR = 1e-3
-"""mm: chains that stay so far from each other are not cut, at any tolerance."""
+"""mm: chains at least this far apart are not cut, at any tolerance."""
 
 
 class ClosedChain:
-    """A closed chain, and how many times it and its twins count together.
+    """A closed chain, and how many times it and its duplicates count together.
 
-    ``outline`` is the first of them; ``contour`` is its tidy form if it is ``alone``, which means
-    that it stays clear of itself.
+    ``outline`` is the first of them; ``contour`` is its tidy form if it is ``alone``: clear of
+    itself.
     """
 
     __slots__ = ("alone", "circle", "contour", "outline", "start", "turns")
@@ -141,7 +141,7 @@ class ClosedChain:
         self.start: Point = self.contour.edges[0].start
 
     def turns_round(self, chain: ClosedChain) -> int:
-        """Winding number of the contour round another chain that it stays clear of."""
+        """Winding number of the contour round another chain that does not meet it."""
         if self.circle is None:
             return self.contour.winding(chain.start)
         (centre, radius) = self.circle
@@ -151,7 +151,7 @@ class ClosedChain:
 
 
 def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
-    """Chains in the order of their first, those that run along the same edges as one.
+    """Chains in order of first appearance; those along the same edges are merged.
 
     Chains that cancel out are left out.
     """
@@ -202,7 +202,7 @@ class ChainGroup:
 
     @property
     def clear(self) -> list[int]:
-        """For each edge a number of its chain; -1 where that may meet itself."""
+        """The chain number of each edge; -1 if the chain may meet itself."""
         return [
             number if chain.alone else -1
             for number, chain in enumerate(self.chains)
@@ -244,7 +244,7 @@ def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:
             for number in numbers
         }
         if len(outside) > 1:
-            # A chain that meets none of them winds round some of a group only.
+            # A chain that meets none of them may wind round only part of a group.
             return [ChainGroup(list(chains), 0)]
         groups.append(ChainGroup([chains[number] for number in numbers], outside.pop()))
     return groups
@@ -307,11 +307,11 @@ def _clear_of_circle(line: Line, arc: Arc) -> bool:
 
 
 def alone(contour: Contour) -> Contour | None:
-    """The tidy form of a contour that stays clear of itself; None where it may meet itself."""
+    """The tidy form of a contour that stays clear of itself; None if it may meet itself."""
     values = contour.__dict__
     if "alone" not in values:
         form = tidy(contour.edges) if _keeps_clear(contour) else None
-        # No contour is stored within itself, or it would outlive its last use.
+        # Do not store a contour within itself: it would never be freed.
         values["alone"] = form is not None and (form.edges == contour.edges or form)
         if form is not None:
             form.__dict__["alone"] = True
@@ -322,19 +322,19 @@ def alone(contour: Contour) -> Contour | None:
 
 
 def settled(contour: Contour) -> Contour:
-    """Mark a contour as staying clear of itself: it has been cut where it met edges."""
+    """Mark a contour as clear of itself, since it has been cut where it met edges."""
     contour.__dict__["alone"] = True
     return contour
 
 
 def meets_itself(contour: Contour) -> Contour:
-    """Mark a contour that comes near itself, so that ``alone`` need not look."""
+    """Mark a contour that comes near itself, so that ``alone`` need not test it."""
     contour.__dict__["alone"] = False
     return contour
 
 
 def turned_round(contour: Contour) -> Contour:
-    """The tidy form of a contour that is alone, with the material on its other side."""
+    """The reversed tidy form of a contour that is ``alone``."""
     return stored(contour, "turned_round", _turned)
 
 

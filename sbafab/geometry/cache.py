@@ -13,13 +13,13 @@ Arguments = ParamSpec("Arguments")
 Several = TypeVar("Several", bound=tuple[object, ...])
 
 MOST = 256
-"""Results that a function's cache holds, which bounds the memory over any number of designs."""
+"""Results kept per function, which bounds the memory over any number of designs."""
 
 
 class cached_attribute(Generic[Value]):  # noqa: N801
     """An attribute computed at its first use and then stored in its frozen record.
 
-    As ``functools.cached_property``, but without the lock that it takes before Python 3.12.
+    Like ``functools.cached_property``, but without the lock used before Python 3.12.
     """
 
     def __init__(self, compute: Callable[[Any], Value]) -> None:
@@ -53,9 +53,9 @@ def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Val
 
 
 class Exact:
-    """A record that equals others within a tolerance, but is a key by its exact numbers.
+    """A record that compares equal within a tolerance, but is a cache key by its exact numbers.
 
-    No abstract base class: every key of the cache is tested against this one, which would be slow.
+    Not an abstract base class: the cache tests every key against it, which would be slow.
     """
 
     def exact_hash(self) -> int:

@@ -36,7 +36,7 @@ Similarity = Callable[[Point], Point]
 """A similarity of the plane, by its effect on points."""
 
 MANY = 32
-"""Edges from which on filing them by place is worth its cost."""
+"""Number of edges above which a spatial index pays off."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Contour:
 
     @cached_attribute
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
-        """The edges gathered by the line or circle they lie on, from the first corner on."""
+        """The edges grouped by the line or circle they lie on, from the first corner on."""
         return tuple(runs(self.edges))
 
     @property
@@ -105,8 +105,8 @@ class Contour:
 
     @cached_attribute
     def marks(self) -> tuple[Mark, ...]:
-        """The vertices with their bulges; of one circle, which may be split anywhere, its centre
-        and radius (negative for a hole).
+        """The vertices with their bulges; for a full circle, which may be split anywhere, its
+        centre and radius (negative for a hole).
         """
         if self.circle is None:
             return self.vertices
@@ -206,7 +206,7 @@ class Contour:
         step = (high - low) / count
         rows: list[list[Edge]] = [[] for _ in range(count)]
         for edge, (_, bottom, _, top) in zip(self.edges, self.boxes, strict=True):
-            # One row more at both ends: a row's own limits are rounded.
+            # One extra row at both ends, since row limits are rounded.
             first, last = int((bottom - low) / step) - 1, int((top - low) / step) + 1
             for row in range(max(0, first), min(count - 1, last) + 1):
                 rows[row].append(edge)
@@ -232,7 +232,7 @@ def circle(centre: Point, radius: float) -> Contour:
     contour = Contour(
         tuple([Arc(compass[i], compass[(i + 1) % 4], centre, radius, True) for i in range(4)])
     )
-    # No need to work these out from the arcs.
+    # Known here; no need to derive them from the arcs.
     contour.__dict__.update(
         circle=(centre, radius),
         area=math.pi * radius * radius,
@@ -267,13 +267,13 @@ def flip(p: Point) -> Point:
     return -p[0], p[1]
 
 
-# Chords of arcs. On one circle they end at the same angles in every contour: at whole multiples
-# of one step, of which a whole number makes a quarter turn.
+# Chords of arcs. On one circle they end at the same angles in every contour: at multiples of a
+# step that divides a quarter turn.
 
 
 CHORD_ROOM = 0.05
-"""Share of a chord's angle within which no vertex stands beside the end of a run of chords that
-keep to one side of it.
+"""Share of a chord's angle that stays free of vertices at the ends of a run whose chords keep to
+one side of it.
 """
 
 
@@ -285,7 +285,7 @@ def chord_step(half: float, least: int) -> float:
 def ticks(run: Sequence[Edge], step: float, room: float) -> list[float]:
     """Angles, in the run's direction, of the chords' ends on a run of arcs of one circle.
 
-    Nearer than ``room`` steps to the run's ends there is none; a whole circle has all.
+    None lies within ``room`` steps of the run's ends; a whole circle has all of them.
     """
     first = run[0]
     assert isinstance(first, Arc)
@@ -320,7 +320,7 @@ def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Po
         half = math.acos(1 - min(1.0, sagitta / first.radius))
         if keeps_area:
             step = chord_step(half, 12)
-            # Half a step from the ends: nearer, a vertex outside the circle would make a dent.
+            # Half a step from the ends: a vertex outside the circle would make a dent any closer.
             angles = ticks(run, step, 0.5)
             radius = first.radius * math.sqrt(step / math.sin(step))
             if not angles:
@@ -338,8 +338,8 @@ def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Po
 def run_chords(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
     """Vertices of chords within ``error`` mm of a run, without the last, where the next run begins.
 
-    If it ``grows``, all that lies to the left of the run lies to the left of the chords; otherwise
-    all that lies to the left of the chords lies to the left of the run.
+    If it ``grows``, everything left of the run is left of the chords; otherwise everything left of
+    the chords is left of the run.
     """
     first = run[0]
     if isinstance(first, Line):
@@ -364,12 +364,12 @@ def _apex(arc: Arc, a: float, b: float) -> Point:
     return arc.centre[0] + radius * math.cos(middle), arc.centre[1] + radius * math.sin(middle)
 
 
-# The tidy form, in which booleans return contours: edges of one support joined, dust left out.
+# The tidy form, in which booleans return contours: edges on one line or circle joined, no dust.
 
 
 LEAST_AREA = 1e-7
-"""Contours that enclose less, in mm2, are rounding dust; so are those thinner than 4 EPSILON, as
-they are on average where no place in them is SLIVER wide.
+"""mm2: contours that enclose less are rounding dust, and so are contours with a mean width below
+4 EPSILON that are nowhere SLIVER wide.
 """
 SLIVER = 50 * EPSILON
 """mm: a tenth of a micrometre."""
@@ -397,9 +397,9 @@ def tidy(loop: Sequence[Edge]) -> Contour | None:
 
 
 def _has_room(contour: Contour) -> bool:
-    """True if a contour of hardly any width has a place beside an edge that is SLIVER wide.
+    """True if a very thin contour is SLIVER wide somewhere beside an edge.
 
-    A long sliver would hide it in its average.
+    A long sliver would hide such a place in its mean width.
     """
     into = -SLIVER / 2 if contour.area < 0 else SLIVER / 2
     for edge in contour.edges:
@@ -417,12 +417,12 @@ def _has_room(contour: Contour) -> bool:
 
 
 def _first_edge(edges: Sequence[Edge]) -> int:
-    """Number of the edge whose start has the least x, of these the least y, to 1 nm."""
+    """Number of the edge whose start has the least x, then the least y, to 1 nm."""
     limit = min([edge.start[0] for edge in edges]) + 2 * NANOMETRE
     first, least = 0, (math.inf, math.inf)
     for i, edge in enumerate(edges):
         x, y = edge.start
-        # Starts farther to the right are not rounded to the least x.
+        # Skip starts too far right to round to the least x.
         if x <= limit and (place := (nanometres(x), nanometres(y))) < least:
             first, least = i, place
     return first
@@ -440,14 +440,14 @@ def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
 def nanometres(value: float) -> int:
     """Return the whole nanometres nearest to a length in mm.
 
-    Shapes that differ by a hair come in one order if their coordinates are compared so.
+    Comparing coordinates this way gives nearly equal shapes the same order.
     """
     return math.floor(value * 1e6 + 0.5)
 
 
 def in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
     """Outer contours, then holes, each from left to right."""
-    # Most regions have one or two.
+    # Fast path: most regions have one or two.
     return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
 
 
@@ -456,7 +456,7 @@ def _reading_order(contour: Contour) -> tuple[bool, int, int, int]:
     return contour.is_hole, nanometres(low_x), nanometres(low_y), nanometres(high_x)
 
 
-# Contours that are copies of each other: measures of one hold for all.
+# Contours that are copies of each other, so that measures of one hold for all.
 
 
 COPIED = 1e-8
@@ -471,7 +471,7 @@ class Copies:
         self._firsts: dict[int, tuple[Contour, Contour]] = {}
 
     def first(self, contour: Contour) -> Contour:
-        """Return the first contour that this one is a copy of, edge by edge, moved: else itself.
+        """Return the first contour of which this one is a moved copy, edge by edge, else itself.
 
         Ends, centres and radii agree within ``COPIED``.
         """
@@ -489,7 +489,7 @@ class Copies:
                 (x, y), radius = edge.centre, edge.radius
                 numbers += (x - ox, y - oy, radius if edge.ccw else -radius)
         low_x, low_y, high_x, high_y = contour.bounds
-        # The rounded size nearly always agrees between copies and differs between others.
+        # Copies nearly always share a rounded size, and other contours rarely do.
         sizes = round(100 * (high_x - low_x)), round(100 * (high_y - low_y))
         candidates = self._by_size[len(contour.edges), len(numbers), *sizes]
         for candidate, first in candidates:
@@ -499,7 +499,7 @@ class Copies:
         return contour
 
     def lying(self, contour: Contour) -> tuple[int, Point]:
-        """Return a number of the contour's form, and its place: centre, or where it starts."""
+        """Return a number for the contour's form, and its position: centre, or start point."""
         if contour.circle is not None:
             centre, radius = contour.circle
             return -round(radius / COPIED), centre

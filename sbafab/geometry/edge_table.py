@@ -27,18 +27,18 @@ TOGETHER = 64
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Return the dot products of vectors, which have a row a coordinate."""
+    """Return the dot products of vectors with one row per coordinate."""
     product: Floats = a[0] * b[0] + a[1] * b[1]
     return product
 
 
 def columns_of(rows: Iterable[Iterable[float]], width: int) -> Floats:
-    """Return rows of so many numbers as columns; faster than ``np.array``."""
+    """Return rows of ``width`` numbers as columns; faster than ``np.array``."""
     return np.fromiter(chain.from_iterable(rows), dtype=float).reshape(-1, width).T
 
 
 class EdgeTable:
-    """Edges in arrays, a column each; points and boxes have a row a coordinate.
+    """Edges in arrays, one column per edge; points and boxes have one row per coordinate.
 
     ``turn`` is 1 for an arc that runs counter-clockwise, -1 for one that runs clockwise, 0 for a
     line, whose centre is its start. All attributes are rows of ``columns``.
@@ -76,7 +76,7 @@ class EdgeTable:
         return EdgeTable(self.columns.take(numbers, axis=1))
 
     def normal(self, p: Floats) -> Floats:
-        """Unit normals to the left of travel, each edge's at its own point."""
+        """Unit normals to the left of travel, for each edge at its own point."""
         chord = self.end - self.start
         out = p - self.centre
         x = np.where(self.turn == 0, -chord[1], -self.turn * out[0])
@@ -86,7 +86,7 @@ class EdgeTable:
         return np.array([x / length, y / length])
 
     def faces(self, p: Floats, room: float = 0.0) -> Bools:
-        """Return True for each arc whose own point, seen from the centre, lies before it.
+        """Return True for each arc whose own point lies within its sweep, seen from the centre.
 
         ``room`` is a share of the radius by which the point may lie past an end.
         """
@@ -113,7 +113,7 @@ class EdgeTable:
 
 
 class CellOrder:
-    """The order in which an ``EdgeIndex`` of the same edges returns those that a box touches.
+    """The order in which an ``EdgeIndex`` of the same edges returns the edges that a box touches.
 
     ``parts`` are the numbers of edges in each of several indices, one after the other.
     """
@@ -141,7 +141,7 @@ def touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
     if queries.shape[1] * boxes.shape[1] <= FEW:
         return _touching(queries, boxes)
     pairs = []
-    # Boxes with successive numbers mostly lie side by side.
+    # Consecutive boxes are usually neighbours.
     for first in range(0, queries.shape[1], TOGETHER):
         batch = queries[:, first : first + TOGETHER]
         near = np.flatnonzero(
@@ -158,7 +158,7 @@ def touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
 def touching_in_parts(
     queries: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
 ) -> tuple[Indices, Indices]:
-    """Return such pairs where each part of the queries is compared with its own boxes only."""
+    """Return these pairs, comparing each part of the queries with its own boxes only."""
     if len(parts) > 1 and sum(map(mul, parts, box_parts)) <= FEW:
         return _touching_in_parts(queries, parts, boxes, box_parts)
     pairs = []
@@ -177,13 +177,13 @@ def touching_in_parts(
 def _touching_in_parts(
     queries: Floats, parts: Sequence[int], boxes: Floats, box_parts: Sequence[int]
 ) -> tuple[Indices, Indices]:
-    """Return such pairs, comparing all pairs of all parts in one array."""
+    """Return these pairs, comparing all pairs of all parts in one array."""
     each = np.array(box_parts)
     begins = (each.cumsum() - each).repeat(parts)
     each = each.repeat(parts)
     query = np.arange(len(each)).repeat(each)
     box = np.arange(len(query)) - (each.cumsum() - each - begins).repeat(each)
-    # Side by side most are left out, so that few are compared in height.
+    # The test along x rules out most pairs, so few are compared along y.
     for low, high in ((0, 2), (1, 3)):
         meets = boxes[low].take(box) <= queries[high].take(query)
         meets &= boxes[high].take(box) >= queries[low].take(query)
@@ -193,13 +193,13 @@ def _touching_in_parts(
 
 
 def _touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
-    """Return such pairs, comparing every query with every box."""
+    """Return these pairs, comparing every query with every box."""
     sides = queries[:, :, None]
     meets = boxes[0] <= sides[2]
     meets &= boxes[2] >= sides[0]
     meets &= boxes[1] <= sides[3]
     meets &= boxes[3] >= sides[1]
-    # Of a flat array the few that are true are found sooner.
+    # The few True values are found faster in a flat array.
     query, box = np.divmod(meets.ravel().nonzero()[0], boxes.shape[1] or 1)
     return query, box
 
@@ -212,9 +212,9 @@ def boxes_round(p: Floats, q: Floats, margin: float) -> Floats:
 def crossings(
     origin: Floats, unit: Floats, edges: EdgeTable, tolerance: float = EPSILON
 ) -> tuple[Floats, Bools]:
-    """Return distances along straight lines at which each meets the line or circle of its own edge.
+    """Return distances along straight lines to where each meets the line or circle of its own edge.
 
-    Three rows (the foot where it touches, and two crossings), and which of them exist.
+    Three rows (the foot of a tangent, and two crossings), and a mask of the ones that exist.
     """
     chord = edges.end - edges.start
     off = edges.start - origin
@@ -235,13 +235,13 @@ def crossings(
 
 
 ROOM = 1e-9
-"""More than the rounding of the pairwise tests that follow."""
+"""Exceeds the rounding of the pairwise tests that follow."""
 
 
 class SideTable:
     """The sides of one boundary, or of several one after the other, in arrays.
 
-    ``parts`` are the numbers of sides in each boundary; none faces a side of another.
+    ``parts`` are the numbers of sides in each boundary; sides of different boundaries never face.
     """
 
     def __init__(self, sides: Sequence[BoundarySide], parts: Sequence[int] = ()) -> None:
@@ -270,7 +270,7 @@ class SideTable:
         return a.take(order), b.take(order)
 
     def later(self, aside: float, within: float) -> list[list[int]]:
-        """For each side, the later ones that it may face within a distance, and few others."""
+        """For each side, the later ones that it may face within a distance (a slight superset)."""
         _, a, b = self._near(within)
         a, b = a[a < b], b[a < b]
         opposed = self._opposed(a, b, aside)

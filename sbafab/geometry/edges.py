@@ -17,13 +17,13 @@ Bounds = tuple[float, float, float, float]
 EPSILON = 2e-6
 """mm: a point nearer to an edge than this, 2 nm, lies on it."""
 SAME = 2 * EPSILON
-"""mm: points nearer to each other than this, 4 nm, are one point, and so are all that hang together
-by such steps. Far below the 1 um that the cut files promise.
+"""mm: points closer than this, 4 nm, are one point, and so are chains of such points. Far below the
+1 um that the cut files promise.
 """
 
 BENT = EPSILON / 4
-"""mm: an edge whose points were moved off its line or circle by more may cross others where no
-crossing was searched. Two edges bent by less are within EPSILON of each other where they meet.
+"""mm: an edge whose ends were moved off its line or circle by more may cross others outside the
+searched places. Two edges bent by less are within EPSILON of each other where they meet.
 """
 UNKNOWN = 1e9
 """Radians: an angle that is not computed yet."""
@@ -241,7 +241,7 @@ class Arc:
         x1, y1 = last
         low_x, high_x = (x0, x1) if x0 < x1 else (x1, x0)
         low_y, high_y = (y0, y1) if y0 < y1 else (y1, y0)
-        # The ends may lie off the circle by a rounding: they are within the box, too.
+        # The ends may be off the circle by a rounding: include them in the box.
         return (
             cx - r if y0 >= cy >= y1 and cx - r < low_x else low_x,
             cy - r if x0 <= cx <= x1 and cy - r < low_y else low_y,
@@ -269,7 +269,7 @@ class Arc:
         return (-y / r, x / r) if self.ccw else (y / r, -x / r)
 
     def parameter(self, p: Point) -> float:
-        """Fraction of the sweep at the foot of ``p``; outside 0 to 1 where the foot misses."""
+        """Fraction of the sweep at the foot of ``p``; outside 0 to 1 if the foot misses the arc."""
         cx, cy = self.centre
         ax, ay = self.start[0] - cx, self.start[1] - cy
         bx, by = p[0] - cx, p[1] - cy
@@ -319,7 +319,7 @@ class Arc:
         return Arc(start, end, self.centre, self.radius, self.ccw)
 
     def offset(self, distance: float) -> Arc | None:
-        """The concentric edge ``distance`` to the right; None where it shrinks to nothing."""
+        """The concentric edge ``distance`` to the right; None if it shrinks to nothing."""
         radius = self.radius + distance if self.ccw else self.radius - distance
         if radius < EPSILON:
             return None
@@ -360,7 +360,7 @@ def quarter_arcs(
 
 
 def from_end_to_end(edge: Edge) -> Edge:
-    """The edge; for an arc with an end off its circle by more than BENT, the arc of its sweep
+    """The edge; an arc with an end off its circle by more than BENT becomes the arc of equal sweep
     through both ends.
     """
     if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
@@ -400,10 +400,10 @@ def turns_round(edge: Edge, p: Point) -> int:
     if isinstance(edge, Arc):
         cx, cy = edge.centre
         dx, dy = x1 - x0, y1 - y0
-        # Beside its chord alone: that of a short arc with snapped ends may lean either way.
+        # Only beside its chord: the chord of a short arc with snapped ends may lean either way.
         beside = 0 <= (px - x0) * dx + (py - y0) * dy <= dx * dx + dy * dy
         if beside and (px - cx) * (px - cx) + (py - cy) * (py - cy) < edge.radius * edge.radius:
-            # A point exactly on the chord belongs to the side the count above gave it.
+            # A point exactly on the chord belongs to the side that the count above assigned.
             is_left = side > 0 or (side == 0 and (y0 > y1 or (y0 == y1 and x1 > x0)))
             if edge.ccw and not is_left:
                 turns += 1
@@ -413,7 +413,7 @@ def turns_round(edge: Edge, p: Point) -> int:
 
 
 def box_round(boxes: Sequence[Bounds]) -> Bounds:
-    """Return the box that holds all boxes; of none, one that holds nothing."""
+    """Return the bounding box of all boxes; without boxes, one that contains nothing."""
     low_x = low_y = math.inf
     high_x = high_y = -math.inf
     for box in boxes:
@@ -424,16 +424,16 @@ def box_round(boxes: Sequence[Bounds]) -> Bounds:
     return low_x, low_y, high_x, high_y
 
 
-# Runs: edges of a closed chain gathered by the line or circle that they lie on.
+# Runs: edges of a closed chain grouped by the line or circle that they lie on.
 
 
 _Run = tuple[Edge, ...]
 DRIFT = 4 * EPSILON
-"""mm by which edges on one line or circle may leave it together."""
+"""mm by which the edges of one run may deviate from its line or circle in total."""
 
 
 def runs(edges: _Run) -> Iterator[_Run]:
-    """The edges gathered by the line or circle they lie on, from the first corner on."""
+    """The edges grouped by the line or circle they lie on, from the first corner on."""
     breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
     if not breaks:
         yield from _parted(edges)
@@ -460,7 +460,7 @@ def same_support(a: Edge, b: Edge) -> bool:
 def _parted(run: _Run) -> Iterator[_Run]:
     """Yield the run in parts that each follow one line or circle.
 
-    Each two neighbours may look straight and the edges yet turn a corner together.
+    Every pair of neighbours may look straight although the run as a whole turns a corner.
     """
     if len(run) < 3:
         yield run
@@ -470,7 +470,7 @@ def _parted(run: _Run) -> Iterator[_Run]:
         offs = [_off_circle(edge, head) for edge in run]
         place = next((i for i, off in enumerate(offs) if off > DRIFT), 0)
     else:
-        # Of a closed run, what lies farthest from where it starts.
+        # The point of a closed run farthest from its start.
         chord = Line(head.start, end)
         offs = [
             math.dist(edge.start, end) if head.start == end else abs(chord.to_left(edge.start))
@@ -506,8 +506,8 @@ def meeting_points(
 ) -> list[Point]:
     """Return the points that lie on both edges, to within the tolerance.
 
-    Edges that run along each other give the ends of the shared stretch. ``boxes`` hold all points
-    within the tolerance of each edge, if computed already; no point outside them is returned.
+    Overlapping edges give the ends of the shared stretch. ``boxes`` hold all points within the
+    tolerance of each edge, if computed already; no point outside them is returned.
     """
     near_a, near_b = boxes
     low_x, low_y = max(near_a[0], near_b[0]), max(near_a[1], near_b[1])
@@ -531,7 +531,7 @@ def meeting_points(
     for p in _support_crossings(a, b, tolerance):
         if not (low_x <= p[0] <= high_x and low_y <= p[1] <= high_y):
             continue
-        # A known end wins over a computed point: at a touch the computed one is less exact.
+        # Prefer a known end to a computed point, which is less exact at a touch.
         if any(math.dist(p, q) <= 2 * tolerance for q in points):
             continue
         if distance_to(a, p) < tolerance and distance_to(b, p) < tolerance:
@@ -603,7 +603,7 @@ def _circle_circle(a: Arc, b: Arc, tolerance: float) -> list[Point]:
         return []
     ux, uy = (bx - ax) / gap, (by - ay) / gap
     along = (gap * gap + (a.radius - b.radius) * (a.radius + b.radius)) / (2 * gap)
-    # The product form keeps its digits where the circles all but touch (Heron).
+    # The product form keeps its digits if the circles nearly touch (Heron).
     rest = outside * inside * (gap + a.radius + b.radius) * (gap + abs(a.radius - b.radius))
     half = math.sqrt(max(0.0, rest)) / (2 * gap)
     if outside < tolerance or inside < tolerance:

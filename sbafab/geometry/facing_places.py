@@ -1,4 +1,4 @@
-"""Facing places: all segments hardly wider than the narrowest that stand square on edges."""
+"""Facing places: segments square on edges that are barely longer than the shortest one."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from sbafab.geometry.edge_table import Bools, Floats, Indices
 
 STEP = math.radians(15)
-"""Widest step of samples along an arc: 7.5 degrees aside, a shift counts 0.99 of its length."""
+"""Largest sample step along an arc: a shift 7.5 degrees off counts 0.99 of its length."""
 
 
 def sampled(edges: Sequence[Edge], room: float = 0.0) -> tuple[list[Point], list[int]]:
     """Return samples of all edges, one edge after the other, and the count of each.
 
-    On a line both ends and the middle, on an arc at least one every 15 degrees; the outermost lie
-    ``room`` mm within the ends.
+    A line has both ends and the middle, an arc at least one sample every 15 degrees; the outermost
+    samples lie ``room`` mm inside the ends.
     """
     points: list[Point] = []
     counts: list[int] = []
@@ -87,9 +87,9 @@ FacingQuery = tuple[Region, float, float, Width | None]
 def facing_places_of(queries: Sequence[FacingQuery]) -> Sequence[FacingPlaces]:
     """Return the facing places of several regions, each once.
 
-    They are at most ``slack`` mm wider than the narrowest. Besides the places where edges are
-    square on each other these are samples along edges that run nearly alongside: where a layer
-    turns, those may become the narrowest.
+    They are at most ``slack`` mm wider than the narrowest. They include places where edges are
+    square on each other, and samples along nearly parallel edges: these may become the narrowest if
+    a layer turns.
     """
     nowhere = FacingPlaces(np.zeros((2, 0)), np.zeros((2, 0)), np.zeros(0))
     results = [nowhere] * len(queries)
@@ -144,7 +144,7 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     counts, samples = np.array(numbers), columns_of(points, 2)
     owner = np.arange(len(counts)).repeat(counts)
     normals = sides.table.at(owner).normal(samples)
-    # Each pair has a row a sample of its first side.
+    # One row per pair and sample of its first side.
     rows_of_pair = counts.take(a)
     starts = (counts.cumsum() - counts).take(a)
     row = np.arange(rows_of_pair.sum()) + (starts - rows_of_pair.cumsum() + rows_of_pair).repeat(
@@ -153,7 +153,7 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
     p, n = samples.take(row, axis=1), normals.take(row, axis=1)
     feet, inward, there = _feet(p, sides, b.repeat(rows_of_pair))
     side = a.repeat(rows_of_pair)
-    # Rows of samples, a column a foot.
+    # One row per sample, one column per foot.
     p, n = p[:, :, None], n[:, :, None]
     off = feet - p
     square = dot(n, inward) < -math.cos(ASIDE)
@@ -164,7 +164,7 @@ def _from_samples(sides: SideTable, within: Floats) -> tuple[Floats, Floats, Ind
 
 
 def _feet(p: Floats, sides: SideTable, numbers: Indices) -> tuple[Floats, Floats, Bools]:
-    """The points of sides where their normals pass through points, up to two each; the normals."""
+    """The points of sides whose normals pass through given points, up to two each; the normals."""
     edges = sides.table.at(numbers)
     chord, off = edges.end - edges.start, p - edges.start
     square = dot(chord, chord)

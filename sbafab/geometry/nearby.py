@@ -1,4 +1,4 @@
-"""Search for near edges and boxes without comparing all of them."""
+"""Spatial search for near edges and boxes without comparing all pairs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import NamedTuple
 from sbafab.geometry.edges import EPSILON, Bounds, Edge, Line, Point, distance_to, left_normal
 
 MANY_BOXES = 500
-"""Number from which comparing boxes in arrays outweighs loading NumPy."""
+"""Number of boxes above which NumPy is worth loading."""
 FEW_BOXES = 100
-"""Number up to which a sweep needs no bands."""
+"""Number of boxes up to which a sweep needs no bands."""
 AT_ONCE = 1_000_000
-"""Pairs that are compared at once, which bounds the memory."""
+"""Pairs compared at once, which bounds the memory."""
 
 
 def widened(box: Bounds, margin: float) -> Bounds:
@@ -30,8 +30,8 @@ def boxes_meet(a: Bounds, b: Bounds) -> bool:
 def close_pairs(boxes: Sequence[Bounds], reach: float) -> Iterable[tuple[int, int]]:
     """Return the numbers of boxes that come within ``reach`` of each other, by a sweep along x.
 
-    The sweep runs in bands along y as high as a box is on average, so its time grows with the boxes
-    and the pairs alone. For few boxes it needs no bands; many are compared in arrays. The order of
+    The sweep runs in bands along y of the mean height of a box, so its time grows only with the
+    number of boxes and pairs. Few boxes need no bands; many are compared in arrays. The order of
     the pairs is the same in each case.
     """
     if len(boxes) >= MANY_BOXES:
@@ -85,7 +85,7 @@ def _close_among_few(boxes: Sequence[Bounds], reach: float) -> list[tuple[int, i
 
 
 def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[int, int]]:
-    # Only large designs need it: reading a drawing must not load NumPy.
+    # Loaded for large designs only: reading a drawing must not import NumPy.
     import numpy as np
 
     sides = np.array(boxes)
@@ -113,7 +113,7 @@ def _close_among_many(boxes: Sequence[Bounds], reach: float) -> Iterator[tuple[i
 
 
 FEW_EDGES = 64
-"""Number up to which comparing all boxes costs less than filing them."""
+"""Number of edges up to which comparing all boxes costs less than indexing them."""
 
 
 class EdgeIndex:
@@ -183,7 +183,7 @@ class EdgeIndex:
         return numbers if len(self._boxes) > FEW_EDGES else self.in_order(box, numbers)
 
     def among(self, box: Bounds, numbers: Iterable[int]) -> list[int]:
-        """Return those of these edges whose bounding boxes meet a box."""
+        """Return the numbers of the given edges whose bounding boxes meet a box."""
         low_x, low_y, high_x, high_y = box
         boxes = self._boxes
         return [
@@ -196,7 +196,7 @@ class EdgeIndex:
         ]
 
     def in_order(self, box: Bounds, numbers: list[int]) -> list[int]:
-        """Sort edges that meet a box, in rising order, by the first cell they share with it."""
+        """Sort the edges that meet a box by the first cell they share with it."""
         if len(numbers) > 1:
             x, y = self._low
             cell = self.cell
@@ -206,9 +206,9 @@ class EdgeIndex:
         return numbers
 
     def about(self, box: Bounds, after: int = -1) -> Iterable[int]:
-        """Return the edges in the cells that a box touches, cell by cell, each once; all of a few.
+        """Return the edges in the cells that a box touches, cell by cell, without duplicates.
 
-        Those up to the number ``after`` may be left out.
+        A small index returns all edges. Edges up to the number ``after`` may be left out.
         """
         if len(self._boxes) <= FEW_EDGES:
             return range(after + 1, len(self._boxes))
@@ -250,7 +250,7 @@ ALONGSIDE = 1e-3
 
 
 BESIDE = 1e-5
-"""Rounding: mm by which an edge may miss another's normals."""
+"""mm by which an edge may miss another's normals because of rounding."""
 
 
 class Foot(NamedTuple):

@@ -28,7 +28,7 @@ from sbafab.geometry.nearby import EdgeIndex, close_pairs, widened
 from sbafab.geometry.region import Region, enclosed, union, wound
 
 CUSP = 3.0
-"""Radians: a path that turns by more is taken to turn back on itself."""
+"""Radians: a path that turns by more is treated as turning back on itself."""
 
 
 def grow(region: Region, distance: float) -> Region:
@@ -57,7 +57,7 @@ def shrink(region: Region, distance: float) -> Region:
 
 @cached
 def _shrunk(region: Region, distance: float) -> Region:
-    # The outside grows: its winding number is 0 or more, that of the remaining material -1.
+    # The outside grows: its winding number is 0 or more, and -1 in the remaining material.
     outside = [contour.reversed() for contour in region.contours]
     chains = [_chain(contour, distance) for contour in outside]
     return enclosed([chain.reversed() for chain in chains if chain.edges])
@@ -78,12 +78,12 @@ def _chain(contour: Contour, distance: float) -> Contour:
     moved = list(_moved(contour, distance))
     chain = Contour(tuple(_joined_up(moved)))
     corners = {edge.start for edge in contour.edges}
-    # Where it goes by way of a corner, it meets itself.
+    # A path through a corner meets itself there.
     return meets_itself(chain) if any(edge.end in corners for edge in moved) else chain
 
 
 def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
-    """Yield the edges with ends that differ by a rounding made one point."""
+    """Yield the edges with ends merged that differ by a rounding."""
     starts = [edge.start for edge in edges]
     for i, start in enumerate(starts):
         end = edges[i - 1].end
@@ -95,10 +95,10 @@ def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
 
 
 def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
-    """Yield the edges of such a chain.
+    """Yield the edges of the chain described in ``_chain``.
 
-    The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are walked
-    round one by one, by way of the corner, or straight on where both cover the difference.
+    The band of an edge reaches ``distance`` to its right. Bands that overlap at a corner are
+    traversed one by one through the corner, or straight on if both cover the difference.
     """
     edges = contour.edges
     moved = [edge.offset(distance) for edge in edges]
@@ -139,10 +139,10 @@ def _lines(stops: Sequence[Point]) -> list[Edge]:
 
 
 def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
-    """The arcs round a convex corner; none where the path is smooth or turns the other way.
+    """The arcs round a convex corner; empty if the path is smooth or turns the other way.
 
-    At the tip of a cusp rounding decides whether the path turns left or right, so there it gets
-    its arcs either way: round the end of a notch they lie in the material, and fall away.
+    At the tip of a cusp, rounding decides whether the path turns left or right, so it always gets
+    its arcs there: round the end of a notch they lie in the material and drop out.
     """
     turn = left_turn(before, after)
     if -CUSP < turn < EPSILON / distance:
@@ -165,12 +165,12 @@ def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
 TOLERANCE = 0.0001
 """Farthest an arc of the path may lie from the exact curve, in mm."""
 STEP, CORNER_STEP = math.radians(15), math.radians(30)
-"""Most that one arc turns along a curve, and round a corner."""
+"""Maximum turn of one arc along a curve, and round a corner."""
 LEAST_ARCS = 3
-"""Fewest arcs of a curve: four points identify its circle when the kerf is undone."""
+"""Minimum arcs per curve: four points identify its circle when the kerf is undone."""
 SHORT = 1e-3
 SHARES = tuple(0.75**k for k in range(16, 0, -1))
-"""Shares of two tracks from whose ends a crossing is searched."""
+"""Shares of two tracks at which the search for a crossing starts."""
 
 
 def rim(a: float, b: float, angle: float) -> Point:
@@ -223,7 +223,7 @@ def crossing(
 ) -> tuple[float, float]:
     """Return the parameters at which a track that ends meets one that starts.
 
-    Searched from there, and where the beam moves back there, from farther away.
+    The search starts there, or farther away if the beam moves back there.
     """
     (before, far, end), (after, start, on) = arriving, leaving
     if before.runs_on(end) and after.runs_on(start):
@@ -263,7 +263,7 @@ def _met(before: Track, s: float, after: Track, t: float) -> tuple[float, float]
 
 
 def arcs_along(track: Track, t0: float, t1: float) -> list[Edge]:
-    """Return arcs through points of the track, as many as keep within the tolerance."""
+    """Return enough arcs through points of the track to stay within the tolerance."""
     step, tolerance = (STEP, TOLERANCE) if track.radius else (CORNER_STEP, TOLERANCE / 10)
     count = max(1, math.ceil(abs(t1 - t0) / step - 1e-9))
     if track.radius * abs(t1 - t0) > SHORT:
@@ -274,7 +274,7 @@ def arcs_along(track: Track, t0: float, t1: float) -> list[Edge]:
 def through(
     curve: Callable[[float], Point], t0: float, t1: float, count: int, tolerance: float
 ) -> list[Edge]:
-    """Arcs through ``count`` + 1 points of the curve, or through twice as many, and so on."""
+    """Arcs through ``count`` + 1 points of the curve, doubled until they fit."""
     while True:
         stops = [t0 + (t1 - t0) * k / count for k in range(count + 1)]
         points = [curve(t) for t in stops]
@@ -310,9 +310,9 @@ def _through(start: Point, middle: Point, end: Point) -> Edge:
 
 # The path of a beam of some width: regions grown by half of it, contour by contour.
 #
-# A beam that is as wide along x as along y grows a region by a disc, and arcs stay arcs. One that
-# is not grows it by an ellipse: straight edges stay straight, and every other piece of the path,
-# known in closed form, is drawn through its points by arcs.
+# A beam of equal width along x and y grows a region by a disc, and arcs stay arcs. An unequal beam
+# grows it by an ellipse: straight edges stay straight, and arcs are fitted through points of every
+# other piece of the path, which has a closed form.
 
 
 Kerf = float | tuple[float, float]
@@ -324,11 +324,11 @@ FINE = 0.00005
 SHORTEST = 4 * EPSILON
 """An arc shorter than this is stretched as a line."""
 STRETCHED_STEP, MOST_PIECES = math.radians(30), 1000
-"""Most that two arcs turn along a stretched curve, and more of them than any curve takes."""
+"""Maximum turn of two arcs along a stretched curve, and more pieces than any curve needs."""
 SMOOTH = 1e-3
-"""Radians: a curve that turns more at once crosses itself there, or another."""
+"""Radians: a curve with a sharper kink crosses itself or another one there."""
 PROJECTIONS, BEND = 3, 0.01
-"""Steps to the point of a track nearest to another; its radius (mm) where its way counts as much.
+"""Iterations to a track's nearest point; radius in mm at which distance along it counts equally.
 """
 
 
@@ -341,7 +341,7 @@ class Lost(NamedTuple):
 
 @dataclass(frozen=True)
 class BeamPath:
-    """The path, and the first contour of the region that has no single path of its own."""
+    """The path, and the first contour of the region without a single path."""
 
     region: Region
     lost: Lost | None
@@ -353,9 +353,9 @@ def widths(kerf: Kerf) -> tuple[float, float]:
 
 
 def beam_path(region: Region, kerf: Kerf) -> BeamPath:
-    """The path of the beam's middle that leaves ``region``; both widths 0, or neither.
+    """The path of the beam's centre that leaves ``region``; both widths are 0, or neither is.
 
-    Raises GeometryError where the offset cannot be worked out.
+    Raises GeometryError if the offset cannot be computed.
     """
     a, b = (width / 2 for width in widths(kerf))
     if a == b:
@@ -363,7 +363,7 @@ def beam_path(region: Region, kerf: Kerf) -> BeamPath:
         return BeamPath(path, _lost(region.contours, region.contours, path, a))
     reach = max(a, b)
     sx, sy = reach / a, reach / b
-    # Stretched so that the beam is round, in arcs a twentieth of a micrometre off the ellipses.
+    # Stretch until the beam is round; the arcs stay within 0.05 um of the ellipses.
     rounds = [[_stretched(edge, sx, sy) for edge in c.edges] for c in region.contours]
     wide = Region(tuple(Contour(tuple(e for part in c for e in part)) for c in rounds))
     grown = grow(wide, reach)
@@ -395,7 +395,7 @@ class _Source(NamedTuple):
 
 
 class _Sources(NamedTuple):
-    """The stretched region's edges by place, and the source of each."""
+    """A spatial index of the stretched region's edges, and the source of each."""
 
     near: EdgeIndex
     of: Sequence[_Source]
@@ -406,7 +406,7 @@ class _Sources(NamedTuple):
 def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
     """Return edges within FINE of the stretched edge, without kinks, which would count as corners.
 
-    The ends are exactly those of the edge; an edge too short to turn is a line.
+    The ends match the edge's exactly; an edge too short to turn becomes a line.
     """
     start, end = ((p[0] * sx, p[1] * sy) for p in (edge.start, edge.end))
     if isinstance(edge, Line) or math.dist(start, end) < SHORTEST:
@@ -422,7 +422,7 @@ def _stretched(edge: Edge, sx: float, sy: float) -> list[Edge]:
             biarc(p, u, q, v, 0.0)
             for (p, q), (u, v) in zip(pairwise(points), pairwise(ways), strict=True)
         ]
-        # A biarc lies farthest from its curve at a sixth of its way and at five sixths.
+        # A biarc deviates most from its curve at one sixth and five sixths of its length.
         if all(
             pair and distance_to(pair[half], curve(s + (t - s) * share)[0]) < FINE
             for pair, (s, t) in zip(pieces, pairwise(angles), strict=True)
@@ -466,7 +466,7 @@ def _lost(
 
 
 def _track(edge: Edge, sources: _Sources) -> Track:
-    """Return the track of a piece of the stretched path, in true measure."""
+    """Return the track of a piece of the stretched path, in unstretched lengths."""
     near, reach = sources.near, sources.reach
     if isinstance(edge, Arc) and edge.ccw and abs(edge.radius - reach) < EPSILON:
         for number in near.numbers(widened((*edge.centre, *edge.centre), 2 * EPSILON)):
@@ -498,7 +498,7 @@ def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, f
         stretch = [edges[k % count] for k in range(i, max(after, i + 1))]
         t0 = _parameter(tracks[i], stretch[0], stretch[0].start, scale)
         stops = _cut_where_wide(tracks[i], t0, _last(tracks[i], t0, stretch, scale))
-        # Where the beam moves back from end to end, the pieces beside cross each other.
+        # If the beam moves back along the whole piece, its neighbours cross each other.
         spans += [
             (tracks[i], s, t)
             for s, t in pairwise(stops)
@@ -508,7 +508,7 @@ def _drawn(edges: Sequence[Edge], tracks: Sequence[Track], scale: tuple[float, f
 
 
 def _untangled(contour: Contour) -> Contour:
-    """The contour without loops of less than a micrometre, where tracks cross once too often."""
+    """The contour without loops below a micrometre, made by tracks with an extra crossing."""
     edges, count = contour.edges, len(contour.edges)
     if not any(
         (i - j) % count not in (1, count - 1) and meeting_points(edges[i], edges[j])
@@ -516,14 +516,14 @@ def _untangled(contour: Contour) -> Contour:
     ):
         return contour
     whole = wound((contour.reversed() if contour.is_hole else contour).edges, 0).contours
-    # A larger loop is no rounding: it stays, and is found when the file is read.
+    # A larger loop is not rounding: keep it, so that reading the file back reports it.
     if len(whole) != 1 or abs(whole[0].area - abs(contour.area)) > EPSILON * contour.length:
         return contour
     return whole[0].reversed() if contour.is_hole else whole[0]
 
 
 def _cut_where_wide(track: Track, t0: float, t1: float) -> list[float]:
-    """Both ends, and between them where the beam's flat side moves back and crosses itself."""
+    """Both ends, and the points between at which the beam's flat side moves back over itself."""
     flat = 0.0 if track.beam[1] > track.beam[0] else math.pi / 2
     low, high = sorted((t0, t1))
     sides = [
@@ -542,18 +542,18 @@ def _parameter(track: Track, edge: Edge, p: Point, scale: tuple[float, float]) -
     ux, uy = edge.direction(p)
     t = math.atan2(-ux * sy, uy * sx)
     for _ in range(PROJECTIONS):
-        # The way tells the parameter, and the place more precisely where the track bends little.
+        # The length gives the parameter, more exactly than the position if the track bends little.
         (x, y), (rx, ry) = track.at(t), track.rate(t)
         t += ((p[0] / sx - x) * rx + (p[1] / sy - y) * ry) / (rx * rx + ry * ry + BEND**2)
     return t
 
 
 def _last(track: Track, t0: float, edges: Sequence[Edge], scale: tuple[float, float]) -> float:
-    """The parameter at the end of a track's edges, on from ``t0`` the way the track turns."""
+    """The parameter at the end of a track's edges, counted from ``t0`` as the track turns."""
     t1 = _parameter(track, edges[-1], edges[-1].end, scale)
     if track.line is not None:
         return t1
-    # No edge turns by more than a half: their turns tell how often the normal has come round.
+    # No edge turns by more than half a turn, so their sum counts the normal's full turns.
     turn = sum(
         math.remainder(
             _parameter(track, e, e.end, scale) - _parameter(track, e, e.start, scale), math.tau
@@ -565,7 +565,7 @@ def _last(track: Track, t0: float, edges: Sequence[Edge], scale: tuple[float, fl
 
 
 def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
-    """Yield edges along the tracks, which end where they cross the next."""
+    """Yield edges along the tracks; each ends where it crosses the next."""
     starts, ends = [t0 for _, t0, _ in spans], [t1 for _, _, t1 in spans]
     for i, span in enumerate(spans):
         ends[i - 1], starts[i] = crossing(spans[i - 1], span)
@@ -592,7 +592,7 @@ def _joined(spans: Sequence[tuple[Track, float, float]]) -> Iterator[Edge]:
             yield from edges
 
 
-# Strips: what a tool of some width covers on its way along a path, or a region on its own.
+# Strips: the area swept by a tool of some width along a path, or by a region along an edge.
 
 
 SHORT_TURN = 1.5
@@ -600,10 +600,10 @@ SHORT_TURN = 1.5
 
 
 def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
-    """Return what a tool of a ``width``, mm, covers along a chain of edges, with exact arcs.
+    """Return the area swept by a tool of ``width`` mm along a chain of edges, with exact arcs.
 
-    The chain may be closed, and may cross, touch or retrace itself. An open one ends round, or
-    square; where it bends the tool turns on the spot, so corners are round outside.
+    The chain may be closed, and may cross, touch or retrace itself. An open one has round or
+    square ends; the tool turns on the spot at corners, so they are round on the outside.
     """
     half = width / 2
     is_closed = math.dist(path[0].start, path[-1].end) < EPSILON
@@ -615,9 +615,9 @@ def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
 
 
 def dragged(region: Region, way: Edge) -> Region:
-    """Return all sums of a point of a region and one of an edge: what it covers on its way along.
+    """Return the Minkowski sum of a region and an edge: the area swept along the edge.
 
-    It is what the region covers at both ends, and what its edges cover on the way, exactly.
+    It is the exact union of the region at both ends and the areas swept by its edges.
     """
     bands = [
         band
@@ -630,13 +630,13 @@ def dragged(region: Region, way: Edge) -> Region:
 
 
 def _short(edge: Edge) -> list[Edge]:
-    """An edge, an arc in parts that turn by less than a quarter."""
+    """The edge, with an arc split into parts of less than a quarter turn."""
     count = math.ceil(abs(edge.sweep) / SHORT_TURN) if isinstance(edge, Arc) else 1
     return [edge.part(edge.at(k / count), edge.at((k + 1) / count)) for k in range(count)]
 
 
 def _sums(a: Edge, b: Edge) -> Iterator[Region]:
-    """Yield what the sums of a point of one short edge and one of another cover."""
+    """Yield the Minkowski sum of two short edges."""
     if isinstance(a, Arc) and isinstance(b, Arc):
         loops = _sums_of_arcs(a, b)
     else:
@@ -648,7 +648,7 @@ def _sums(a: Edge, b: Edge) -> Iterator[Region]:
 
 
 def _slid(edge: Edge, way: Edge) -> Iterator[Sequence[Edge]]:
-    """Yield outlines of what an edge covers on a straight way, parted where it turns along it."""
+    """Yield outlines of the area swept by an edge along a line, split where both are parallel."""
     shares = [0.0, 1.0]
     if isinstance(edge, Arc):
         (u, v), (x, y), r = way.direction(way.start), edge.centre, edge.radius
@@ -669,10 +669,10 @@ def _shifted(edge: Edge, by: Point) -> Edge:
 
 
 def _sums_of_arcs(a: Arc, b: Arc) -> Iterator[Sequence[Edge]]:
-    """Yield outlines of what the sums of a point of one arc and one of another cover.
+    """Yield outlines of the Minkowski sum of two arcs.
 
-    By the angles of the two points these are a rectangle. It folds over where the arcs are
-    parallel: where the angles differ by a multiple of pi. On one side of that no sums are equal.
+    The angles of the two points span a rectangle. The map to their sum folds where the arcs are
+    parallel, that is, where the angles differ by a multiple of pi; each side of it is one-to-one.
     """
     first, low = a.start_angle, b.start_angle
     last, high = first + a.sweep, low + b.sweep
@@ -689,13 +689,13 @@ def _sums_of_arcs(a: Arc, b: Arc) -> Iterator[Sequence[Edge]]:
             if off >= 0:
                 half.append((s, t))
             if off * off1 < 0:
-                # One of the two angles is that of the side of the rectangle.
+                # One of the two angles is constant along a side of the rectangle.
                 half.append((s, s - fold) if s == s1 else (t + fold, t))
         yield _outline(half, a, b)
 
 
 def _outline(cell: Sequence[Point], a: Arc, b: Arc) -> list[Edge]:
-    """The sums along the edges of a cell of angles: arcs of either, or of both where it folds."""
+    """The sums along the edges of a cell of angles: arcs of either arc, or of both at the fold."""
     centre = a.centre[0] + b.centre[0], a.centre[1] + b.centre[1]
 
     def on(middle: Point, radius: float, angle: float) -> Point:
@@ -716,7 +716,7 @@ def _outline(cell: Sequence[Point], a: Arc, b: Arc) -> list[Edge]:
 
 
 def shortened(path: Sequence[Edge], length: float) -> tuple[Edge, ...]:
-    """Return a chain of edges without a ``length``, mm, at each end; a closed one as it is."""
+    """Return a chain of edges shortened by ``length`` mm at each end; a closed one is unchanged."""
     if math.dist(path[0].start, path[-1].end) < EPSILON:
         return tuple(path)
     edges = list(path)
@@ -731,7 +731,7 @@ def shortened(path: Sequence[Edge], length: float) -> tuple[Edge, ...]:
 
 
 def _band(edge: Edge, half: float) -> Region:
-    """Return what lies within ``half`` of an edge, mm, on normals of it."""
+    """Return the points within ``half`` mm of an edge along its normals."""
     right, left = edge.offset(half), edge.offset(-half)
     if right is not None and left is not None:
         sides: list[Edge] = [right, Line(right.end, left.end), left.reversed()]

@@ -81,13 +81,13 @@ class Region(Exact):
 
     @cached_attribute
     def index(self) -> EdgeIndex:
-        """The edges filed by place."""
+        """The spatial index of the edges."""
         return EdgeIndex(self.edges, [box for contour in self.contours for box in contour.boxes])
 
     @property
     def pieces(self) -> tuple[Region, ...]:
         """The connected pieces, each an outer contour with its holes."""
-        # A region that kept itself would be freed late.
+        # A region must not store itself: it would be freed late.
         return (self,) if len(self.outers) == 1 else self._several
 
     @cached_attribute
@@ -113,12 +113,12 @@ class Region(Exact):
     def key(self) -> str:
         """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
 
-        Equal keys are of equal shapes. Shapes that differ by a hair may round to two keys; compare
-        with ``==``.
+        Equal keys mean equal shapes. Nearly equal shapes may round to different keys; compare with
+        ``==``.
         """
         rings = []
         for contour in self.contours:
-            # Adding 0.0 makes -0.0 and 0.0 one.
+            # Adding 0.0 turns -0.0 into 0.0.
             ring = [tuple(round(value, 6) + 0.0 for value in mark) for mark in contour.marks]
             first = ring.index(min(ring))
             rings.append(ring[first:] + ring[:first])
@@ -148,7 +148,7 @@ class Region(Exact):
         )
 
     def __eq__(self, other: object) -> bool:
-        """True if corners and arcs lie within SAME of each other, wherever contours start."""
+        """True if corners and arcs agree within SAME, regardless of where contours start."""
         if not isinstance(other, Region) or len(self.contours) != len(other.contours):
             return False
         if self is other:
@@ -197,7 +197,7 @@ class Region(Exact):
         return Region(tuple([contour.mapped(point, scale, mirror) for contour in self.contours]))
 
     def moved(self, dx: float, dy: float) -> Region:
-        """Return the region moved by so many mm along x and y."""
+        """Return the region moved by ``dx`` and ``dy`` mm."""
         return self.mapped(shift(dx, dy), 1.0, False)
 
     def turned(self, degrees: float, about: Point = (0.0, 0.0)) -> Region:
@@ -213,7 +213,7 @@ class Region(Exact):
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
         """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""
-        # No other code needs it.
+        # Imported here only.
         import shapely
 
         pieces = self.polygons(chord_error)
@@ -275,14 +275,14 @@ def _difference(a: Region, b: Region) -> Region:
 def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
     """Return the points that closed chains wind round more than ``above`` times together.
 
-    Raises GeometryError where no tolerance for cutting edges gives one answer.
+    Raises GeometryError if no tolerance for cutting edges gives a consistent result.
     """
     (outlines,) = combined([(contour, 1) for contour in contours], [more_than(above)])
     return Region(outlines)
 
 
 def wound(edges: Sequence[Edge], above: int) -> Region:
-    """As ``enclosed``, for edges of closed chains in any order, all cut where they meet."""
+    """Like ``enclosed``, for edges of closed chains in any order, all cut where they meet."""
     return Region(in_reading_order(arranged([edges], partial(_wound, above))))
 
 
@@ -354,7 +354,7 @@ def strip(start: Point, end: Point, width: float) -> Region:
 
 
 def stadium(centre: Point, width: float, length: float) -> Region:
-    """A slot shape ``width`` across x and ``length`` along y; a disc where they are equal."""
+    """A slot shape ``width`` across x and ``length`` along y; a disc if they are equal."""
     x, y = centre
     r = width / 2
     half = length / 2 - r
@@ -420,7 +420,7 @@ def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
 
 
 def _may_meet(box: Bounds, origin: Point, direction: Point) -> bool:
-    """Return True if a line comes into a box, or so near that it could touch an edge in it."""
+    """Return True if a line enters a box, or comes near enough to touch an edge in it."""
     (ox, oy), (ux, uy) = origin, direction
     low_x, low_y, high_x, high_y = box
     off = ux * ((low_y + high_y) / 2 - oy) - uy * ((low_x + high_x) / 2 - ox)

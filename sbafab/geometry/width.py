@@ -1,8 +1,8 @@
 """The least width of a region, and of the gaps in it, between edges that face each other.
 
-A width is the length of a segment inside the material that stands square on the edge at both of
-its ends (a reflex corner counts as an edge turned into a point). Offsets would miss what lies
-between corners; these are exact for lines and arcs.
+A width is the length of a segment inside the material that is square on the edge at both ends (a
+reflex corner counts as an edge shrunk to a point). Offsets would miss widths between corners;
+these are exact for lines and arcs.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ ROUNDING = 1e-12
 TOUCH = 1e-6
 """mm within which two points are one."""
 ASIDE = math.acos(0.9)
-"""Radians (25 degrees) that the normals of samples which still face each other may turn aside."""
+"""Radians (25 degrees) by which normals of facing samples may deviate."""
 SQUARE = 0.05
-"""As ASIDE for edges square on each other: room for rounding, and for those alongside."""
+"""Like ASIDE, for edges square on each other: an allowance for rounding and parallel edges."""
 NOTCH = 15.0
-"""Degrees: notches sharper than this are no slots."""
+"""Degrees: notches sharper than this do not count as slots."""
 MANY_SIDES = 100
 """Number from which comparing all pairs in arrays is faster."""
 
@@ -71,13 +71,13 @@ def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) ->
 
 @cached
 def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
-    """Return the narrowest slot, hole or gap between pieces, likewise."""
+    """Return the narrowest slot, hole or gap between pieces; arguments as in ``least_width``."""
     outside = [stored(contour, "from_outside", Contour.reversed) for contour in region.contours]
     return least_of(Boundary(may_be_narrower(outside, below), sharp), below)
 
 
 def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
-    """Return the place where a beam's path loses a contour: the slot that closes, or its middle."""
+    """Return the place at which a beam's path loses a contour: the closing slot, or its middle."""
     if lost.fate != "vanishes":
         slot = least_gap(region, NOTCH, max(widths(kerf)))
         if slot is not None:
@@ -94,7 +94,7 @@ class Boundary:
         self.corners = [
             corner for contour in contours for corner in stored(contour, "corners", _corners)
         ]
-        """What corner each side starts at, if any."""
+        """The corner that each side starts at, if any."""
         self.ends = [
             ends
             for contour in contours
@@ -106,7 +106,7 @@ class Boundary:
             [side.edge for side in self.sides], [side.box for side in self.sides]
         )
         self.known_clear: dict[tuple[Point, Point], bool] = {}
-        """Of segments that were asked: whether no edge crosses them."""
+        """Cache by segment: True if no edge crosses it."""
         self._table: SideTable | None = None
 
     @property
@@ -158,7 +158,7 @@ class _Narrowest:
         after: int = -1,
         among: Sequence[int] | None = None,
     ) -> list[tuple[int, BoundarySide]]:
-        """Return numbered sides that a segment shorter than the best could join to ``a``.
+        """Return numbered sides that a segment shorter than the best so far could join to ``a``.
 
         Their normals are opposed somewhere, to within ``aside`` radians, and their numbers come
         ``after`` this one. ``among`` limits the candidates.
@@ -225,7 +225,7 @@ class Gathered(_Narrowest):
 def least_of(boundary: Boundary, below: float) -> Width | None:
     if boundary.pinch is not None:
         return Width(0.0, boundary.pinch, boundary.pinch)
-    # Most edges lie far apart: far pairs are searched only where no near ones face.
+    # Most edges lie far apart: search far pairs only if no near ones face.
     reach = min(boundary.index.cell, boundary.widest_least + 2 * SHORTER)
     farthest = min(below, 2 * boundary.index.across)
     while True:
@@ -263,7 +263,7 @@ def _corners(contour: Contour) -> list[Corner | None]:
 
 def _side(edge: Edge, box: Bounds) -> BoundarySide:
     if isinstance(edge, Arc):
-        # As ``at`` computes it, without computing the sweep again.
+        # Like ``at``, without recomputing the sweep.
         sweep = edge.sweep
         middle, half_turn = edge.on_circle(edge.start_angle + 0.5 * sweep), abs(sweep) / 2
     else:
@@ -297,7 +297,7 @@ def _between_edges(a: BoundarySide, b: BoundarySide, narrowest: _Narrowest) -> N
 
 
 def _lie_farther(a: Edge, b: Edge, than: float) -> bool:
-    """Return True if two arcs surely lie farther apart than so many mm, as their circles do."""
+    """Return True if the circles of two arcs are farther apart than ``than`` mm."""
     if not (isinstance(a, Arc) and isinstance(b, Arc)):
         return False
     gap, r, s = math.dist(a.centre, b.centre), a.radius, b.radius
@@ -349,13 +349,13 @@ def _at_corners(corners: Sequence[Corner | None], narrowest: _Narrowest) -> None
     for i, corner in enumerate(corners):
         if corner is None:
             continue
-        # What a convex corner faces may be square on neither of its edges.
+        # An edge facing a convex corner may be square on neither of its edges.
         aside = SQUARE if corner.turn < 0 else math.pi / 2
         for _, side in narrowest.near(corner, aside):
             for foot in side.feet(corner.point):
                 _corner_to_edge(corner, side, foot, narrowest)
         if corner.turn < 0:
-            # The edges of a corner that faces another one need not face it.
+            # A corner may face another one although its edges do not.
             for facing in narrowest.corners_near(corner, i):
                 if facing.turn < 0:
                     _between_corners(corner, facing, narrowest)
@@ -419,13 +419,13 @@ class Corner:
 
 
 def corners_of(contour: Contour) -> Iterator[Corner | None]:
-    """Yield the corner that each edge starts at; None where the path is smooth."""
+    """Yield the corner that each edge starts at; None if the path is smooth there."""
     edges = contour.edges
     for before, after in zip((edges[-1], *edges), edges, strict=False):
         u, v = before.direction(after.start), after.direction(after.start)
         turn = math.atan2(u[0] * v[1] - u[1] * v[0], _dot(u, v))
         if abs(turn) > math.pi - SMOOTH:
-            # At a cusp the side of the material follows from the curvatures alone.
+            # At a cusp the curvatures decide the side of the material.
             turn = math.pi if _curvature(before) + _curvature(after) < 0 else -math.pi
         yield Corner(after.start, u, v, turn) if abs(turn) > SMOOTH else None
 
@@ -456,16 +456,16 @@ def _turned_left(u: Point) -> Point:
     return -u[1], u[0]
 
 
-# Ends of tapered arms: nothing stands square on both sides there, yet they are narrow.
+# Ends of tapered arms: narrow, although no segment is square on both sides there.
 #
-# An end lies between two flanks that come together towards it: a rounded corner, or an edge between
-# two bends, each a corner or its fillet. It is as wide as its flanks are apart where they stop.
+# An end lies between two converging flanks: a rounded corner, or an edge between two bends, each a
+# corner or its fillet. Its width is the distance between the ends of its flanks.
 
 
 SMOOTH = 1e-4
-"""Corners that turn by less, in radians, are none."""
+"""Radians: smaller turns do not count as corners."""
 TAPER = 30.0
-"""Degrees; flanks at a wider angle are two sides of a corner, not of an arm."""
+"""Degrees: flanks at a wider angle form a corner, not an arm."""
 LEAST_TURN = math.pi - math.radians(TAPER + 1)
 ROUNDED = 0.1
 """Degrees a corner may miss its angle by: coordinates read from a file are rounded."""
@@ -494,11 +494,11 @@ class _Run:
 def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]]:
     """Yield the ends of the flanks of every tapered end in a contour with the arm on its left.
 
-    A rounded corner is an end where the corner itself would have less than ``sharp`` degrees.
+    A rounded corner is an end if the sharp corner would have less than ``sharp`` degrees.
     """
     runs = [_Run(edges[0], edges[-1], run_sweep(edges)) for edges in contour.runs]
     corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
-    # No end where the path can not turn far enough from the run before to the one after.
+    # Skip if the path cannot turn far enough from the run before to the one after.
     most = [abs(run.sweep) + abs(corner) for run, corner in zip(runs, corners, strict=True)]
     ahead = [*range(1, len(runs)), 0]
     for i, run in enumerate(runs):
@@ -507,7 +507,7 @@ def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]
             continue
         before, after = runs[i - 1], runs[(i + 1) % len(runs)]
         into, out = corners[i], corners[(i + 1) % len(runs)]
-        # A round end that turns further is wider than between its flanks.
+        # A round end that turns further is wider than its flanks are apart.
         if abs(into) < SMOOTH and abs(out) < SMOOTH and run.sweep < math.pi + SMOOTH:
             yield from _between_flanks(runs, corners, i, i, min(TAPER, sharp) - ROUNDED)
         start = i - 1 if abs(into) < SMOOTH and before.is_fillet(run) else i
@@ -532,11 +532,11 @@ def _between_flanks(
         yield runs[start % len(runs)].first.start, runs[stop % len(runs)].last.end
 
 
-# Concentric arcs with material between them, where no search is needed.
+# Concentric arcs with material between them, which need no search.
 
 
 WIDE = 1e-5
-"""mm: in narrower rings rounding may decide which edges face each other."""
+"""mm: rounding may decide which edges face each other in narrower rings."""
 
 
 def bound_a_ring(a: Edge, b: Edge) -> bool:
@@ -576,7 +576,7 @@ MANY_CIRCLES = 24
 def widest_least(contours: Sequence[Contour]) -> float:
     """Return an upper bound of the least width, mm, from gaps between circles and across them.
 
-    Infinite if there are no circles.
+    Infinite without circles.
     """
     circles = [(*p.circle, p.is_hole) for p in contours if p.circle is not None]
     least = min((2 * radius for _, radius, is_hole in circles if not is_hole), default=math.inf)
@@ -596,9 +596,9 @@ def widest_least(contours: Sequence[Contour]) -> float:
 
 
 def may_be_narrower(contours: Sequence[Contour], than: float) -> Sequence[Contour]:
-    """Return the contours without circles that are as wide, and stay as far from all others.
+    """Return the contours without the circles that are at least ``than`` mm wide and isolated.
 
-    No width below ``than`` mm begins, ends or is crossed there.
+    No width below ``than`` mm starts, ends or is crossed at these circles.
     """
     if math.isinf(than):
         return contours
@@ -644,8 +644,8 @@ class InscribedDisc(NamedTuple):
 
 @cached
 def inscribed_disc(region: Region) -> InscribedDisc:
-    """Return the largest disc within a region that is not empty: of a circle itself, of others
-    within 1e-4 of its radius, where the centre of what is left by an offset is not exactly it.
+    """Return the largest disc within a region that is not empty: exact for a circle, otherwise
+    within 1e-4 of its radius, taken from the centre of the region's last nonempty offset.
     """
     circles = [None if region.holes else outer.circle for outer in region.outers]
     widest = max((c for c in circles if c), key=lambda c: c[1], default=((0.0, 0.0), 0.0))
@@ -661,9 +661,9 @@ def inscribed_disc(region: Region) -> InscribedDisc:
         return InscribedDisc(widest[1], widest[0])
     centre = centroid(max(core.pieces, key=lambda piece: piece.area))
     if not region.contains(centre) or region.distance_to_edge(centre) < low:
-        centre = core.contours[0].edges[0].at(0.5)  # What is left may lie round a hole.
+        centre = core.contours[0].edges[0].at(0.5)  # The remaining core may surround a hole.
     return InscribedDisc(max(low, region.distance_to_edge(centre)), centre)
 
 
 DISC_SHARE = 1e-4
-"""Share of a radius to which an inscribed disc is known."""
+"""Relative accuracy of an inscribed disc's radius."""
