@@ -25,9 +25,9 @@ _SurfaceFiles = tuple[list[tuple[str, Writer]], MeshKind, str | None, Callable[[
 class MeshFile:
     """A mesh as the manifest lists it.
 
-    ``file`` is relative to the output folder; ``chamber`` is None but for cavities; ``elements``
-    counts triangles of surfaces, elements of volume and shell meshes. ``fill_ul`` is the volume of
-    air in a balloon that the shape is for.
+    ``file`` is relative to the output folder; ``chamber`` is None except for cavities; ``elements``
+    counts triangles of surfaces, elements of volume and shell meshes. ``fill_ul`` is the air per
+    balloon in ul for which the shape was computed.
     """
 
     file: str
@@ -48,9 +48,9 @@ def write_meshes(
 
     A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
     ``folder`` is the output folder, ``sagitta`` the height in mm of an arc over its chord.
-    ``progress`` is called with the numbers of files done and of all files. Return the files
-    written, and those left out, each with the reason: a surface that is open, or whose volume is
-    not the sum of area x thickness.
+    ``progress`` is called with the number of files done and the total. Return the files written,
+    and the omitted ones with the reason: a surface that is open, or whose volume is not the sum of
+    area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     surfaces = _surfaces(laminate, sagitta)
@@ -72,7 +72,7 @@ def write_meshes(
 
 
 def _surfaces(laminate: Laminate, sagitta: float) -> list[_SurfaceFiles]:
-    """Return each surface's files with their writers, its kind and chamber, and what makes it."""
+    """Return each surface's files with their writers, its kind and chamber, and its maker."""
     wrap = tube_wrap(laminate)
 
     def of_solid(suffix: str) -> list[tuple[str, Writer]]:

@@ -1,7 +1,7 @@
 """Partition of the plane by the edges of regions, prisms over it, and the flat solid and cavities.
 
-Every edge of every region is an edge of the partition, so surfaces put together from its cells
-meet edge to edge.
+Every edge of every region is an edge of the partition, so surfaces assembled from its cells meet
+edge to edge.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import shapely
 
 GRID = 1e-5
-"""Spacing in mm of the grid that vertices are rounded to; single precision tells them apart."""
+"""Grid spacing in mm to which vertices are rounded; single precision resolves it."""
 
 
 class Partition(NamedTuple):
@@ -35,7 +35,7 @@ class Partition(NamedTuple):
 
     ``points`` (n, 2) float64 in mm. ``edges`` (m, 2) int64 indices of points, each edge of each
     cell with the cell on its left; ``cells`` (m,) the cell of an edge. ``inside`` (regions,
-    cells) bool: which cells make up a region.
+    cells) bool: a mask of the cells of each region.
     """
 
     points: NDArray[np.float64]
@@ -80,7 +80,7 @@ def partition(regions: Sequence[Region], sagitta: float) -> Partition:
     steps = np.round(coordinates / GRID).astype(np.int64)
     distinct, index = np.unique(steps, axis=0, return_inverse=True)
     index = index.ravel()
-    # A ring ends where it starts; the step to the next ring is no edge.
+    # A ring ends where it starts; skip the step to the next ring.
     joined = ring[:-1] == ring[1:]
     edges = np.column_stack([index[:-1], index[1:]])[joined]
     return Partition(distinct * GRID, edges, owner[ring[:-1][joined]], inside)
@@ -90,7 +90,7 @@ def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
     import shapely
 
     def ring(contour: Contour) -> shapely.LinearRing:
-        # As an array, which shapely takes without a look at every number of it.
+        # As an array, which shapely takes without checking every number.
         return shapely.linearrings(np.array(facets(contour, sagitta)))
 
     pieces = []
@@ -101,7 +101,7 @@ def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
 
 
 def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Closed chains of points that the directed edges make up, none through a point twice."""
+    """Closed chains formed by the directed edges, none passing a point twice."""
     following: defaultdict[int, list[int]] = defaultdict(list)
     for tail, head in edges.tolist():
         following[tail].append(head)
@@ -127,7 +127,7 @@ def _loops(edges: NDArray[np.int64]) -> list[NDArray[np.int64]]:
 
 
 SAGITTA = 0.0015
-"""Default height in mm of an arc over its chord: no point is farther than 1 um from the arc."""
+"""Default height in mm of an arc over its chord: every point is within 1 um of the arc."""
 
 VOLUME_TOLERANCE = 0.002
 """Largest relative difference between a surface's volume and its sum of area x thickness."""
@@ -149,9 +149,9 @@ class Slab(NamedTuple):
 def fuse(slabs: Sequence[Slab], sagitta: float, cuts: Sequence[float] = ()) -> Surface:
     """The surface of the union of the slabs, built film by film from one partition of the plane.
 
-    Arcs become chords within ``sagitta`` mm of them, of equal area. No boolean of solids is
-    needed: walls stand on the outline of a level, and what differs from the level above it or
-    below it is a face. ``cuts`` (x in mm, ascending) are lines that no face runs across.
+    Arcs become chords within ``sagitta`` mm of them, of equal area. Solid booleans are not needed:
+    walls stand on the outline of a level, and its difference from the level above or below is a
+    face. Faces are split along ``cuts`` (x in mm, ascending).
     """
     regions = list(dict.fromkeys(slab.region for slab in slabs))
     strips = list(_strips(regions, cuts))
@@ -209,8 +209,8 @@ def sealed(name: str, surface: Surface) -> Surface:
 def _levels(
     slabs: Sequence[Slab], regions: Sequence[Region], plane: Partition
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The heights where something starts or ends, and the filled cells between each two."""
-    # To 1e-9 mm, so that faces that touch lie at one number.
+    """The heights at which slabs start or end, and the filled cells between successive heights."""
+    # Rounded to 1e-9 mm, so that touching faces have equal heights.
     spans = [(round(slab.bottom, 9), round(slab.top, 9)) for slab in slabs]
     heights = sorted({height for span in spans for height in span})
     number = {height: index for index, height in enumerate(heights)}
@@ -224,7 +224,7 @@ def _levels(
 def _faces(
     plane: Partition, levels: NDArray[np.bool_], strips: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """Triangles (k, 3) of point + height x number of points, heights counted from the lowest."""
+    """Triangles (k, 3) of indices point + level x number of points, levels from the lowest."""
     walls: dict[bytes, NDArray[np.int64]] = {}
     lids: dict[bytes, NDArray[np.int64]] = {}
     count = len(plane.points)
@@ -245,7 +245,7 @@ def _faces(
 
 
 def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Two triangles an edge, from one height to the next."""
+    """Two triangles per edge, from one height to the next."""
     tails, heads = edges.T
     lower = np.column_stack([tails, heads, heads + count])
     upper = np.column_stack([tails, heads + count, tails + count])
@@ -256,16 +256,16 @@ def _walls(edges: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 
 
 MASKLESS_GAP = 0.02
-"""mm that a gap with seams and no mask is open in solids and meshes: films would else be one body.
+"""mm by which a gap with seams but no mask opens in solids and meshes, to keep the films apart.
 """
 FOLD_WIDTH = 0.5
-"""mm along a fold within which the two halves are one body in solids and meshes."""
+"""Width in mm along a fold in which the two halves are one body in solids and meshes."""
 
 
 def parted(laminate: Laminate) -> Laminate:
     """Return the laminate with ``MASKLESS_GAP`` in each gap whose films stay apart without a mask.
 
-    Seams bond such films; all else of the gap is open, between two balloons as in a chamber.
+    Seams bond such films; the rest of the gap is open, both between balloons and in a chamber.
     """
     opened = {
         interface.above.index
@@ -280,7 +280,7 @@ def parted(laminate: Laminate) -> Laminate:
 
 
 def folded_strips(laminate: Laminate, interface: Interface) -> Region:
-    """Return the strips along the folds of an interface, where film goes on to the other half."""
+    """Return the strips along the folds of an interface, where film continues to the other half."""
     layers = interface.below.index, interface.above.index
     folds = [fold for fold in laminate.folds if (fold.lower, fold.upper) == layers]
     strips = [strip(*fold.line, 2 * FOLD_WIDTH) for fold in folds]
@@ -288,7 +288,7 @@ def folded_strips(laminate: Laminate, interface: Interface) -> Region:
 
 
 def body_bond(laminate: Laminate, interface: Interface) -> Region:
-    """Return where the films of an interface are one body: bonds, and strips along folds."""
+    """Return the region in which the films of an interface are one body: bonds and fold strips."""
     strips = folded_strips(laminate, interface)
     return interface.bond if strips.is_empty else interface.bond | strips
 
@@ -311,25 +311,25 @@ def solid_slabs(laminate: Laminate) -> list[Slab]:
 def solid(laminate: Laminate, sagitta: float = SAGITTA, cuts: Sequence[float] = ()) -> Surface:
     """The surface of the flat actuator, pockets, bores, inlet channels and lumen open.
 
-    Its volume is that of :func:`solid_slabs`. No face runs across the ``cuts``, x in mm. Raises
-    OutputError if it does not close.
+    Its volume equals the sum over :func:`solid_slabs`. Faces are split at the ``cuts``, x in mm.
+    Raises OutputError if it does not close.
     """
     return closed_surface("the solid", solid_slabs(laminate), sagitta, cuts)
 
 
-# The cavity of a chamber: what its air fills, closed at the inlet's mouth.
+# The cavity of a chamber: the volume of its air, closed at the inlet's mouth.
 
 
 def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
     """The chamber's pockets and its channels through walls and neck rings, bottom to top.
 
-    Raises OutputError where the chamber has no pocket, or a film between two of its pockets
-    closes a channel.
+    Raises OutputError if the chamber has no pocket, or a film between two of its pockets closes a
+    channel.
     """
     laminate = parted(laminate)
     axes = [bore.centre for bore in laminate.bores if bore.chamber == chamber.name]
     if laminate.nets:
-        # Chambers of nets go through all holes that are drawn, not through bores alone.
+        # Chambers of nets pass through all drawn holes, not only bores.
         inner = laminate.tpe_layers[1:-1]
         axes = [_middle(hole) for layer in inner for hole in layer.profile.holes]
     levels = [interface for interface in laminate.interfaces if interface.kind == "chamber"]
@@ -361,8 +361,8 @@ def cavity(
 ) -> Surface:
     """The closed surface of a chamber's cavity, normals out of the air.
 
-    Its volume is that of :func:`cavity_slabs`. No face runs across the ``cuts``, x in mm. Raises
-    OutputError if it does not close.
+    Its volume equals the sum over :func:`cavity_slabs`. Faces are split at the ``cuts``, x in mm.
+    Raises OutputError if it does not close.
     """
     return closed_surface(
         f"the cavity of chamber {chamber.name}", cavity_slabs(laminate, chamber), sagitta, cuts
@@ -372,10 +372,10 @@ def cavity(
 def _pocket(
     laminate: Laminate, interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
 ) -> Iterator[Contour]:
-    """The unbonded pieces round the centres, open where a channel runs through them."""
+    """The unbonded pieces round the centres, open where a channel passes through them."""
     strips = folded_strips(laminate, interface)
     void = interface.unbonded if strips.is_empty else interface.unbonded - strips
-    # Where a seam goes round a pocket, what lies outside the seam goes round the pocket too.
+    # If a seam surrounds a pocket, the area outside the seam surrounds the pocket too.
     innermost = {
         min(round_it, key=lambda piece: piece.outers[0].area)
         for centre in centres
@@ -393,7 +393,7 @@ def _pocket(
 def _channels(
     laminate: Laminate, chamber: Chamber, axes: Sequence[Point], low: float, high: float
 ) -> Iterator[Slab]:
-    """The openings on the chamber's axes in all that is bonded between two heights in mm."""
+    """The openings on the chamber's axes through bonded films between two heights in mm."""
     films = [
         (f"layer {layer.index}", layer.profile, layer.z, layer.z + layer.film.thickness)
         for layer in laminate.tpe_layers

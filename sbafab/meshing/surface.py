@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import trimesh
 
 Vector = tuple[float, float, float]
-"""A point or a way in space, mm, or a direction."""
+"""A point or displacement in space, mm, or a direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +42,15 @@ class Surface:
 
 
 def open_edges(surface: Surface) -> NDArray[np.float64]:
-    """Middles (k, 3) in mm of the edges that do not join exactly two faces of like turn.
+    """Midpoints (k, 3) in mm of the edges that do not join exactly two consistently oriented faces.
 
-    Points are merged as a single-precision file merges them. Empty for a watertight surface.
+    Points are merged as in a single-precision file. Empty for a watertight surface.
     """
     faces = _merged(surface.points)[surface.faces]
     size = len(surface.points)
     tails = faces.ravel()
     heads = np.roll(faces, -1, axis=1).ravel()
-    # One key an edge, the same both ways but for its last bit: sorted, each stands beside its twin.
+    # One key per edge; its last bit is the direction, so sorting puts opposite edges side by side.
     low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     keys = np.sort((low * size + high) * 2 + (tails > heads))
     ways = keys[::2]
@@ -67,8 +67,8 @@ def open_edges(surface: Surface) -> NDArray[np.float64]:
 
 
 def _merged(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """A number for each point (n,), the same for those that single precision makes one."""
-    # Numbers of four bytes are told apart by their bits; adding 0 makes -0 and 0 one.
+    """A number for each point (n,), equal for points that coincide in single precision."""
+    # Compare the bits of four-byte numbers; adding 0 turns -0 into 0.
     x, y, z = (points.astype(np.float32) + np.float32(0)).view(np.uint32).T.astype(np.uint64)
     half = np.uint64(32)
     in_plan = np.unique(x << half | y, return_inverse=True)[1].astype(np.uint64)

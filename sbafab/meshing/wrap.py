@@ -1,4 +1,4 @@
-"""A flat laminate bent round its tube: x becomes the way round, z the way outward."""
+"""A flat laminate bent round its tube: x becomes the circumference, z the radial direction."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sbafab.laminate.laminate import Laminate
 from sbafab.meshing.surface import Surface, Vector
 
 SAGITTA = 0.008
-"""mm by which a facet of a bent film may leave its cylinder; a fifth of a film."""
+"""mm by which a facet of a bent film may deviate from its cylinder; a fifth of a film."""
 SNAP = 1e-3
-"""mm: a point as near as this to a cut lies on it, so that no sliver is cut off."""
+"""mm: a point this close to a cut counts as on it, to avoid slivers."""
 
 
 RAMP = 1.5
@@ -24,8 +24,8 @@ RAMP = 1.5
 class TubeWrap(NamedTuple):
     """Placement of a laminate round its tube, whose axis is z.
 
-    ``radius`` is the tube's; lengths ``neutral`` mm above it, in the middle of the sheet, stay.
-    Where the sheet overlaps, it is raised by ``thickness`` at and past x = ``seam``; ``cuts`` are
+    ``radius`` is the tube's; lengths ``neutral`` mm above it, in the middle of the sheet, are
+    kept. An overlapping sheet is raised by ``thickness`` at and past x = ``seam``; ``cuts`` are
     the x at which a solid is cut, so that its facets follow the tube. All mm.
     """
 
@@ -40,8 +40,8 @@ class TubeWrap(NamedTuple):
     ) -> NDArray[np.float64]:
         """Points (n, 3) of the flat laminate, z from the tube's surface, round the tube.
 
-        A body that is fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature:
-        0 leaves it straight, on the tangent.
+        A body fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature: 0 leaves
+        it straight, on the tangent.
         """
         x, y, z = points.T
         angle, at = self.angle(x, middle, share), middle / (self.radius + self.neutral)
@@ -57,7 +57,7 @@ class TubeWrap(NamedTuple):
     def angle(
         self, x: NDArray[np.float64], middle: float = 0.0, share: ArrayLike = 1.0
     ) -> NDArray[np.float64]:
-        """Angle in radians by which a body leans at x, seen from where it is fixed."""
+        """Angle in radians by which a body leans at x, relative to its fixed point."""
         bend = np.asarray(share, dtype=float) / self.radius
         angle: NDArray[np.float64] = bend * (x - middle) / (1 + bend * self.neutral)
         return angle
@@ -74,7 +74,7 @@ def tube_wrap(laminate: Laminate) -> TubeWrap | None:
     sheet = laminate.tpe_layers[0]
     radius, neutral = laminate.tube / 2, sheet.film.thickness / 2
     low, _, high, _ = sheet.profile.bounds
-    # Where the sheet has gone all the way round, less what the facets of a solid may be wide.
+    # A full turn of the sheet, less the maximum width of a solid's facets.
     seam = low + math.tau * (radius + neutral) - RAMP
     step = math.sqrt(8 * radius * SAGITTA)
     cuts = tuple(number * step for number in range(math.ceil(low / step), math.ceil(high / step)))
@@ -84,7 +84,7 @@ def tube_wrap(laminate: Laminate) -> TubeWrap | None:
 
 
 def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
-    """The surface of a flat laminate round its tube; it has been cut at ``wrap.cuts``."""
+    """The surface of a flat laminate, already cut at ``wrap.cuts``, wrapped round its tube."""
     x, y, z = surface.points.T
     return Surface(wrap.placed(np.column_stack([x, y, z + wrap.raised(x)])), surface.faces)
 
@@ -98,7 +98,7 @@ def bent_point(p: Vector, radius: float) -> Vector:
 def bent(surface: Surface, radius: float, sagitta: float = SAGITTA) -> Surface:
     """The surface bent round a tube, first cut along the tube so that its facets follow it.
 
-    Lengths at z = 0 stay; what lies above is stretched round the tube, as films on it are.
+    Lengths at z = 0 are kept; points above are stretched round the tube, like films on it.
     """
     step = math.sqrt(8 * radius * sagitta)
     low, high = surface.points[:, 0].min(), surface.points[:, 0].max()
@@ -112,7 +112,7 @@ def bent(surface: Surface, radius: float, sagitta: float = SAGITTA) -> Surface:
 
 
 def cut_along(surface: Surface, x: float) -> Surface:
-    """Return the surface with edges wherever it crosses the plane of this x."""
+    """Return the surface with edges along its intersection with the plane at this x."""
     offset = surface.points[:, 0] - x
     side = np.sign(np.where(np.abs(offset) < SNAP, 0.0, offset)).astype(np.int8)
     sides = side[surface.faces]
@@ -120,7 +120,7 @@ def cut_along(surface: Surface, x: float) -> Surface:
     if not crossed.any():
         return surface
     faces, sides = surface.faces[crossed], sides[crossed]
-    # The first corner becomes the one that is alone on its side, or the one on the plane.
+    # Rotate the corners: first the one alone on its side, or the one on the plane.
     on_plane = (sides == 0).any(axis=1)
     alone = np.where(sides.sum(axis=1) > 0, -1, 1)
     first_side = np.where(on_plane, 0, alone)
@@ -149,7 +149,7 @@ def _crossings(
     faces: NDArray[np.int64],
     on_plane: NDArray[np.bool_],
 ) -> tuple[NDArray[np.float64], tuple[NDArray[np.int64], ...]]:
-    """The points with those added where edges cross, and their indices by edge of the faces."""
+    """The points plus the crossings of edges, and the crossings' indices by edge of the faces."""
     a, b, c = faces.T
     sets = [(a, b, ~on_plane), (b, c, on_plane), (c, a, ~on_plane)]
     ends = np.concatenate([np.column_stack([p, q])[use] for p, q, use in sets])

@@ -1,8 +1,8 @@
 """Check for films of a mesh that pass through each other.
 
 Each film is a surface over the plane, seen along its own upright. A film must lie above the one
-below it wherever both are; of films farther apart in the stack, none may have one node on this side
-of the other and the next node on that side.
+below it wherever both exist. For films farther apart in the stack, two neighbouring nodes of one
+must not lie on opposite sides of the other.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from shapely import STRtree
 
 SLACK = 0.002
-"""mm by which a film may seem to lie in another: chords leave curved films by as much."""
+"""mm of apparent overlap allowed between films: the error of chords on curved films."""
 
 PARALLEL = 1e-9
-"""mm, and sine, by which frames may differ and be one."""
+"""mm, and sine, within which frames count as equal."""
 
 
 class Crossing(NamedTuple):
-    """Two films, by their place in the layup, that pass ``depth`` mm through each other; where the
-    upper one is deepest in the lower one, on the flat laminate, in mm.
+    """Two films, by their index in the layup, that pass ``depth`` mm through each other, and the
+    place of the deepest overlap on the flat laminate, in mm.
     """
 
     lower: int
@@ -42,7 +42,7 @@ class Crossing(NamedTuple):
 
 
 def check_apart(stack: Layup, forms: Sequence[FormedFilm]) -> None:
-    """Raises OutputError where films of a mesh cross; ``forms`` are not wrapped round a tube."""
+    """Raises OutputError if films of a mesh cross; ``forms`` are not wrapped round a tube."""
     deepest = crossing(stack, forms)
     if deepest is not None:
         raise OutputError(f"{crossing_clause(stack, deepest)}; ask for a more even fill")
@@ -58,11 +58,11 @@ def crossing_clause(stack: Layup, worst: Crossing) -> str:
 
 
 def crossing(stack: Layup, forms: Sequence[FormedFilm]) -> Crossing | None:
-    """Return the deepest crossing of two films; None where all are apart, or touch."""
+    """Return the deepest crossing of two films; None if all are apart or touch."""
     films = [_Film(stack, k, form) for k, form in enumerate(forms)]
     plane = _Plane(stack)
     near = [_between(plane, lower, upper) for lower, upper in pairwise(films)]
-    # Films farther apart matter only where neighbours are in order.
+    # Films farther apart matter only if neighbours are in order.
     far = (
         _between(plane, lower, upper)
         for k, lower in enumerate(films)
@@ -120,7 +120,7 @@ class _Plane:
 
         places, parts = self.tree.query(shapely_points(points), predicate="intersects")
         holding = np.full(len(points), -1, dtype=np.int64)
-        # On an edge the first of those that share it.
+        # On an edge, the first of the triangles that share it.
         holding[places[::-1]] = parts[::-1]
         return holding
 
@@ -178,14 +178,14 @@ def _between(plane: _Plane, lower: _Film, upper: _Film) -> Crossing | None:
 
 
 def _is_parallel(lower: _Film, upper: _Film) -> bool:
-    """Return True if two films are seen along one upright, one right above the other."""
+    """Return True if two films have the same upright, one directly above the other."""
     sideways = lower.axes[:2] @ (upper.shift - lower.shift).ravel()
     is_parallel = np.abs(lower.axes - upper.axes).max() < PARALLEL
     return bool(is_parallel and np.abs(sideways).max() < PARALLEL)
 
 
 def _upright(plane: _Plane, lower: _Film, upper: _Film) -> NDArray[np.float64]:
-    """Height of the upper film's nodes over the same nodes of the lower; NaN beside that."""
+    """Height of the upper film's nodes over the same nodes of the lower; NaN outside the lower."""
     below = np.full(len(plane.points), np.nan)
     below[lower.nodes] = lower.top @ lower.axes[2]
     gap: NDArray[np.float64] = upper.bottom @ lower.axes[2] - below[upper.nodes]

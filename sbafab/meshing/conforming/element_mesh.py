@@ -41,7 +41,7 @@ class Sweep:
 
     ``prisms`` (m, 18) hold the six nodes of a triangle below, halfway up and above.
     ``lower``, ``middle`` and ``upper`` (plies, plane nodes) number the nodes of each film over
-    the plane's, -1 where there are none; ``joints`` those halfway up the bond under each film.
+    the plane's, -1 if absent; ``joints`` the nodes halfway up the bond under each film.
     ``prism_of`` and ``joint_of`` (plies, triangles) number the prisms of films and bonds.
     """
 
@@ -58,8 +58,8 @@ class Sweep:
 def sweep(layup: Layup, forms: Sequence[FormedFilm], full_middles: bool) -> Sweep:
     """The films as prisms, bottom to top.
 
-    Where films lie on each other, the nodes in the closure of a bond are one; where gaps are
-    kept, wedges join them. ``full_middles`` puts a node halfway up over mid-edge nodes too, as
+    If films lie on each other, they share the nodes in the closure of a bond; if gaps are kept,
+    wedges join them. ``full_middles`` adds nodes halfway up over mid-edge nodes too, as
     tetrahedra need.
     """
     triangles = layup.plane.triangles
@@ -131,7 +131,7 @@ BOTTOM, TOP, SIDES = 0, 1, 2
 
 
 def neighbours(plane: Plane) -> NDArray[np.int64]:
-    """The triangle (m, 3) beyond each side of each triangle, -1 where there is none."""
+    """The triangle (m, 3) beyond each side of each triangle, -1 without a neighbour."""
     middles = plane.triangles[:, 3:].ravel()
     order = np.argsort(middles, kind="stable")
     ranked = middles[order]
@@ -146,7 +146,7 @@ def bordering(
     inside: NDArray[np.bool_], beside: NDArray[np.bool_], beyond: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Triangles of ``inside`` and their sides that lie against a triangle of ``other``."""
-    # A last entry that is False stands for what lies beyond the plane.
+    # The last entry, False, stands for the outside of the plane.
     padded = np.append(beside, False)
     cells, sides = np.nonzero(inside[:, None] & padded[beyond])
     return cells, sides
@@ -224,7 +224,7 @@ def lids(
     """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
 
     Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's. Raises
-    OutputError where the film ends at the hole.
+    OutputError if the film ends at the hole.
     """
     of_holes = []
     for k, cells in sorted(void.under.items()):
@@ -289,7 +289,7 @@ def faces_of_tetrahedra(
 
 
 def open_sides(triangles: NDArray[np.int64]) -> int:
-    """Return the number of triangle sides that are not the side of one other, run the other way."""
+    """Return the number of triangle sides not shared with exactly one opposite side."""
     size = int(triangles.max(initial=0)) + 1
     heads = np.roll(triangles, -1, axis=1)
     forth = np.sort((triangles * size + heads).ravel())
@@ -335,7 +335,7 @@ VOLUME_TOLERANCE = 0.001
 
 
 def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
-    """Raises OutputError where an element is inverted, the skin is not manifold or a volume off.
+    """Raises OutputError if an element is inverted, the skin is not manifold or a volume is off.
 
     ``expected`` gives the exact volume in mm3 of cell sets.
     """
@@ -354,7 +354,7 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
 
 
 def check_cavities(mesh: Mesh) -> None:
-    """Raises OutputError where a cavity's surface is not closed."""
+    """Raises OutputError if a cavity's surface is not closed."""
     for name, triangles in mesh.cavities.items():
         gaps = open_sides(triangles)
         if gaps:
@@ -376,12 +376,12 @@ def _check_jacobians(mesh: Mesh) -> None:
 
 
 def skin(mesh: Mesh) -> NDArray[np.int64]:
-    """The faces (k, 2: cell and face number) that one cell alone has."""
+    """The faces (k, 2: cell and face number) that belong to one cell only."""
     size = len(mesh.points)
     keys, cells, numbers = [], [], []
     for number, local in enumerate(FACES[mesh.kind]):
         corners = np.sort(mesh.cells[:, [n for n in local if n < CORNERS[mesh.kind]]], axis=1)
-        # Three of a square's corners tell it from every other face.
+        # Three corners identify a quadrilateral face.
         keys.append((corners[:, 0] * size + corners[:, 1]) * size + corners[:, 2])
         cells.append(np.arange(len(corners)))
         numbers.append(np.full(len(corners), number))
@@ -409,7 +409,7 @@ def _check_skin(mesh: Mesh) -> None:
         nodes = mesh.cells[outer[outer[:, 1] == number, 0]][:, list(local)]
         for place in range(len(corners)):
             a, b = nodes[:, place], nodes[:, (place + 1) % len(corners)]
-            # The middle tells apart two sides between the same corners.
+            # The middle node distinguishes two sides between the same corners.
             middle = nodes[:, len(corners) + place]
             sides.append(np.column_stack([a * size + b, b * size + a, middle]))
     forth, back, middle = np.concatenate(sides).T
@@ -430,7 +430,7 @@ def _check_skin(mesh: Mesh) -> None:
 
 
 def thin(stack: Layup) -> Layup:
-    """The layup with films of no thickness on each other: all mid-surfaces lie at z = 0."""
+    """The layup with films of zero thickness: all mid-surfaces lie at z = 0."""
     plies = tuple(replace(ply, z=0.0, gap=0.0) for ply in stack.plies)
     return replace(stack, plies=plies, is_thick=False)
 
@@ -438,9 +438,9 @@ def thin(stack: Layup) -> Layup:
 def shell_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
     """The mid-surfaces of a thin layup, with their sets and cavities.
 
-    A triangle where films are bonded is one for all of them and carries the sum of their
-    thicknesses. Cavities leave the neck rings out, which have the same air on both sides.
-    Raises OutputError where a check fails.
+    Bonded films share one triangle, which carries the sum of their thicknesses. Cavities exclude
+    the neck rings, which have the same air on both sides.
+    Raises OutputError if a check fails.
     """
     check_apart(stack, forms)
     forms = round_tube(stack, forms)
@@ -540,7 +540,7 @@ def _shell_cell_sets(
 
 
 def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
-    """The volume mesh with its sets and cavities. Raises OutputError where a check fails."""
+    """The volume mesh with its sets and cavities. Raises OutputError if a check fails."""
     check_apart(stack, forms)
     forms = round_tube(stack, forms)
     is_tet = stack.settings.element == "tet"
@@ -585,12 +585,12 @@ def volume_mesh(stack: Layup, forms: Sequence[FormedFilm]) -> Mesh:
 
 
 def swept_points(stack: Layup, forms: Sequence[FormedFilm]) -> NDArray[np.float64]:
-    """The points alone of the volume mesh that these films have."""
+    """The points of the volume mesh of these films."""
     return sweep(stack, forms, full_middles=stack.settings.element == "tet").points
 
 
 def _materials(stack: Layup) -> dict[str, str]:
-    """The material of every film and bond; a bond is of the lower film if that melts."""
+    """The material of every film and bond; a bond takes the lower film's if that melts."""
     materials = {ply.name: ply.layer.film.material for ply in stack.plies}
     for k, (below, above) in enumerate(pairwise(stack.plies), start=1):
         films = [ply.layer.film for ply in (below, above)]
@@ -611,7 +611,7 @@ def _cell_sets(
     stack: Layup, swept: Sweep, parts: int, growths: Sequence[float]
 ) -> tuple[dict[str, NDArray[np.int64]], dict[str, float]]:
     """Cells of every film and bond, and the volume in mm3 that each must have; ``growths`` are the
-    parts by which films have grown.
+    relative growths of the films.
     """
     sets, expected = {}, {}
     for k, ply in enumerate(stack.plies):

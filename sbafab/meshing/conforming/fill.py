@@ -1,10 +1,9 @@
 """Films lifted by the air of their balloons, and balloons set on each other.
 
-The lift is vertical in the frame of each balloon, so no element changes its volume; balloons are
-then set on each other by their neck discs, leaning where chambers hold unlike amounts, and
-refused where they would lean into each other. Films stretch along the meridian (1 % at 5 ul in
-the paper's 5 mm balloon) and thin by as much; the flat mesh is the rest position for a solver
-that takes one.
+The lift is vertical in the frame of each balloon, so no element changes its volume. Balloons are
+then stacked by their neck discs. They lean if chambers hold different amounts, and are refused if
+they would lean into each other. Films stretch along the meridian (1 % at 5 ul in the paper's 5 mm
+balloon) and thin accordingly; the flat mesh is the rest position for a solver that takes one.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from sbafab.models.parabola import fullest
 class Lift(NamedTuple):
     """Shapes (3, plane nodes) of a film over a pocket, in mm2, mm and mm.
 
-    The first is what even pressure gives; the others are a neck disc that leans by one along x
-    or y. ``plateaus`` (3,) are their heights at the middle of the neck disc (of the first one),
-    ``volumes`` (3,) what they enclose.
+    The first is the shape under even pressure; the others are the shapes for a neck disc with a
+    slope of one along x or y. ``plateaus`` (3,) are their heights at the middle of the (first) neck
+    disc, ``volumes`` (3,) the volumes that they enclose.
     """
 
     shapes: NDArray[np.float64]
@@ -51,7 +50,7 @@ def lift(
 ) -> Lift:
     """Return the rise of the film over a pocket: -lap w = 1, w = 0 at the ``fixed`` nodes.
 
-    ``discs`` are the nodes of each neck and its middle: they rise as one. For a round pocket
+    ``discs`` are the nodes of each neck and its middle: they rise together. For a round pocket
     without a neck this is the paraboloid of the paper's Eq. 1.
     """
     try:
@@ -100,16 +99,16 @@ def lift(
 
 
 NEAR = 1e-3
-"""mm by which a round pocket may stand off its chamber's axis."""
+"""mm by which a round pocket may be off its chamber's axis."""
 
 
 @dataclass(frozen=True)
 class Pocket:
     """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
 
-    ``centres`` are its stacks, as places in the layup's. ``share`` of each of them is meshed;
-    ``flat_ul`` is what the meshed part holds before it is filled, ``largest_ul`` the most air
-    that a balloon can hold.
+    ``centres`` are its stacks, as indices of the layup's centres. ``share`` of each is meshed;
+    ``flat_ul`` is the volume of the meshed part before filling, ``largest_ul`` the most air that a
+    balloon can hold.
     """
 
     chamber: str
@@ -126,7 +125,7 @@ class Pocket:
         """The amount of the even shape, in 1/mm, at which each balloon holds ``ul``.
 
         ``lean`` (2, 2) are the slopes of the lower and the upper neck disc. Raises DesignError
-        where a balloon cannot hold that much.
+        if a balloon cannot hold that much.
         """
         if ul > self.largest_ul:
             raise DesignError(
@@ -148,7 +147,7 @@ class Pocket:
 
 
 def pockets(stack: Layup) -> list[Pocket]:
-    """The pockets of every chamber, bottom to top; equal ones are worked out once."""
+    """The pockets of every chamber, bottom to top; equal ones are computed once."""
     lifts: dict[tuple[bytes, ...], Lift] = {}
     limits: dict[tuple[bytes, bytes], float] = {}
     return [
@@ -222,11 +221,11 @@ def _largest(
     places: list[Point],
     share: float,
 ) -> float:
-    """Most air in ul that a balloon can hold, of which ``share`` is meshed.
+    """Most air in ul that a balloon can hold; ``share`` of it is meshed.
 
-    A round pocket's is that of two paraboloids whose meridian keeps its length (paper Eqs. 1 to
-    3), an oblong one's that of two arcs (as ``predict`` says); a drawn one holds as much more than
-    the disc in it as the even lift of equal height does.
+    A round pocket is two paraboloids whose meridian keeps its length (paper Eqs. 1 to 3), an oblong
+    one two arcs (as in ``predict``). A drawn pocket's volume over its inscribed disc's is the ratio
+    of their even lifts of equal height.
     """
     ends = _round_ends(interface, places[0])
     if len(ends) == 1:
@@ -244,9 +243,8 @@ def _largest(
 def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]]:
     """Middles and radii of the circles that the pocket round a centre ends in.
 
-    One on the centre where most of its edge is that circle; two of one radius and at equal
-    distances on either side of it for a slot, of which at least a third of a turn is left beside
-    inlet and manifold.
+    One on the centre if most of the edge is that circle. Two of equal radius at equal distances on
+    either side for a slot, if at least a third of a turn of each remains beside inlet and manifold.
     """
     turns: dict[tuple[Point, float], float] = {}
     for outer in interface.unbonded.outers:
@@ -271,7 +269,7 @@ def _round_ends(interface: Interface, centre: Point) -> list[tuple[Point, float]
 
 
 FLATNESS = 0.01
-"""Part of the lift by which necks may miss a common plane."""
+"""Fraction of the lift by which necks may deviate from a common plane."""
 
 
 class RigidMotion(NamedTuple):
@@ -287,7 +285,7 @@ UPRIGHT = RigidMotion(np.eye(3), np.zeros(3))
 def slopes_of(centres: NDArray[np.float64], heights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Slopes along x and y of the plane through the heights at the centres (n, 2).
 
-    Raises DesignError where they have no common plane.
+    Raises DesignError if they have no common plane.
     """
     offsets = centres - centres.mean(axis=0)
     rises = heights - heights.mean()
@@ -320,7 +318,7 @@ def set_on(
 
 
 def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The turn (3, 3) by the least angle of the upright axis onto the normal of a plane."""
+    """The smallest rotation (3, 3) of the upright axis onto the normal of a plane."""
     normal = np.array([-slopes[0], -slopes[1], 1.0])
     normal /= np.linalg.norm(normal)
     x, y, z = normal.tolist()
@@ -337,14 +335,14 @@ def _frame(slopes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 ROUNDS = 4
-"""Leaning discs change volumes, and these the lean, by less each round."""
+"""Iterations: leaning discs change volumes, and volumes the lean, by less each round."""
 HALVINGS = 6
-"""How closely the least fill is sought that keeps films apart: to a part in 2^6 of the largest."""
+"""Bisection steps for the least fill that keeps films apart: to 1/2^6 of the largest fill."""
 
 
 @dataclass(frozen=True)
 class Fill:
-    """The air asked for, in ul a balloon, by chamber; ``largest`` is what the fullest one holds."""
+    """The requested air, in ul per balloon, by chamber; ``largest`` is what the fullest holds."""
 
     ul: Mapping[str, float]
 
@@ -358,12 +356,11 @@ class Fill:
 
 
 def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, list[FormedFilm]]:
-    """Every film where the air has moved it to.
+    """Every film at the position that the air has moved it to.
 
-    ``fill_ul`` is the air in every balloon in ul, or in those of the chambers named; 0 is flat.
-    Raises DesignError for a chamber that is not there, for more air than a film of constant
-    length can hold, where unlike fills have no common plane, and where they would make films pass
-    through each other.
+    ``fill_ul`` is the air in every balloon in ul, or in the balloons of the named chambers; 0 is
+    flat. Raises DesignError for an unknown chamber, for more air than a film of constant length can
+    hold, if different fills have no common plane, and if films would pass through each other.
     """
     fill = _fill(stack, fill_ul)
     all_pockets = pockets(stack)
@@ -384,7 +381,7 @@ def filled(stack: Layup, fill_ul: float | Mapping[str, float]) -> tuple[Fill, li
 
 
 def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
-    """The fill that is raised least towards an even one, in steps of 0.1 ul, for films to clear."""
+    """The fill raised just enough towards an even one, in steps of 0.1 ul, to keep films apart."""
 
     def raised(share: float) -> Fill:
         return Fill(
@@ -408,7 +405,7 @@ def _least(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> Fill:
 
 
 def formed(stack: Layup, fill: Fill, all_pockets: list[Pocket]) -> list[FormedFilm]:
-    """Every film where the air of these pockets has moved it to, films that cross included."""
+    """Every film at the position that the air of these pockets gives it, even if films cross."""
     body_of_node, body_of_centre = bodies(stack)
     forms = [FormedFilm(form.base.copy(), form.up.copy()) for form in flat(stack)]
     for body in np.unique(body_of_centre).tolist():
@@ -492,7 +489,7 @@ def _lift(
 def _poses(
     stack: Layup, places: NDArray[np.float64], necks: NDArray[np.float64]
 ) -> list[RigidMotion]:
-    """The place of every film: those of a balloon move as one, each balloon stands on the last."""
+    """The pose of every film: a balloon's films move together, each balloon stands on the last."""
     poses = [UPRIGHT]
     kinds = [interface.kind for interface in stack.laminate.interfaces]
     for k, kind in enumerate(kinds, start=1):

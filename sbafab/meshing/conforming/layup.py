@@ -26,11 +26,11 @@ class MeshSettings:
     """Settings of the conforming meshes.
 
     ``h`` is the side of the triangles in mm. ``symmetry``: half of the actuator, the quarter of a
-    1-DoF one that lies away from its inlet, or one lobe's sector. ``fill_ul`` is the air in every
-    balloon's pocket in ul, or in those of each chamber by name; None is the flat shape.
-    ``gaps`` keeps the films as far apart as the masks hold them, with bonds between them that
-    are as thick; without it films lie on each other, and the height is the sum of the TPE films.
-    ``wrapped``: a laminate made for a tube lies round it, its axis z; else it lies flat.
+    1-DoF one away from its inlet, or one lobe's sector. ``fill_ul`` is the air per pocket in ul,
+    for all balloons or by chamber name; None is the flat shape. ``gaps`` keeps the films a mask's
+    thickness apart, with bonds of that thickness; without it films lie on each other, and the
+    height is the sum of the TPE films. ``wrapped``: a laminate made for a tube is wrapped round it,
+    with the tube's axis along z; otherwise it lies flat.
     """
 
     h: float = 0.35
@@ -41,14 +41,14 @@ class MeshSettings:
     wrapped: bool = True
 
 
-# The part of an actuator that stands for the whole.
+# The part of an actuator that represents the whole.
 
 
 SLACK = 1e-5
 """mm2 by which a profile may differ from its image."""
 ON_PLANE = 1e-6
 NEAR = 0.01
-"""mm round a chamber's centre, any part of which makes it meshed."""
+"""Radius in mm about a chamber's centre: the chamber is meshed if any part of it is."""
 
 
 class Sector(NamedTuple):
@@ -73,10 +73,10 @@ class Sector(NamedTuple):
 def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
     """The part of the laminate to mesh, None for all of it.
 
-    Half: one side of the plane y = 0, or else of x = 0. Quarter: of a stack on the axis, the one at
-    x < 0, y > 0, away from the inlet, which is left out so. Sector: one of several stacks round
-    the axis, with its inlet.
-    Raises DesignError where the laminate is not symmetric.
+    Half: one side of the plane y = 0, or else of x = 0. Quarter: for a stack on the axis, the
+    quarter at x < 0, y > 0, which excludes the inlet. Sector: one of several stacks round the axis,
+    with its inlet.
+    Raises DesignError if the laminate is not symmetric.
     """
     if symmetry == "full":
         return None
@@ -104,7 +104,7 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
 
 
 def _is_on_axis(laminate: Laminate) -> bool:
-    """Return True if there is one stack, on the axis: its quarter is a quarter of its chamber."""
+    """Return True for a single stack on the axis: a quarter then holds a quarter of its chamber."""
     return [chamber.centres for chamber in laminate.chambers] == [((0.0, 0.0),)]
 
 
@@ -131,7 +131,7 @@ def _covers(region: Region, image: Region) -> bool:
 
 
 def _is_quarter(laminate: Laminate, region: Region) -> bool:
-    """Return True if, but for the inlet, all four quarters are images of each other."""
+    """Return True if all four quarters are images of each other, apart from the inlet."""
     far = 10 * max(map(abs, laminate.bounds)) + 10
     away = region & polygon([(-far, -far), (0.0, -far), (0.0, far), (-far, far)])
     if not _covers(_flipped_y(away), away):
@@ -145,7 +145,7 @@ def _is_quarter(laminate: Laminate, region: Region) -> bool:
 
 
 def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
-    """For each chamber the one that is meshed in its place: itself, or one it is an image of."""
+    """For each chamber, the one meshed in its place: itself, or one that it is an image of."""
     part = sector(laminate, symmetry)
     chambers = {chamber.name: chamber.centres for chamber in laminate.chambers}
     if part is None:
@@ -180,8 +180,8 @@ MOST_ELEMENTS = 3_000_000
 
 @dataclass(frozen=True)
 class Ply:
-    """One TPE film. ``cells`` are the triangles it covers, ``bonded`` those of them that are
-    bonded to the ply below, ``gap`` mm above it; ``area`` is its exact area in mm2.
+    """One TPE film. ``cells`` are the triangles it covers, ``bonded`` the triangles bonded to the
+    ply below, ``gap`` mm above it; ``area`` is its exact area in mm2.
     """
 
     layer: Layer
@@ -220,9 +220,9 @@ class MeshedVoid:
 
 @dataclass(frozen=True)
 class Layup:
-    """All that meshes of one laminate share. ``seats`` are the triangles on the channels' axes by
-    which base and tip are held: the neck ring with the bore inside it. ``shares`` tell how much of
-    each chamber is meshed. Without ``is_thick`` films are their mid-surfaces.
+    """Data shared by the meshes of one laminate. ``seats`` are the triangles on the channels' axes
+    that hold base and tip: the neck ring with the bore inside it. ``shares`` are the meshed
+    fractions of the chambers. Without ``is_thick`` films are their mid-surfaces.
     """
 
     laminate: Laminate
@@ -259,8 +259,8 @@ class Layup:
 def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
     """The films and voids of a laminate over one triangulation.
 
-    Raises DesignError where h does not suit the laminate or the symmetry is not the design's,
-    OutputError where bonds touch in one point.
+    Raises DesignError if h does not suit the laminate or the design lacks the symmetry,
+    OutputError if bonds touch in one point.
     """
     laminate = parted(laminate)
     _check_size(laminate, settings)
@@ -341,7 +341,7 @@ def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
 
 
 def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
-    """Width in mm of the narrowest bonded ring, the largest h there can be, and what it is."""
+    """Width in mm of the narrowest bonded ring, which is the largest possible h, and its name."""
     return min([*_rings(laminate)] or _open_rings(laminate), default=None)
 
 
@@ -361,7 +361,7 @@ def _rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
 def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
     """Yield the narrowest width of the bond beside each pocket, and its name.
 
-    No ring is closed where a lone balloon's inlet leaves it.
+    A lone balloon's ring is open at its inlet.
     """
     for interface in laminate.interfaces:
         low_x, low_y, high_x, high_y = interface.contact.bounds
@@ -374,7 +374,7 @@ def _open_rings(laminate: Laminate) -> Iterator[tuple[float, str]]:
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:
-    """Return the bond without snipped-off ears: between balloons, the neck rings alone."""
+    """Return the bond without snipped-off ears: only the neck rings between balloons."""
     if interface.kind != "separator":
         return body_bond(laminate, interface)
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
@@ -387,7 +387,7 @@ def _bond(laminate: Laminate, interface: Interface) -> Region:
 
 
 def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
-    """The discs, one a stack, on which base and tip stand."""
+    """The discs on which base and tip stand, one per stack."""
     necks = [i.bond for i in laminate.interfaces if i.kind == "separator"]
     for centre in chamber.centres:
         outers = [outer for neck in necks for outer in neck.outers if outer.winding(centre)]
@@ -417,7 +417,7 @@ def _heights(laminate: Laminate, gaps: bool) -> Iterator[tuple[float, float]]:
 
 
 def _void_slabs(laminate: Laminate, chamber: Chamber) -> Iterator[tuple[int, bool, Region]]:
-    """The chamber's slabs as (ply, whether it lies under the ply instead of in it, region)."""
+    """The chamber's slabs as (ply, True if under the ply instead of in it, region)."""
     films = {layer.z: ply for ply, layer in enumerate(laminate.tpe_layers)}
     gaps = {interface.z: ply for ply, interface in enumerate(laminate.interfaces, start=1)}
     for slab in cavity_slabs(laminate, chamber):
@@ -445,7 +445,7 @@ def _void(
 
 
 def _check_apart(plane: Plane, ply: Ply) -> None:
-    """Raises OutputError where two parts of a bond meet in a single point."""
+    """Raises OutputError if two parts of a bond meet in a single point."""
     triangles = plane.triangles[ply.bonded]
     middles, times = np.unique(triangles[:, 3:], return_counts=True)
     edge = np.isin(triangles[:, 3:], middles[times == 1])
@@ -465,8 +465,8 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
 
 class FormedFilm(NamedTuple):
     """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
-    (n, 3) along which its thickness is measured. ``growth`` is the part by which its volume is
-    larger than flat, where it is bent round a tube.
+    (n, 3) along which its thickness is measured. ``growth`` is the relative increase of its volume
+    over the flat film's, if it is bent round a tube.
     """
 
     base: NDArray[np.float64]
@@ -494,7 +494,7 @@ def level(layup: Layup, z: float) -> FormedFilm:
 def bodies(stack: Layup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the body of each node of the plane, and of each stack's centre.
 
-    A body is what hangs together above the sheet, such as each oblong balloon stack on it.
+    A body is a connected part above the sheet, such as each oblong balloon stack on it.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

@@ -1,6 +1,6 @@
 """A mesh of second-order elements with its named sets, and the shape functions of its elements.
 
-Node order is that of Abaqus and CalculiX: corners first, then the middles of the edges.
+Node order follows Abaqus and CalculiX: corners first, then the middles of the edges.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ FACES: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
         (2, 0, 3, 5, 8, 12, 11, 14),
     ),
 }
-"""Nodes of each face, counter-clockwise seen from outside; face numbers are those of Abaqus, less
-one; a triangle's are its lower side (SNEG) and its upper one (SPOS)."""
+"""Nodes of each face, counter-clockwise seen from outside; face numbers are Abaqus's less one; a
+triangle's faces are its lower side (SNEG) and its upper one (SPOS)."""
 
 CORNERS: dict[ElementKind, int] = {"triangle6": 3, "tetra10": 4, "wedge15": 6}
 VTK_TYPES = {"triangle": 5, "triangle6": 22, "tetra10": 24, "wedge15": 26}
@@ -121,8 +121,8 @@ def scaled_jacobians(
 ) -> NDArray[np.float64]:
     """Least scaled Jacobian of each cell at its nodes and integration points.
 
-    Determinant over the product of the lengths of its columns: 1 where edges are at right
-    angles, 0.87 in an equilateral triangle, negative where the element is inverted.
+    Determinant over the product of the lengths of its columns: 1 for edges at right angles, 0.87
+    in an equilateral triangle, negative if the element is inverted.
     """
     least = np.full(len(cells), np.inf)
     for integration in (False, True):
@@ -211,8 +211,8 @@ SIDE = (-1, 3, 5, 4)
 def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
     """Three tetrahedra (3 x m, 10) of second order for each prism, in its order.
 
-    ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts below
-    the smaller number of two, so that neighbours agree.
+    ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts at its
+    lower corner with the smaller number, so that neighbours agree.
     """
     side = np.array(SIDE)
     ranked = np.argsort(corners, axis=1)
@@ -220,7 +220,7 @@ def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray
     cells = np.empty((len(prisms), 3, 10), dtype=np.int64)
     rows = np.arange(len(prisms))
     for number, tetra in enumerate(TETRAHEDRA):
-        # A mirrored prism takes its first two corners the other way round.
+        # A mirrored prism swaps its first two corners.
         for turned, chosen in (((0, 1, 2, 3), is_even), ((1, 0, 2, 3), ~is_even)):
             ends = [tetra[place] for place in turned]
             pairs = [(end, end) for end in ends]
@@ -236,7 +236,7 @@ def tetrahedra(prisms: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray
 def split_wedges(corners: NDArray[np.int64]) -> NDArray[np.int64]:
     """Three tetrahedra (3 x m, 4) of first order for each wedge (m, 6), in its order.
 
-    Which way a side is cut hangs on the lower nodes' numbers, so that neighbours agree.
+    The lower nodes' numbers decide the diagonal of a side, so that neighbours agree.
     """
     prisms = np.repeat(corners, 3, axis=1)
     prisms[:, :3], prisms[:, 12:15] = corners[:, :3], corners[:, 3:]
@@ -258,10 +258,10 @@ class Mesh:
     hold sorted indices; ``face_sets`` rows of cell and face number, as in ``elements.FACES``.
     ``cavities`` are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter-
     clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
-    shell's, in mm, a value a cell set. ``notes`` are sentences for whoever reads a file of it.
-    ``materials`` names the film that each part of a volume mesh is of; a bond is of what melts.
-    ``rest`` (n, 3) is where the points are in the flat laminate, free of stress; None where they
-    are there.
+    shell's, in mm, one value per cell set. ``notes`` are sentences for the reader of a mesh file.
+    ``materials`` names the film of each part of a volume mesh; a bond takes the film that melts.
+    ``rest`` (n, 3) are the points in the flat, stress-free laminate; None if the mesh itself is
+    flat.
     """
 
     name: str
@@ -279,17 +279,17 @@ class Mesh:
 
     @property
     def parts(self) -> dict[str, NDArray[np.int64]]:
-        """The cell sets that share the cells out: films and bonds, or a shell's thicknesses."""
+        """The cell sets that partition the cells: films and bonds, or a shell's thicknesses."""
         names = self.thickness or self.cell_sets
         return {name: self.cell_sets[name] for name in names}
 
     def cavity(self, name: str) -> tuple[Surface, NDArray[np.int64]]:
-        """A cavity as a surface of its own, and the mesh's node of each of its points."""
+        """A cavity as a separate surface, and the mesh node of each of its points."""
         nodes, faces = np.unique(self.cavities[name], return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
 
     def node_fields(self) -> dict[str, NDArray[np.uint8]]:
-        """Return the node sets other than bonds, each as 0 or 1 a node."""
+        """Return the node sets other than bonds, each as 0 or 1 per node."""
         return {
             name: _marked(len(self.points), nodes)
             for name, nodes in self.node_sets.items()
@@ -297,7 +297,7 @@ class Mesh:
         }
 
     def cell_fields(self) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
-        """Return ``part``, each cell's part from 1, and the face sets as 0 or 1 a cell."""
+        """Return ``part``, each cell's part from 1, and the face sets as 0 or 1 per cell."""
         part = np.zeros(len(self.cells), dtype=np.int32)
         for number, cells in enumerate(self.parts.values(), start=1):
             part[cells] = number
@@ -309,8 +309,8 @@ class Mesh:
     def meshio(self) -> meshio.Mesh:
         """Return the mesh for meshio (extra "python"), with its fields, point and cell sets.
 
-        meshio 5.3 refuses wedges of 15 nodes: they come as wedges of their six corners, and the
-        points of their mid-edge nodes belong to no cell. Tetrahedra keep their second order.
+        meshio 5.3 refuses wedges of 15 nodes: they become wedges of their six corners, and their
+        mid-edge nodes belong to no cell. Tetrahedra keep their second order.
         Raises DesignError without meshio.
         """
         try:

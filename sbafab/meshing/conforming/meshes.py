@@ -52,8 +52,8 @@ ROUNDS = 2
 class ConformingMeshes:
     """Volume and shell mesh of one triangulation.
 
-    ``flat_shell`` is the shell before it was filled (the same one without fill): a rest position
-    for it. ``fill`` says what the air was asked to be and how films were moved for it. Without
+    ``flat_shell`` is the shell before it was filled (the same one without fill): its rest
+    position. ``fill`` holds the requested air and the resulting positions of the films. Without
     gaps all mid-surfaces of a flat shell lie at z = 0, and the volume is as high as its TPE films.
     """
 
@@ -66,15 +66,15 @@ class ConformingMeshes:
 
     @property
     def stretch(self) -> float:
-        """By what part the films over the pockets are larger in area than flat; 0 when flat.
+        """Relative growth in area of the films over the pockets; 0 when flat.
 
-        The fill keeps no length: 0.01 at 5 ul in the paper's 5 mm balloon.
+        The fill does not preserve lengths: 0.01 at 5 ul in the paper's 5 mm balloon.
         """
         return thinning(self.shell, self.flat_shell).mean
 
     @property
     def has_air(self) -> bool:
-        """True if any film stands off another."""
+        """True if any film is separated from another."""
         return any(self.holds_air(chamber) for chamber in self.volume.cavities)
 
     def holds_air(self, chamber: str) -> bool:
@@ -92,8 +92,8 @@ def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) 
     """Volume and shell mesh of a laminate, checked.
 
     No element is inverted, skins are manifold, cavities closed, and films hold area x thickness.
-    Raises DesignError where the settings do not suit the laminate or Netgen is not installed,
-    OutputError where a check fails.
+    Raises DesignError if the settings do not suit the laminate or Netgen is not installed,
+    OutputError if a check fails.
     """
     if not laminate.chambers:
         raise DesignError(
@@ -134,7 +134,7 @@ def _filled(stack: Layup, fill: Fill, make: Callable[[Layup, Sequence[FormedFilm
     mesh = make(stack, formed(stack, fill, all_pockets))
     if stack.laminate.tube is None or not stack.settings.wrapped or stack.sector is not None:
         return mesh
-    # Bent round the tube balloons hold a little more than flat.
+    # Balloons bent round the tube hold a little more than flat ones.
     amounts, sizes = dict(fill.ul), stack.plane.areas()
     for _ in range(ROUNDS):
         for chamber in stack.laminate.chambers:
@@ -168,12 +168,12 @@ def write_conforming(
     progress: Callable[[int, int], None] | None = None,
     formats: Collection[str] = CONFORMING_ENDINGS,
 ) -> list[MeshFile]:
-    """Write ``mesh/volume.*``, ``mesh/shell.*``, and of open pockets ``mesh/skin.*`` and
+    """Write ``mesh/volume.*``, ``mesh/shell.*``, and for open pockets ``mesh/skin.*`` and
     ``mesh/cavity_<chamber>_conforming.*``.
 
-    ``folder`` is the output folder, ``formats`` the file endings wanted. Models of a part by
-    symmetry have no closed cavities: their cavity walls are face sets of the meshes. ``progress``
-    is called with the numbers of files done and of all files.
+    ``folder`` is the output folder, ``formats`` the requested file endings. Symmetry models have no
+    closed cavities: their cavity walls are face sets of the meshes. ``progress`` is called with the
+    number of files done and the total.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     jobs = [job for job in _jobs(meshes) if Path(job[0].file).suffix[1:] in formats]
@@ -187,7 +187,7 @@ def write_conforming(
 
 
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
-    """Every file there could be, and what writes it to a path."""
+    """Every possible file, with the function that writes it to a path."""
     fill = meshes.fill.largest if meshes.fill is not None else 0.0
     kinds: tuple[tuple[MeshKind, Mesh], ...] = (("volume", meshes.volume), ("shell", meshes.shell))
     for kind, mesh in kinds:
@@ -206,7 +206,7 @@ def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path],
                 file = MeshFile(name, "skin", None, fill, outer.volume, len(outer.faces))
                 yield file, partial(row.surface, outer)
     for chamber in mesh.cavities:
-        # Films that lie on each other enclose nothing: such a surface has no inside.
+        # Films that lie on each other enclose nothing: the surface would have no inside.
         if not meshes.holds_air(chamber):
             continue
         surface, _ = mesh.cavity(chamber)
@@ -239,8 +239,8 @@ class Statistics(TypedDict):
 
 
 class Thinning(NamedTuple):
-    """By what part films over the pockets are larger than flat, in the mean and at most, and how
-    thin they are there: no film changes its volume.
+    """Relative growth in area of films over the pockets, mean and largest, and their least
+    thickness in mm there: no film changes its volume.
     """
 
     mean: float

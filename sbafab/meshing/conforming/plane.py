@@ -24,14 +24,14 @@ from sbafab.meshing.conforming.mesh import scaled_jacobians, volumes
 MISSING = 'conforming meshes need {}; install it with: pip install "sbafab[mesh]"'
 
 Label = tuple[bool, ...]
-"""For each region, whether it covers a cell of the plane."""
+"""For each region, True if it covers a cell of the plane."""
 
 CUSP = math.radians(8.0)
-"""Edges that leave a point at less than this angle are joined for as far as they are near."""
+"""Edges that leave a point at less than this angle are joined for as long as they are near."""
 NEAR = 0.03
-"""The part of h within which they are near."""
+"""Fraction of h within which they are near."""
 COARSE = 0.35
-"""Above this h, in mm, a coarser mesh does not move edges any farther."""
+"""h in mm above which a coarser mesh does not move edges any farther."""
 
 
 @dataclass(frozen=True)
@@ -47,10 +47,10 @@ class Border:
 
 
 def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
-    """All edges of the regions, each place once, cut where they meet.
+    """All edges of the regions without duplicates, cut where they meet.
 
-    Where two edges leave a point in one direction (a fillet and the outline it runs into) they
-    are one until they are a small part of ``h`` mm apart, so that no cell ends in a cusp.
+    Two edges that leave a point in one direction (a fillet and the outline it runs into) are
+    joined until they are a small fraction of ``h`` mm apart, so that no cell ends in a cusp.
     """
 
     def labelled(plan: Arrangement) -> list[Border]:
@@ -102,7 +102,7 @@ def _from(border: Border, corner: Point) -> Border:
 
 
 def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Border | None] | None:
-    """The part that two borders from one corner share, and what is left of both.
+    """The part that two borders from one corner share, and the remainders of both.
 
     The second one is bent over about ``h`` to start where the first one does.
     """
@@ -113,7 +113,7 @@ def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Bor
     if apart is None:
         return None
     end, b_end = apart
-    # The cusp lies between the two: the common part keeps what is outside both.
+    # The cusp lies between the two: the common part keeps the outer side of both.
     across = (b_end[0] - end[0]) * -ay + (b_end[1] - end[1]) * ax
     b_is_left = across > 0
     common = Border(
@@ -133,9 +133,9 @@ def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Bor
 
 
 def _parting(a: Edge, b: Edge, near: float) -> tuple[Point, Point] | None:
-    """The points, one on each, from which on two edges of one start are ``near`` mm apart.
+    """The points, one on each, where two edges with a common start become ``near`` mm apart.
 
-    None if they already are at the first step, or never are.
+    None if that happens at the first step, or never.
     """
     steps = 256
     length = min(a.length, b.length)
@@ -157,14 +157,14 @@ TURN = 0.5
 """Angle in radians that one side of a triangle may follow an arc: a parabola through three points
 of it then encloses the arc's area to 0.05 %."""
 LEAST = 0.4
-"""Triangles are never made smaller than this part of h."""
+"""Least size of triangles, as a fraction of h."""
 
 
 def narrows(borders: Sequence[Border], h: float) -> list[float]:
-    """For each edge the side in mm of the triangles along it: ``h``, or less where it is needed.
+    """For each edge, the side in mm of the triangles along it: ``h``, or less if needed.
 
-    Straight out from each edge on both sides, the next edge that does not start or end where
-    this one does must be two triangles away; tight arcs have sides of half a radian.
+    Along each edge's normals, the next edge that shares no end with it must be at least two
+    triangles away; tight arcs have sides of half a radian.
     """
     import shapely
 
@@ -242,7 +242,7 @@ LEAST_JACOBIAN = 0.05
 """A curved side that leaves its triangle less than this becomes a chord."""
 SHARP = math.radians(40.0)
 GRADING = 0.3
-"""How fast triangles grow away from a narrow place, as Netgen counts."""
+"""Growth rate of triangles away from a narrow place, in Netgen's definition."""
 
 
 class Plane(NamedTuple):
@@ -250,8 +250,8 @@ class Plane(NamedTuple):
 
     ``points`` (n, 2) mm, the ``corners`` first corner nodes, then the mid-edge ones, which lie
     on the arcs. ``triangles`` (m, 6): three corners counter-clockwise, then the nodes between
-    first and second, second and third, third and first. ``inside`` (regions, m) tells which
-    triangles make up a region.
+    first and second, second and third, third and first. ``inside`` (regions, m) is a mask of the
+    triangles of each region.
     """
 
     points: NDArray[np.float64]
@@ -267,8 +267,8 @@ class Plane(NamedTuple):
 def triangulation(regions: Sequence[Region], h: float) -> Plane:
     """The plane covered by any of the regions, in triangles of about ``h`` mm.
 
-    Triangles are smaller where edges run nearer to each other. Deterministic. Raises DesignError
-    where Netgen is not installed, OutputError where it cannot mesh a cell.
+    Triangles are smaller where edges run closer together. Deterministic. Raises DesignError if
+    Netgen is not installed, OutputError if it cannot mesh a cell.
     """
     borders = arrangement(regions, h)
     labels, points, triangles, cells, sides = _netgen(borders, h)
@@ -327,7 +327,7 @@ def _netgen(
         raise OutputError(
             f"The plane could not be meshed at h = {h:g} mm ({error}); ask for another h."
         ) from None
-    # A copy: Netgen frees its own with the mesh.
+    # Copy: Netgen frees its array with the mesh.
     points = np.array(mesh.Coordinates(), dtype=np.float64)
     elements = mesh.Elements2D().NumPy()
     sides = mesh.Elements1D().NumPy()
@@ -349,7 +349,7 @@ def _crossings_halved(
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Triangles with a node on each edge that crosses a cell from border to border.
 
-    Two films bonded at both ends of such an edge, but not along it, would share it otherwise.
+    Otherwise two films bonded at both ends of such an edge, but not along it, would share it.
     """
     on_border = np.zeros(len(points), dtype=bool)
     on_border[sides[:, :2]] = True
@@ -433,7 +433,7 @@ def _second_order(
 
 
 def _straightened(plane: Plane) -> Plane:
-    """The plane with chords for arcs round every triangle that a curved side would fold."""
+    """The plane with arcs replaced by chords in every triangle that a curved side would fold."""
     points = plane.points.copy()
     nodes = plane.triangles
     for _ in range(4):

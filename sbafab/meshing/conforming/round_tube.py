@@ -1,8 +1,8 @@
-"""A laminate on a tube: its sheet wrapped round it, its balloons where they stand on the sheet.
+"""A laminate on a tube: the sheet wrapped round it, with the balloons on the sheet.
 
-Flat balloons lie round the tube with their sheet. Filled ones straighten: they are bent so far that
-no film is stretched round the tube by more than in the flat laminate, and stay bent like the tube
-where they are bonded to the sheet.
+Flat balloons are wrapped with their sheet. Filled ones straighten: they are bent only as far as no
+film is stretched round the tube by more than in the flat laminate, but follow the tube where they
+are bonded to the sheet.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from sbafab.meshing.conforming.layup import FormedFilm, Layup, Ply, bodies
 from sbafab.meshing.wrap import TubeWrap, tube_wrap
 
 SLACK = 1e-3
-"""mm by which a film may seem to lie in the sheet, or past the middle between two balloons."""
+"""mm of apparent overlap allowed into the sheet, or past the middle between two balloons."""
 
 NEAR = 12
-"""How fast a film leaves the tube beside its bond to the sheet: by this power of its depth."""
+"""A film leaves the tube beside its bond to the sheet with this power of its depth."""
 
 
 def round_tube(stack: Layup, forms: Sequence[FormedFilm]) -> list[FormedFilm]:
-    """The films of a laminate on a tube where they are when it is wrapped; others as they are.
+    """The films in their wrapped position if the laminate is on a tube; otherwise unchanged.
 
-    Raises DesignError where filled balloons meet round the tube.
+    Raises DesignError if filled balloons meet round the tube.
     """
     wrap = tube_wrap(stack.laminate) if stack.settings.wrapped else None
     if wrap is None:
@@ -82,7 +82,7 @@ def _moved(
     base[nodes] = wrap.placed(flat, middle, share)
     lean = wrap.angle(flat[:, 0], middle, share) + middle / (wrap.radius + wrap.neutral)
     up[nodes] = np.column_stack([np.cos(lean), np.sin(lean), np.zeros(len(lean))])
-    # What lies farther out than the sheet's middle is longer round the tube.
+    # Points farther out than the sheet's middle are stretched round the tube.
     bend = share / wrap.radius
     height = flat[:, 2] + (ply.thickness / 2 if stack.is_thick else 0.0)
     longer = np.zeros(len(base))
@@ -93,7 +93,7 @@ def _moved(
         longer += shorter
     cells = stack.plane.triangles[ply.cells]
     sizes = stack.plane.areas()[ply.cells]
-    # Over a triangle of second order the middles of the sides alone count.
+    # Only the mid-side nodes carry weight in a second-order triangle.
     growth = float((longer[cells[:, 3:]].mean(axis=1) * sizes).sum() / sizes.sum())
     return moved._replace(growth=form.growth + growth)
 
@@ -104,8 +104,8 @@ def _laid(
     body: tuple[NDArray[np.int64], float, float],
     flat: NDArray[np.float64],
 ) -> tuple[FormedFilm, NDArray[np.float64]]:
-    """A body's film on the sheet, drawn down to the tube where it is bonded, and near there; how
-    much shorter it is round the tube for that.
+    """A body's film on the sheet, drawn down to the tube at its bond and near it, and how much that
+    shortens it round the tube.
     """
     nodes, middle, share = body
     low, high = flat[:, 2].min(), flat[:, 2].max()
@@ -120,7 +120,7 @@ def _laid(
 
 
 def _check_room(stack: Layup, wrap: TubeWrap, placed: Sequence[FormedFilm]) -> None:
-    """Raises DesignError where balloons reach past the middle between them, or into the sheet."""
+    """Raises DesignError if balloons reach past the middle between them, or into the sheet."""
     of_node, of_centre = bodies(stack)
     middles: dict[int, list[float]] = {}
     for (x, _), body in zip(stack.centres, of_centre.tolist(), strict=True):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sbafab.meshing.conforming.mesh import ElementKind, Mesh
 
 TYPES: dict[ElementKind, str] = {"wedge15": "C3D15", "tetra10": "C3D10", "triangle6": "STRI65"}
-"""Abaqus's names, which meshio knows too; CalculiX has the same but for STRI65, its S6."""
+"""Abaqus's names, also known to meshio; CalculiX uses them too, except S6 for STRI65."""
 SHELL = "CalculiX calls the element STRI65 S6: change that word on the *ELEMENT lines for it."
 SIDES = {0: "SNEG", 1: "SPOS"}
 NODE = "%d, %.10g, %.10g, %.10g\n"

@@ -1,4 +1,4 @@
-"""The mesh formats, a row each."""
+"""Table of mesh formats."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sbafab.meshing.surface import Surface
 
 
 class MeshFormat(NamedTuple):
-    """A file ending, and for each content that the format can hold the function that writes it.
+    """A file ending, with the writing function for each content that the format can hold.
 
     ``solid``: the flat solid, its film's material named. ``elements``: volume and shell meshes.
     ``surface``: skins and cavities. ``cavity``: a chamber's cavity with the numbers of its nodes
@@ -42,9 +42,9 @@ MESH_FORMATS = (
     MeshFormat("3mf", solid=write_3mf),
     MeshFormat("glb", solid=write_glb),
 )
-"""In the order in which files are written and listed."""
+"""Formats in the order in which files are written and listed."""
 
 CONFORMING_ENDINGS = tuple(
     row.ending for row in MESH_FORMATS if row.elements or row.surface or row.cavity
 )
-"""Endings of the files that ``sbafab mesh --format`` chooses among."""
+"""File endings selectable by ``sbafab mesh --format``."""

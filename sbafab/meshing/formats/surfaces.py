@@ -14,11 +14,11 @@ LinearRGB = tuple[float, float, float]
 FILM: LinearRGB = (0.78, 0.74, 0.65)
 """Linear red, green and blue: the off-white of TPE film."""
 UPRIGHT_METRES = ((1e-3, 0, 0, 0), (0, 0, 1e-3, 0), (0, -1e-3, 0, 0), (0, 0, 0, 1))
-"""From mm with z up to the metres with y up that GLB asks for."""
+"""From mm with z up to metres with y up, as GLB requires."""
 
 
 class Node(NamedTuple):
-    """One body of a scene; ``colour`` is linear, not as screens have it."""
+    """One body of a scene; ``colour`` is linear, not sRGB."""
 
     name: str
     surface: Surface
@@ -27,7 +27,7 @@ class Node(NamedTuple):
 
 
 def write_stl(surface: Surface, path: Path, _material: str = "") -> None:
-    """Write binary STL in mm; the format has no place for a unit or a material."""
+    """Write binary STL in mm; the format cannot store a unit or a material."""
     path.write_bytes(surface.trimesh().export(file_type="stl"))
 
 
@@ -48,7 +48,7 @@ def write_glb(surface: Surface, path: Path, material: str = "TPE") -> None:
 
 
 def write_scene(nodes: Sequence[Node], path: Path) -> None:
-    """Write GLB at true size, a node for each body: coordinates in mm, scaled by the node."""
+    """Write GLB at true size, one node per body: coordinates in mm, scaled by the node."""
     from trimesh import Scene
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial

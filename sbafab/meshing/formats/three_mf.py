@@ -41,14 +41,14 @@ xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
 </model>
 """
 AT_ONCE = 8192
-"""Rows written together: few enough that they stay in the processor's cache."""
+"""Rows written together: few enough to stay in the processor's cache."""
 VERTEX = b'<vertex x="%s" y="%s" z="%s"/>\n'
 TRIANGLE = b'<triangle v1="%s" v2="%s" v3="%s"/>\n'
 
 
 def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
     """Write the surface in mm, as one object of one material."""
-    # Most points share their x, y or z with others: each number is put in words once.
+    # Most points share their x, y or z with others, so format each number once.
     corners = _counted(len(surface.points))
     vertices = _rows(VERTEX, [_worded(along) for along in surface.points.T])
     triangles = _rows(TRIANGLE, [corners[along] for along in surface.faces.T])
@@ -65,15 +65,15 @@ def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
 
 
 def _worded(numbers: NDArray[np.float64]) -> NDArray[np.bytes_]:
-    """Each number with six decimals."""
-    # By their bits, which tell -0 from 0 as the words do.
+    """Format each number with six decimals."""
+    # Compare bits, which distinguish -0 from 0 as the formatted numbers do.
     bits, place = np.unique(np.ascontiguousarray(numbers).view(np.int64), return_inverse=True)
     words: NDArray[np.bytes_] = np.array([b"%.6f" % n for n in bits.view(np.float64).tolist()])
     return words[place]
 
 
 def _counted(count: int) -> NDArray[np.bytes_]:
-    """The whole numbers from 0 on, ``count`` of them, NUL for zeros in front."""
+    """The first ``count`` whole numbers from 0, padded with leading NUL."""
     width = len(str(count))
     digits = np.arange(count)[:, None] // 10 ** np.arange(width - 1, -1, -1)
     signs = (digits % 10 + ord("0")).astype(np.uint8)
@@ -83,7 +83,7 @@ def _counted(count: int) -> NDArray[np.bytes_]:
 
 
 def _rows(form: bytes, columns: Sequence[NDArray[np.bytes_]]) -> bytes:
-    """The form once a row, its places filled with the words of the columns."""
+    """The form once per row, its placeholders filled from the columns."""
     first, *rest = (np.asarray(part) for part in form.split(b"%s"))
     fields = [first, *chain.from_iterable(zip(columns, rest, strict=True))]
     kinds = [(str(number), field.dtype) for number, field in enumerate(fields)]
@@ -92,7 +92,7 @@ def _rows(form: bytes, columns: Sequence[NDArray[np.bytes_]]) -> bytes:
         rows = np.empty(min(AT_ONCE, len(columns[0]) - start), dtype=kinds)
         for (name, _), field in zip(kinds, fields, strict=True):
             rows[name] = field[start : start + AT_ONCE] if field.shape else field
-        # Words shorter than their column are filled up with NUL.
+        # Entries shorter than their column are padded with NUL.
         parts.append(rows.tobytes().translate(None, b"\0"))
     return b"".join(parts)
 
@@ -102,8 +102,8 @@ def _write_zip(path: Path, parts: dict[str, bytes]) -> None:
 
     with ZipFile(path, "w") as archive:
         for name, data in parts.items():
-            # ZipInfo's date is fixed where a bare name would take the clock's; the maker must
-            # not depend on the system either.
+            # ZipInfo has a fixed date, whereas a bare name would take the clock's; the creating
+            # system must not vary either.
             entry = ZipInfo(name)
             entry.compress_type = ZIP_DEFLATED
             entry.create_system = 3

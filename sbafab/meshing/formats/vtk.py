@@ -11,7 +11,7 @@ TRIANGLE, TETRAHEDRON = 5, 10
 
 
 def write_vtk(mesh: Mesh, path: Path) -> None:
-    """Write a mesh as tetrahedra or triangles of first order, through the corner nodes alone."""
+    """Write a mesh as first-order tetrahedra or triangles, from the corner nodes only."""
     points, cells, owner = mesh.linear()
     kind = TETRAHEDRON if cells.shape[1] == 4 else TRIANGLE
     part = [0] * len(mesh.cells)
