@@ -27,13 +27,13 @@ from sbafab.simulators.coarse.rounds import pocket_radii, why_not_round
 Name = Literal["calculix", "sofa", "mujoco"]
 NAMES: tuple[Name, ...] = ("calculix", "sofa", "mujoco")
 LONGEST = 1e5
-"""s of simulated time."""
+"""Longest simulated time, s."""
 MOST_PRESSURE = 1000.0
-"""kPa: nearly three times what bursts the paper's actuators."""
+"""kPa: nearly three times the burst pressure of the paper's actuators."""
 LARGEST_VACUUM = 101.325
-"""kPa below the air outside, which no vacuum exceeds."""
+"""kPa below the outside air: the limit of any vacuum."""
 VACUUM = -6.0
-"""kPa in a design that works under a vacuum, by default: as far from 0 as CalculiX inflates."""
+"""Default kPa of a design that works under a vacuum: the size of CalculiX's default pressure."""
 
 
 CHOICES = {
@@ -41,19 +41,18 @@ CHOICES = {
     "procedure": ("dynamic", "static"),
     "scene": ("shell", "frames", "volume", "beam"),
 }
-"""What a setting of a request may be, by its name."""
+"""Allowed values of a request's settings, by name."""
 
 
 @dataclass(frozen=True)
 class SimulationRequest:
-    """Settings of a simulation; None where the simulator's default will do.
+    """Settings of a simulation; None for the simulator's default.
 
-    ``pressure`` in kPa, as a gauge shows it (a vacuum is negative), for every chamber that
-    ``chambers`` does not name; ``minutes`` is the most
-    real time a run may take. Each simulator's ``USES`` names the others that it reads:
-    ``h`` in mm, ``seconds`` of simulated time, ``volumes`` in ul above the start by chamber;
-    ``CHOICES`` tells the words of the rest. Raises DesignError for another word, and for what is
-    no number.
+    ``pressure`` in kPa is a gauge pressure (a vacuum is negative) for every chamber that
+    ``chambers`` does not name; ``minutes`` is the maximum real time of a run. Each simulator's
+    ``USES`` names the other settings that it reads: ``h`` in mm, ``seconds`` of simulated time,
+    ``volumes`` in ul above the start by chamber; ``CHOICES`` lists the values of the rest. Raises
+    DesignError for any other value, and if a number is not finite.
     """
 
     pressure: float | None = None
@@ -82,20 +81,20 @@ class SimulationRequest:
 
     @property
     def specific_fields(self) -> list[str]:
-        """Names of the set fields that not every simulator reads."""
+        """Names of the fields in use that not every simulator reads."""
         names = ("h", "symmetry", "procedure", "scene", "seconds", "volumes")
         return [name for name in names if getattr(self, name) not in (None, {})]
 
 
 @dataclass(frozen=True)
 class State:
-    """An actuator at one moment in s of a run, in every simulator's terms.
+    """An actuator at one time in s of a run, in the form shared by all simulators.
 
-    ``pressures`` are kPa over the air outside by chamber (a vacuum is negative), none where
-    volumes are imposed; ``volumes`` ul of air by chamber, none where they were not recorded.
-    ``tip`` is by how many mm (x, y, z) the middle of the tip has moved since the films lay flat,
-    ``height`` where it then is over the underside of the base, with films as thick as bought;
-    ``tilt`` degrees. These three are None round a tube, the tilt also where the tip has one axis.
+    ``pressures`` are kPa above the outside air by chamber (a vacuum is negative), empty if volumes
+    are imposed; ``volumes`` ul of air by chamber, empty if they were not recorded. ``tip`` is the
+    displacement in mm (x, y, z) of the middle of the tip from the flat state, ``height`` its height
+    in mm above the underside of the base, with films as thick as bought; ``tilt`` is in degrees.
+    These three are None round a tube, and the tilt is also None if the tip has only one axis.
     """
 
     time: float
@@ -119,7 +118,7 @@ FIGURES = {
     "work": ("work of the air", "uJ"),
     "rate": ("rate", "steps/s"),
 }
-"""Label and unit of what only some simulators find."""
+"""Label and unit of results that only some simulators give."""
 DRIFT_SECONDS = 0.5
 SAME_TIME = 1e-6
 """s"""
@@ -130,7 +129,7 @@ class Result:
     """Result of a run: its ``states`` in order of time, and ``figures`` (mm, ul, MPa, uJ or
     steps/s) by name of ``FIGURES``.
 
-    ``stopped`` is one sentence if it ended early; the results until then are valid.
+    ``stopped`` is one sentence if it ended early; the results up to then are valid.
     """
 
     simulator: Name
@@ -140,27 +139,27 @@ class Result:
 
     @property
     def last(self) -> State:
-        """The state at the end, which the following are of."""
+        """The final state; the properties below refer to it."""
         return self.states[-1]
 
     @property
     def pressures(self) -> Mapping[str, float]:
-        """Pressures in kPa over the air outside, by chamber."""
+        """Pressures in kPa above the outside air, by chamber."""
         return self.last.pressures
 
     @property
     def height(self) -> float | None:
-        """Height in mm of the middle of the tip over the underside of the base."""
+        """Height in mm of the middle of the tip above the underside of the base."""
         return self.last.height
 
     @property
     def tip(self) -> Vector | None:
-        """By how many mm the middle of the tip has moved since the films lay flat."""
+        """Displacement in mm of the middle of the tip from the flat state."""
         return self.last.tip
 
     @property
     def tilt(self) -> float | None:
-        """Degrees by which the tip leans."""
+        """Tilt of the tip in degrees."""
         return self.last.tilt
 
     @property
@@ -170,7 +169,7 @@ class Result:
 
     @property
     def rows(self) -> list[tuple[str, float, str]]:
-        """Label, value and unit of what is printed."""
+        """Label, value and unit of each printed line."""
         last = self.last
         rows = [(name, value, "kPa") for name, value in last.pressures.items()]
         if last.tip is not None and last.height is not None:
@@ -197,15 +196,15 @@ class Result:
 
 
 class Simulator(Protocol):
-    """The module ``run`` of a simulator's folder."""
+    """Interface of the module ``run`` in a simulator's folder."""
 
     USES: tuple[str, ...]
 
     def why_not(self, laminate: Laminate) -> str | None:
-        """Return the reason why there can be no input for a laminate, or None."""
+        """Return the reason why no input can be made for a laminate, or None."""
 
     def export(self, laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
-        """Write the simulator's input, with all that it loads."""
+        """Write the simulator's input, and every file that it loads."""
 
     def run(
         self, laminate: Laminate, request: SimulationRequest, folder: Path, progress: Progress
@@ -260,8 +259,8 @@ def chamber_pressures(
 ) -> dict[str, float]:
     """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
 
-    Without any it is the ``default`` in all of them; with single ones only, 0 in the others. Raises
-    DesignError for a chamber that is not there and a pressure out of range.
+    Without a request every chamber has the ``default``; if only single chambers are given, the
+    others have 0. Raises DesignError for an unknown chamber and a pressure out of range.
     """
     if not names:
         raise DesignError(
@@ -292,7 +291,7 @@ def refuse_time(seconds: float, least: float) -> None:
 
 
 def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantity: str) -> None:
-    """Raises DesignError for a chamber that is not there."""
+    """Raises DesignError for an unknown chamber."""
     unknown = next((name for name in requested if name not in names), None)
     if unknown is not None:
         raise DesignError(
@@ -301,30 +300,30 @@ def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantit
         )
 
 
-# What cannot be: a result that holds it is void.
+# Physical limits: a result beyond them is void.
 
 
 STRETCH = 1.3
-"""Times its flat length that a film may be along its meridian; more has burst it long before."""
+"""Maximum stretch ratio of a film along its meridian; it would have burst long before."""
 MOST_LEAN = 1.0
-"""Degrees of tilt where all chambers are alike; shells that hold stand within 0.1."""
+"""Maximum degrees of tilt with equal chambers; sound shells stay within 0.1."""
 LEAST_RISE = 0.01
-"""mm that a tip rises where all chambers are alike: no start is as low and stays there."""
+"""Least rise in mm of a tip with equal chambers: no sound start remains this low."""
 NOWHERE = 1e-6
-"""mm from 0 in x, y and z: no start has its tip there, and solvers that fail put nodes there."""
+"""mm from 0 in x, y and z: tips never start there, but failing solvers put nodes there."""
 NO_AIR = 0.01
-"""Part of the films' own volume, over its pockets, by which a chamber's air may be below 0."""
+"""Limit of a chamber's negative air, as a fraction of the films' volume over its pockets."""
 MOST_OVERLAP = 0.2
-"""Part of all air in which films may have passed through each other where there is no contact. At
-a tenth, which one chamber at 5 kPa takes in SOFA's scenes, it bends some 10 degrees too far."""
+"""Largest overlap of films without contact, as a fraction of all air. One chamber at 5 kPa in
+SOFA's scenes reaches a tenth, and then bends some 10 degrees too far."""
 
 
 @dataclass(frozen=True)
 class PhysicalLimits:
-    """Limits of what a laminate can do.
+    """Physical limits of a laminate.
 
-    ``highest`` is how far its tip may rise, in mm, None round a tube; whether its tip must stand,
-    as alike chambers lift it; the least air of a chamber in ul.
+    ``highest`` is the maximum rise of its tip in mm, None round a tube; then a flag, True if equal
+    chambers must keep the tip level, and the least air of a chamber in ul.
     """
 
     highest: float | None
@@ -335,8 +334,8 @@ class PhysicalLimits:
 def limits(laminate: Laminate, requested: Collection[float]) -> PhysicalLimits:
     """Return the limits of a laminate with these pressures or volumes in its chambers.
 
-    A balloon is no higher than its two films are long; equal chambers lift a plate evenly, where
-    the mesh has no inlets. A laminate on a tube has no common tip.
+    A balloon's height cannot exceed the length of its two films; equal chambers lift a plate evenly
+    if the mesh has no inlets. A laminate on a tube has no common tip.
     """
     radii = pocket_radii(laminate)
     thick = min((layer.film.thickness for layer in laminate.tpe_layers), default=0.0)
@@ -348,7 +347,7 @@ def limits(laminate: Laminate, requested: Collection[float]) -> PhysicalLimits:
 
 
 def impossible(state: State, can_be: PhysicalLimits, passed: float = 0.0) -> str | None:
-    """Return what is impossible in a state, or None; ``passed`` is the ``overlap`` in ul."""
+    """Return why a state is impossible, or None; ``passed`` is the ``overlap`` in ul."""
     return next(_wrong(state, can_be, passed), None)
 
 
@@ -388,10 +387,10 @@ def overlap(
 ) -> float:
     """Return the volume in ul in which films have passed through the films that lay on them.
 
-    ``points``, ``flat`` and ``start`` are the places (n, 3) of nodes at the end, when all films lie
-    on each other, and in the order of the films; ``triangles`` (k, 3) are all films. Nodes that lie
-    on each other when flat are looked at one on the next, along the normal of their films, each
-    for its share of the flat film.
+    ``points``, ``flat`` and ``start`` are the positions (n, 3) of nodes at the end, when all films
+    lie on each other, and in the order of the films; ``triangles`` (k, 3) are all films. Nodes that
+    coincide when flat are compared in pairs along the normal of their films, each weighted by its
+    share of the flat film.
     """
     a, b, c = flat[triangles].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)[:, 2]
@@ -414,38 +413,38 @@ def overlap(
 
 
 def drift(states: Sequence[State]) -> float:
-    """Return by how many mm the tip moved in the last half second; little if it is at rest."""
+    """Return the distance in mm that the tip moved in the last half second; small at rest."""
     last = states[-1]
     since = last.time - DRIFT_SECONDS + SAME_TIME
     before = next((state for state in reversed(states) if state.time <= since), states[0])
     return math.dist(before.tip or (), last.tip or ())
 
 
-# A program started, watched, and stopped after its time or on an interrupt.
+# Starting a program, monitoring it, and stopping it on timeout or interrupt.
 
 
 LOOK_EVERY = 0.1
-"""s between two looks at how far a run is."""
+"""Progress polling interval, s."""
 STOP_WITHIN = 10.0
-"""s that a program has to end by itself before it is killed."""
+"""Grace period in s before a program is killed."""
 
 
 class Stop(NamedTuple):
-    """Why a program ended early: on an interrupt, after its time, as it diverged, or failed."""
+    """Why a program ended early: interrupted, timed out, diverged, or failed."""
 
     kind: Literal["interrupt", "time", "diverged", "failed"]
     words: str
 
 
 class Ended(NamedTuple):
-    """End of a program: its exit code, and why it was stopped, None if it ended by itself."""
+    """End of a program: its exit code, and the reason if it was stopped, else None."""
 
     code: int
     stopped: Stop | None
 
 
 def program_path(name: str, install: str) -> str:
-    """Path of an installed program. Raises OutputError that says how to ``install`` it."""
+    """Path of an installed program. Raises OutputError with instructions to ``install`` it."""
     path = shutil.which(name)
     if path is None:
         raise OutputError(f"{name} was not found; {install}")
@@ -458,17 +457,17 @@ def run_program(
     limit: float | None,
     look: Callable[[], None],
 ) -> Ended:
-    """Run a command in the folder of its ``log``, which takes what it prints.
+    """Run a command in the folder of its ``log``, which receives its output.
 
     ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
     stop the run, not the program that started it, so that partial results can be kept. One
-    thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError where it cannot be started.
+    thread, unless OMP_NUM_THREADS says otherwise. Raises OutputError if it cannot be started.
     """
     began = time.monotonic()
     stopped: Stop | None = None
     with log.open("wb") as opened:
         try:
-            # In a session of its own: the command may be a script that starts the real program.
+            # In a new session, since the command may be a script that starts the real program.
             process = subprocess.Popen(
                 command,
                 cwd=log.parent,
@@ -493,7 +492,7 @@ def run_program(
                 if limit is not None and time.monotonic() - began >= limit:
                     stopped = Stop("time", f"it was stopped after {limit / 60:g} minutes")
         except KeyboardInterrupt:
-            # Hours of computing are not thrown away with the rest of them.
+            # Keep the results of hours of computing.
             stopped = Stop("interrupt", "it was interrupted")
         finally:
             _end(process)
@@ -501,7 +500,7 @@ def run_program(
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends the program and what it started."""
+    """Ends the program and its child processes."""
     for number in (signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)):
         if process.poll() is not None:
             return
@@ -516,7 +515,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 
 def tilt_of(points: Sequence[Vector]) -> float:
-    """Degrees by which the normal of a polygon of points leans off the axis."""
+    """Angle in degrees between the normal of a polygon of points and the axis."""
     nx = ny = nz = 0.0
     for (ax, ay, az), (bx, by, bz) in zip(points, [*points[1:], points[0]], strict=True):
         nx += ay * bz - az * by

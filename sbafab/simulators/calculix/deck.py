@@ -1,4 +1,4 @@
-"""What a CalculiX run is asked to do, and the film it does it with.
+"""Settings of a CalculiX run, its film, and the input deck.
 
 Units are mm, N, MPa, t and s; pressures are given in kPa.
 """
@@ -27,7 +27,7 @@ from sbafab.simulators.simulator import (
 Procedure = Literal["dynamic", "static"]
 
 PAPER_PRESSURE = 6.0
-"""kPa up to which the paper's model of one balloon is inflated (Fig. 7c)."""
+"""kPa to which the paper's model of one balloon is inflated (Fig. 7c)."""
 
 
 class Elastic(NamedTuple):
@@ -39,19 +39,19 @@ class Elastic(NamedTuple):
 
 
 TPE = Elastic(*PAPER_TPE, 1.122e-9)
-"""As in the paper's model. The density is the film's own where there is a laminate."""
+"""The paper's model. A laminate's film replaces the density."""
 
 
 @dataclass(frozen=True)
 class DeckSettings:
     """Load and procedure.
 
-    ``pressures`` in kPa by chamber, reached after ``ramp`` seconds and written out ``outputs``
-    times on the way. They rise with the square of time, because a flat film gives way at once and
-    then ever less. Films start ``imperfection`` mm off flat, or wrinkles would be a bifurcation
-    that no Newton iteration gets past; "static" leaves out the inertia that carries a film from
-    one pattern of wrinkles to the next, and mostly stops there. ``film`` is TPE, ``others`` are
-    further films by material.
+    ``pressures`` in kPa by chamber are reached after ``ramp`` seconds, with ``outputs`` results on
+    the way. They rise with the square of time, because a flat film yields quickly at first and then
+    less and less. Films start ``imperfection`` mm off flat, since Newton's iteration cannot pass
+    wrinkling as a bifurcation. "static" omits the inertia that carries a film from one wrinkle
+    pattern to the next, and usually stops there. ``film`` is TPE, ``others`` are further films by
+    material.
     """
 
     pressures: Mapping[str, float]
@@ -65,11 +65,11 @@ class DeckSettings:
     is_glued: bool = False
 
     def times(self) -> list[float]:
-        """When results are written, in s, and the start."""
+        """Start and output times, in s."""
         return [self.ramp * n / self.outputs for n in range(self.outputs + 1)]
 
     def share(self, time: float) -> float:
-        """The part of the pressures that is on at a time; straight between outputs."""
+        """The fraction of the pressures applied at a time; linear between outputs."""
         at = min(max(time / self.ramp, 0.0), 1.0) * self.outputs
         n = min(int(at), self.outputs - 1)
         return (n**2 + (at - n) * (2 * n + 1)) / self.outputs**2
@@ -87,7 +87,7 @@ class DeckSettings:
 def deck_settings(
     laminate: Laminate, request: SimulationRequest | None = None, procedure: Procedure = "dynamic"
 ) -> DeckSettings:
-    """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
+    """Settings for a laminate; pressures as in ``chamber_pressures``, the paper's by default."""
     names = [chamber.name for chamber in laminate.chambers]
     pressures = chamber_pressures(
         names, request or SimulationRequest(), PAPER_PRESSURE, least=-LARGEST_VACUUM
@@ -95,7 +95,7 @@ def deck_settings(
     films = {layer.film.material: _elastic(layer.film) for layer in laminate.tpe_layers}
     film = films.pop("TPE", TPE)
     is_stack = any(interface.kind == "separator" for interface in laminate.interfaces)
-    # A balloon has an outline that its tabs are no part of, and the paper's model has no tube.
+    # A balloon's outline excludes its tabs, and the paper's model has no tube.
     is_glued = not is_stack and laminate.outline.is_empty
     return DeckSettings(
         pressures, procedure, film=film, others=films, is_free=not is_stack, is_glued=is_glued
@@ -103,7 +103,7 @@ def deck_settings(
 
 
 def _elastic(film: Film) -> Elastic:
-    """Return the film's elastic constants. Raises DesignError where its modulus is not known."""
+    """Return the film's elastic constants. Raises DesignError if its modulus is not known."""
     if film.elastic is None:
         raise DesignError(
             f"CalculiX needs Young's modulus of {film.material}; add "
@@ -112,19 +112,18 @@ def _elastic(film: Film) -> Elastic:
     return Elastic(*film.elastic, 1e-12 * density_of(film, "CalculiX"))
 
 
-# A start a little off flat, from which films know which way to wrinkle.
+# A start slightly off flat, which decides the direction of wrinkles.
 
 
 WAVES = tuple((0.2 + 0.52 * n, (1.0, 1.7, 2.9)[n % 3], 2.4 * n**2) for n in range(12))
-"""Direction, length from crest to crest in mm, and phase of the waves it is the sum of: lengths
-that a mesh of 0.35 can follow and that films of 0.038 wrinkle at, in directions that no round
-pocket is symmetric to."""
+"""Direction, wavelength in mm, and phase of the waves that add up to it: lengths that a mesh of
+0.35 mm resolves and films of 0.038 mm wrinkle at, in directions off a round pocket's symmetries."""
 
 
 def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-    """Points (n, 3) of a stack that lies on a wavy plate, up to ``height`` mm up or down.
+    """Points (n, 3) of a stack laid on a wavy plate, up to ``height`` mm up or down.
 
-    Films and bonds above each other move as one: they stay as thick as they are, and apart.
+    Films and bonds above each other move together: their thicknesses and gaps do not change.
     """
     x, y = points[:, 0], points[:, 1]
     waves = np.zeros(len(points))
@@ -132,7 +131,7 @@ def uneven(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
         along = x * np.cos(direction) + y * np.sin(direction)
         waves += np.cos(2 * np.pi * along / length + phase)
     moved = points.copy()
-    # The sum seldom comes near what all crests together would give: half of it is its height.
+    # The sum rarely approaches that of all crests: half of that counts as its height.
     moved[:, 2] += height * np.clip(2 * waves / len(WAVES), -1.0, 1.0)
     return moved
 
@@ -147,7 +146,7 @@ FLAT = 1e-6
 
 
 def is_lone_balloon(mesh: Mesh) -> bool:
-    """Return True if the mesh has two films only: nothing but the bonded ring can hold them."""
+    """Return True if the mesh has only two films: only the bonded ring can hold them."""
     return sum(name.startswith("film_") for name in mesh.cell_sets) == 2
 
 
@@ -155,8 +154,8 @@ def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Itera
     """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
-    paper's model: a few nodes of the ring hold what a rigid body could do, and nothing else; so do
-    they where the deck ``is_free``. Where it ``is_glued``, inlets are shut by their tubes.
+    paper's model: a few nodes of the ring prevent rigid-body motion only, and likewise if the deck
+    ``is_free``. If it ``is_glued``, inlets are shut by their tubes.
     """
     is_free = is_free or is_lone_balloon(mesh)
     if is_free:
@@ -173,17 +172,16 @@ def supports(mesh: Mesh, is_free: bool = False, is_glued: bool = False) -> Itera
 
 
 def _glued_lips(mesh: Mesh) -> Iterator[str]:
-    """Both lips of a mouth move as one, as a tube is glued in between them.
+    """Tie both lips of a mouth together, as a tube is glued in between them.
 
-    The chamber is closed so: without, air that presses on a mouth that opens would push the films
-    off it.
+    This closes the chamber: otherwise the air in an opening mouth would push the films off.
     """
     bonds = [nodes for name, nodes in mesh.node_sets.items() if name.startswith("bond_")]
     on_planes = {int(node) for name in _planes(mesh) for node in mesh.node_sets[name]}
     for name, mouth in mesh.node_sets.items():
         if not name.startswith(INLET):
             continue
-        # A mouth's ends are bonded as they are; kept apart, they have a node between them.
+        # A mouth's ends are already bonded; with gaps kept, they have a node between them.
         lips: dict[tuple[float, float], list[int]] = {}
         for node in np.setdiff1d(mouth, np.concatenate(bonds)).tolist():
             x, y = np.round(mesh.points[node, :2], 6).tolist()
@@ -191,7 +189,7 @@ def _glued_lips(mesh: Mesh) -> Iterator[str]:
         for column in lips.values():
             column.sort(key=lambda node: (mesh.points[node, 2], node))
             for lower, upper in zip(column[::2], column[1::2], strict=False):
-                # A plane of symmetry holds its nodes across itself.
+                # A plane of symmetry holds its nodes in its normal direction.
                 for axis in (3,) if lower in on_planes else (1, 2, 3):
                     yield f"*EQUATION\n2\n{upper + 1}, {axis}, 1, {lower + 1}, {axis}, -1\n"
 
@@ -201,7 +199,7 @@ def _planes(mesh: Mesh) -> list[str]:
 
 
 def _fixed_freedoms(mesh: Mesh) -> Iterator[tuple[int, int]]:
-    """Nodes, from 1, and axes: as many as the planes of symmetry leave a rigid body to do."""
+    """Nodes, from 1, and axes that fix the rigid-body motions left by the symmetry planes."""
     ring = mesh.node_sets[RING]
     x, y = mesh.points[ring, 0], mesh.points[ring, 1]
     far = float(np.abs(y).max())
@@ -231,7 +229,7 @@ def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
     on_axis = nodes[np.hypot(*mesh.points[nodes, :2].T) < FLAT]
     for node in np.setdiff1d(on_axis, fixed):
         yield f"*BOUNDARY\n{node + 1}, 1, 2\n"
-    # The first term is the one that is eliminated: that of the larger factor.
+    # The first term is eliminated, so it needs the larger factor.
     first, second = (1, 2) if abs(normal[0]) >= abs(normal[1]) else (2, 1)
     for node in np.setdiff1d(nodes, np.concatenate([fixed, on_axis])):
         yield (
@@ -241,7 +239,7 @@ def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
 
 
 def _normal(places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit normal of the upright plane through the axis and these places."""
+    """Unit normal of the upright plane through the axis and these points."""
     x, y = places[np.hypot(*places.T).argmax()]
     normal: NDArray[np.float64] = np.array([-y, x]) / np.hypot(x, y)
     return normal
@@ -249,16 +247,16 @@ def _normal(places: NDArray[np.float64]) -> NDArray[np.float64]:
 
 # The input of CalculiX for an actuator, ``actuator.inp``, its mesh, and the same for Abaqus.
 #
-# Both read the same keywords but for what is to be written out.
+# Both read the same keywords, except for output requests.
 
 
 JOB = "actuator"
 MESH_FILE = "mesh.inp"
 ABAQUS_FILE = "abaqus.inp"
 FIRST, LEAST = 0.1, 1e-7
-"""First and least increment, as parts of the time between outputs and of the ramp."""
+"""First increment as a fraction of the output interval, and least one as a fraction of the ramp."""
 DAMPING = -0.3
-"""Of high frequencies, by Hilber, Hughes and Taylor: the most there is."""
+"""Numerical damping of high frequencies (Hilber, Hughes and Taylor): the largest possible."""
 MOST_INCREMENTS = 100_000
 ABAQUS_OUTPUTS = """\
 *OUTPUT, FIELD, TIME POINTS=outputs
@@ -275,8 +273,8 @@ ALLSE, ALLKE
 def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
     """Write ``actuator.inp``, ``abaqus.inp`` and the ``mesh.inp`` they include into ``folder``.
 
-    ``mesh`` is a flat volume mesh. The files are returned; run them with ``ccx -i actuator`` or
-    ``abaqus job=abaqus``. The latter was written from Abaqus's manual and never run.
+    ``mesh`` is a flat volume mesh. Return the files; run them with ``ccx -i actuator`` or
+    ``abaqus job=abaqus``. The latter follows Abaqus's manual and has never been run.
     """
     folder.mkdir(parents=True, exist_ok=True)
     run_mesh = started(mesh, settings)
@@ -290,7 +288,7 @@ def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
 
 
 def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
-    """The mesh that is run: the flat one with its imperfection."""
+    """The mesh to run: the flat one with its imperfection."""
     return replace(mesh, points=uneven(mesh.points, settings.imperfection))
 
 
@@ -310,7 +308,7 @@ def _lines(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
 
 
 def _sections(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    """The films' materials, and which elements are of each."""
+    """The films' materials, and the elements of each."""
     films = {"TPE": settings.film, **settings.others}
     used = in_order(mesh.materials.values()) or ["TPE"]
     for name in used:
@@ -356,7 +354,7 @@ def _face_numbers(mesh: Mesh, chamber: str) -> list[int]:
 
 
 def _cavity_faces(mesh: Mesh) -> Iterator[str]:
-    """An element set for each chamber and face number: each face is in one of them, once."""
+    """An element set for each chamber and face number: each face is in exactly one."""
     for name, faces in mesh.face_sets.items():
         chamber = name.removeprefix("cavity_")
         for number in _face_numbers(mesh, chamber):

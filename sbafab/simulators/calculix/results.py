@@ -1,6 +1,6 @@
 """Results of CalculiX: the text ``.frd`` with fields at nodes, and ``.sta``.
 
-The layout is that of the CalculiX GraphiX manual: fixed columns, a record a line.
+The layout follows the CalculiX GraphiX manual: fixed columns, one record per line.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
 COMPONENTS = {b"DISP": 3, b"STRESS": 6}
 NODE, VALUE = 13, 12
-"""Columns of a line's key and node number, and of each value."""
+"""Widths in columns of a line's key with node number, and of each value."""
 BLOCK = re.compile(rb"\n  100CL.{6}(.{12})(.{12}).*\n -4  (\S+).*\n(?: -5.*\n)+")
-"""Time, number of nodes and name of what follows."""
+"""Time, number of nodes and name of the block."""
 SAME_TIME = 2e-5
-"""Relative: times have six digits."""
+"""Relative tolerance: times have six digits."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ class Frame:
 def read_frd(path: Path, nodes: int, whole: bool = True) -> list[Frame]:
     """The frames of a result file in order of time.
 
-    ``nodes`` is how many the mesh has. Without ``whole`` the file may end anywhere, as that of a
-    run that was stopped does; full frames before the end are returned. Raises OutputError where
-    the file cannot be read, is of another mesh or, if asked to be whole, is cut short.
+    ``nodes`` is the mesh's number of nodes. Without ``whole`` the file may end anywhere, as after
+    a stopped run; complete frames before the end are returned. Raises OutputError if the file
+    cannot be read, belongs to another mesh or, with ``whole``, is truncated.
     """
     try:
         content = path.read_bytes()
@@ -120,12 +120,12 @@ def _blocks(
 
 
 def read_sta(path: Path) -> list[float]:
-    """Times in s at which a run has converged so far; a line being written is left out."""
+    """Times in s at which a run has converged so far; a partly written line is ignored."""
     times = []
     lines = path.read_text(encoding="ascii", errors="replace").split("\n") if path.is_file() else []
     for line in lines[2:-1]:
         fields = line.split()
-        # A number of attempts with U behind it is of an increment that did not converge.
+        # A U after the number of attempts marks an increment that did not converge.
         if len(fields) == 7 and fields[2].isdigit():
             times.append(float(fields[4]))
     return times
@@ -137,7 +137,7 @@ def read_sta(path: Path) -> list[float]:
 SAME_PLACE = 1e-6
 """mm"""
 NEAR = 0.5
-"""mm from an axis within which a node of the tip stands for it."""
+"""mm from an axis within which a node of the tip represents it."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def history(
     settings: DeckSettings,
     frames: Sequence[Frame],
 ) -> list[LoadedState]:
-    """The states of a run from the unloaded one on; ``mesh`` is the one that was run."""
+    """The states of a run from the unloaded one on; ``mesh`` is the mesh of the run."""
     tips, bases = (_poles(mesh, laminate, name) for name in ("tip", "base"))
     walls = {name: _walls(mesh, name) for name in settings.pressures}
     shares = {name: _share(laminate, name, symmetry) for name in settings.pressures}
@@ -191,7 +191,7 @@ def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
     """Return True if films that face each other across a chamber have passed through each other.
 
     ``mesh`` keeps the gaps between films; decks have no contact. Films of open chambers that lie on
-    each other from the start are not looked at.
+    each other from the start are ignored.
     """
     nodes = np.unique(_walls(mesh, chamber))
     x, y, z = mesh.points[nodes].T
@@ -215,7 +215,7 @@ def _work(
 
 
 def _poles(mesh: Mesh, laminate: Laminate, name: str) -> NDArray[np.int64]:
-    """The node of a set nearest to each stack's axis, if that lies in the mesh."""
+    """The node of a set nearest to each stack's axis, if the axis lies in the mesh."""
     nodes = mesh.node_sets[name]
     nearest = []
     for chamber in laminate.chambers:
@@ -250,7 +250,7 @@ def _volume(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
 
 
 def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
-    """The part of a chamber that is meshed; 1 where none of it is."""
+    """The meshed fraction of a chamber; 1 if none of it is meshed."""
     part = sector(laminate, symmetry)
     if part is None:
         return 1.0
@@ -261,7 +261,7 @@ def _share(laminate: Laminate, chamber: str, symmetry: Symmetry) -> float:
 
 
 def history_csv(states: Sequence[LoadedState]) -> str:
-    """The states as text, a row each; units stand in the heads."""
+    """The states as CSV, one row each; the headers contain the units."""
     first = states[0]
     head = ["time_s", *(f"pressure_{name}_kPa" for name in first.pressures)]
     head += ["stroke_mm", "tip_x_mm", "tip_y_mm"]
@@ -277,7 +277,7 @@ def history_csv(states: Sequence[LoadedState]) -> str:
     return csv_text(rows)
 
 
-# The deformed mesh for ParaView, with what the run found at its nodes.
+# The deformed mesh for ParaView, with the results at its nodes.
 
 
 def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
@@ -285,7 +285,7 @@ def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
 
     To see the undeformed one, warp by the displacement with a factor of -1.
     """
-    # VTK's order of a symmetric tensor is that of CalculiX.
+    # VTK orders a symmetric tensor like CalculiX.
     fields = {
         "displacement": frame.displacement,
         "von_mises": frame.von_mises,
@@ -302,12 +302,12 @@ MARGIN, FOOT = 60, 110
 ENLARGED = 2
 INK = (34, 34, 34)
 SCALE = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)])
-"""Of even lightness steps (viridis): read by the colour blind, and in grey."""
+"""Viridis: even steps of lightness, readable by colour-blind people and in grey."""
 LAMP = (-0.35, 0.55, 0.76)
 """Direction to the light, in the view."""
 DARKEST = 0.22
 ELEVATION, AZIMUTH = 28.0, -35.0
-"""Degrees of the eye over the bench, and round it from x."""
+"""View direction: degrees above the bench, and round it from x."""
 
 
 def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
@@ -322,7 +322,7 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
     stress = frame.von_mises
     most = float(stress.max()) or 1.0
     colours = _coloured(stress[surface.faces].mean(axis=1) / most)
-    # A little darker where a face is steep: it shows wrinkles and leaves the colour readable.
+    # Darken steep faces slightly: this shows wrinkles and keeps the colour readable.
     shade = 1 - DARKEST * (1 - buffer.light) / (1 - AMBIENT)
     rgb = np.where((buffer.body < 0)[..., None], 255, colours[buffer.face] * shade[..., None])
     picture = Image.fromarray(rgb.round().astype(np.uint8), "RGB").reduce(ENLARGED)
@@ -333,7 +333,7 @@ def deformed_png(mesh: Mesh, frame: Frame, caption: str) -> bytes:
 
 
 def _skin(mesh: Mesh) -> NDArray[np.int64]:
-    """Triangles (k, 3) of every element face that no other element has."""
+    """Triangles (k, 3) of every element face not shared with another element."""
     count = len(mesh.cells)
     faces, keys = [], []
     for number, local in enumerate(FACES[mesh.kind]):
@@ -374,7 +374,7 @@ def _write_key(draw: Draw, caption: str, most: float, pixels_per_mm: float) -> N
 
 
 def history_svg(title: str, states: Sequence[LoadedState]) -> str:
-    """Three panels beside each other; x is the chambers' pressure that is farthest from 0."""
+    """Three panels side by side; x is the chamber pressure farthest from 0."""
     last = states[-1]
     fullest = max(last.pressures, key=lambda name: abs(last.pressures[name]))
     x = [state.pressures[fullest] for state in states]

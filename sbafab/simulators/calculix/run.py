@@ -52,14 +52,14 @@ DIVERGED = Stop("diverged", "its iterations no longer converge, however small th
 
 
 class Ending(NamedTuple):
-    """End of a run: the last converged time in s, and what stopped it, None if nothing did."""
+    """End of a run: the last converged time in s, and the reason if it was stopped, else None."""
 
     time: float
     stopped: Stop | None
 
 
 def find_ccx() -> str:
-    """Path of the solver. Raises OutputError where it is not installed."""
+    """Path of the solver. Raises OutputError if it is not installed."""
     return program_path(
         "ccx",
         "install CalculiX; on Debian and Ubuntu: apt install calculix-ccx",
@@ -75,7 +75,7 @@ def run_ccx(
 ) -> Ending:
     """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
-    What ccx prints goes to ``ccx.log`` there; ``report`` is told the time in s that is reached.
+    The output of ccx goes to ``ccx.log`` there; ``report`` is called with the time reached, in s.
     """
     sta = folder / f"{job}.sta"
 
@@ -96,9 +96,9 @@ def _reached(sta: Path) -> float:
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> Stop | None:
-    """Return what went wrong; ccx's exit code alone does not tell, and may be 0 all the same.
+    """Return the failure, if any; ccx's exit code is not enough, since it may be 0 on failure.
 
-    A step that diverges and is tried again with less is no failure.
+    A diverging step that is retried with a smaller increment is not a failure.
     """
     text = log.read_text(encoding="utf-8", errors="replace")
     if is_there and code == 0 and "Job finished" in text:
@@ -128,7 +128,7 @@ class History:
 
 
 def deck_mesh(laminate: Laminate, settings: MeshSettings) -> Mesh:
-    """The flat volume mesh that a deck is of. Raises DesignError, OutputError as meshes do."""
+    """The flat volume mesh for a deck. Raises DesignError, OutputError as meshing does."""
     stack = layup(laminate, settings)
     return volume_mesh(stack, flat(stack))
 
@@ -143,8 +143,8 @@ def simulate(
 ) -> History:
     """Inflates a laminate in CalculiX; ``folder`` receives deck, results, table and pictures.
 
-    ``timeout`` is in seconds. A run that diverges or takes too long keeps what it has reached.
-    Raises OutputError where ccx is not installed or reaches nothing.
+    ``timeout`` is in seconds. A run that diverges or takes too long keeps its results so far.
+    Raises OutputError if ccx is not installed or gives no results.
     """
     progress("mesh", 0, 1)
     mesh = deck_mesh(laminate, mesh_settings)
@@ -154,8 +154,8 @@ def simulate(
     top = settings.largest
 
     def report(reached: float) -> None:
-        # Time says nothing of the load, which rises with its square, nor of how long the rest
-        # takes: steps get shorter where films wrinkle.
+        # Time does not show the load, which rises with its square, or the remaining duration:
+        # steps get shorter when films wrinkle.
         progress(f"ccx, {top * settings.share(reached) + 0.0:.3g} of {top:g} kPa", 0, 1)
 
     report(0.0)
@@ -197,17 +197,17 @@ def simulate(
 
 
 MEASURED_EQUATIONS, MEASURED_SECONDS, GROWTH = 147_513, 6.4, 1.5
-"""Equations of a mesh, processor time in s of one of its iterations (CalculiX 2.20 with SPOOLES on
-one core of a Xeon), and the power of the number of equations by which that grows: the times of six
-meshes of 21,663 to 380,757 equations are 0.8 to 1.8 times what these three give."""
+"""Equations of a mesh, processor time in s of one iteration (CalculiX 2.20 with SPOOLES on one core
+of a Xeon), and the exponent of the number of equations in that time: six meshes of 21,663 to
+380,757 equations took 0.8 to 1.8 times the estimate from these three."""
 LEAST_ITERATIONS = 100
-"""Of a whole run: a quarter of one balloon took 109, of fifteen 136; wrinkling films take more."""
+"""Per run: a quarter of one balloon took 109, a quarter of fifteen 136; wrinkles take more."""
 LONG = 3600.0
 """s"""
 
 
 def _warn_of_hours(mesh: Mesh, timeout: float) -> None:
-    """Warn before a run that cannot end in an hour; ``timeout`` is in s."""
+    """Warn before a run that cannot finish within an hour; ``timeout`` is in s."""
     equations = 3 * len(mesh.points)
     iteration = MEASURED_SECONDS * (equations / MEASURED_EQUATIONS) ** GROWTH
     least = LEAST_ITERATIONS * iteration
@@ -229,7 +229,7 @@ def _first_wrong(
     frames: Sequence[Frame],
     states: Sequence[LoadedState],
 ) -> tuple[int, str] | None:
-    """Return the index of the first frame that cannot be, and why; decks have no contact."""
+    """Return the index of the first impossible frame, and the reason; decks have no contact."""
     can_be = limits(laminate, settings.pressures.values())
     drawn_in = [name for name, pressure in settings.pressures.items() if pressure < 0]
     for number, (frame, state) in enumerate(zip(frames, states[1:], strict=True)):
@@ -242,10 +242,10 @@ def _first_wrong(
 
 
 def converged_frames(frd: Path, mesh: Mesh, ending: Ending) -> list[Frame]:
-    """The frames of a result file up to where its run converged.
+    """The frames of a result file up to the last converged one.
 
-    ccx adds one that did not converge when it gives up. Raises OutputError where the file of a
-    run that ended well is cut short.
+    ccx adds an unconverged frame when it gives up. Raises OutputError if the file of a successful
+    run is truncated.
     """
     if ending.stopped is not None and not frd.exists():
         return []
@@ -295,7 +295,7 @@ def _write_results(
 
 
 def _tidy(folder: Path) -> None:
-    """Removes what only ccx needs, and dates and names from its result file."""
+    """Removes ccx's working files, and dates and names from its result file."""
     frd = folder / f"{JOB}.frd"
     frd.write_bytes(DATED.sub(rb"\1", frd.read_bytes()))
     of_ccx = [path for path in folder.glob(f"{JOB}.*") if path.suffix not in KEPT]
@@ -338,7 +338,7 @@ def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSetti
     )
     settings = deck_settings(laminate, request, cast(Procedure, request.procedure or "dynamic"))
     if settings.has_vacuum:
-        # Films that lie on each other have no room to be drawn together.
+        # Films that lie on each other leave no gap for drawing them together.
         mesh = replace(mesh, gaps=True)
     for name, meshed in images(laminate, mesh.symmetry).items():
         if settings.pressures[name] != settings.pressures[meshed]:

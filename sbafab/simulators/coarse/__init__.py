@@ -1,1 +1,1 @@
-"""The coarse shell of a stack of round balloons, which several simulators take."""
+"""The coarse shell of a stack of round balloons, shared by several simulators."""

@@ -1,4 +1,4 @@
-"""Round pockets on their axes, read off a laminate's profiles, for the coarse mesh."""
+"""Round pockets on their axes, taken from a laminate's profiles, for the coarse mesh."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sbafab.laminate.laminate import Interface, Laminate
 ON_AXIS = 1e-6
 SUPPORTED = "the coarse shell is made for stacks of round pockets on common plates"
 NECK_SHARE, BORE_SHARE = 0.5, 0.2
-"""Neck ring and bore of the paper's 5 mm pocket, for a single balloon, which has neither."""
+"""Neck ring and bore of the paper's 5 mm pocket, for a single balloon, which lacks both."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class RoundStack:
     """A stack of round balloons; radii in mm.
 
     ``pockets`` and ``rims`` (pocket and outline) are given by balloon, bottom to top; ``axes``
-    by chamber; ``hub`` is the outline's radius between two lobes, ``lumen`` that of the hole in
-    the films; both are 0 for a single axis. ``elastic`` are the film's Young's modulus in MPa
+    by chamber; ``hub`` is the outline's radius between two lobes, ``lumen`` the radius of the hole
+    in the films; both are 0 for a single axis. ``elastic`` are the film's Young's modulus in MPa
     and Poisson's ratio.
     """
 
@@ -52,7 +52,7 @@ class RoundStack:
 
 
 def round_stack(laminate: Laminate) -> RoundStack:
-    """The stack of a laminate. Raises DesignError where its pockets are not round."""
+    """The stack of a laminate. Raises DesignError if its pockets are not round."""
     if any(layer.role == "sheet" for layer in laminate.layers):
         raise DesignError(
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
@@ -106,7 +106,7 @@ def round_stack(laminate: Laminate) -> RoundStack:
 
 
 def elastic_of(film: Film) -> tuple[float, float]:
-    """Young's modulus in MPa and Poisson's ratio. Raises DesignError where they are not known."""
+    """Young's modulus in MPa and Poisson's ratio. Raises DesignError if they are not known."""
     if film.elastic is None:
         raise DesignError(
             f"a simulation needs Young's modulus of {film.material}; add "
@@ -116,9 +116,9 @@ def elastic_of(film: Film) -> tuple[float, float]:
 
 
 def equal_area(stack: RoundStack, sectors: int) -> RoundStack:
-    """The stack whose rings of ``sectors`` corners have the area of its circles.
+    """The stack with radii such that rings of ``sectors`` corners have the area of its circles.
 
-    Corners on the circles themselves would take 10 % off a pocket of eight.
+    An inscribed octagon would have 10 % less area than the pocket.
     """
     turn = math.tau / sectors
     grown = math.sqrt(turn / math.sin(turn))
@@ -132,7 +132,7 @@ def equal_area(stack: RoundStack, sectors: int) -> RoundStack:
 
 
 def pocket_radii(laminate: Laminate) -> list[float]:
-    """Half the least width in mm of every pocket."""
+    """Half the least width of every pocket, in mm."""
     radii = []
     for gap in laminate.interfaces:
         if gap.kind == "chamber":
@@ -175,7 +175,7 @@ def _rim(gap: Interface, axis: Point, pocket: float) -> float:
 
 
 def _radius_about(contours: Iterable[Contour], axis: Point) -> float | None:
-    """The radius of most of the arcs round an axis; lobes and tabs leave only part of a circle."""
+    """The predominant radius of arcs round an axis; lobes and tabs leave only part of a circle."""
     turned: dict[float, float] = {}
     for contour in contours:
         for edge in contour.edges:

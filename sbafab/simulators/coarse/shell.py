@@ -1,8 +1,8 @@
-"""The inflated shape the scenes start from: the paper's parabola, with a flat neck disc.
+"""The inflated start shape of the scenes: the paper's parabola, with a flat neck disc.
 
-The paper's balloon is a parabola revolved whose meridian keeps the length l of the flat pocket's
-radius (paper, Eqs. 1-3). Here the parabola begins at the neck disc, which stays flat; with a neck
-of radius 0 it is the paper's own. Lengths mm, volumes ul.
+The paper's balloon is a parabola of revolution whose meridian keeps the length l of the flat
+pocket's radius (paper, Eqs. 1-3). Here the parabola begins at the neck disc, which stays flat; a
+neck of radius 0 gives the paper's shape. Lengths mm, volumes ul.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from sbafab.simulators.simulator import refuse_unknown
 STEEPEST = 40.0
 ROUNDS = 80
 SPARE = 0.95
-"""Share of the largest volume to start from at most: there the edge is not upright yet."""
+"""Largest start volume as a share of the maximum: the edge is not yet vertical there."""
 
 
 @dataclass(frozen=True)
 class Meridian:
-    """One film of a balloon: flat to ``neck``, then down to its edge at ``edge``, 0 high.
+    """One film of a balloon: flat up to ``neck``, then down to height 0 at ``edge``.
 
-    ``length`` is the meridian from neck to edge, ``slope`` what it falls by at the edge.
+    ``length`` is the meridian's length from neck to edge, ``slope`` its downward slope at the edge.
     """
 
     neck: float
@@ -45,7 +45,7 @@ class Meridian:
 
     @property
     def edge(self) -> float:
-        """Radius of the bonded edge, drawn in from the flat pocket's."""
+        """Radius of the bonded edge, smaller than the flat pocket's."""
         return self.neck + self.run
 
     @property
@@ -55,7 +55,7 @@ class Meridian:
 
     @property
     def volume(self) -> float:
-        """Of a balloon, both films, if it is round."""
+        """Volume of a round balloon with two such films."""
         run, neck = self.run, self.neck
         return 2 * math.pi * self.height * (neck * neck + 4 * neck * run / 3 + run * run / 2)
 
@@ -74,13 +74,13 @@ class Meridian:
 
 
 Start = Callable[[float, float], Meridian]
-"""What a pocket of a radius with a neck of a radius (mm) starts from."""
+"""Start shape of a pocket, from the radii of pocket and neck (mm)."""
 
 
 def fullest(pocket: float, neck: float) -> Meridian:
-    """As much as the paper's parabola can hold, 16.95 ul in a pocket of 5 mm.
+    """The volume limit of the paper's parabola: 16.95 ul in a pocket of 5 mm.
 
-    Less where a wide neck leaves too little free film for that.
+    The volume is smaller if a wide neck leaves too little free film.
     """
     most = _holding_most(0.0, pocket).volume
     spare = SPARE * _holding_most(neck, pocket - neck).volume
@@ -88,7 +88,7 @@ def fullest(pocket: float, neck: float) -> Meridian:
 
 
 def standing(balloon: float) -> Start:
-    """Balloons so many mm high, or as high as their film allows."""
+    """Start with balloons ``balloon`` mm high, or as high as their film allows."""
 
     def start(pocket: float, neck: float) -> Meridian:
         return _bisected(neck, pocket - neck, STEEPEST, lambda m: 2 * m.height < balloon)
@@ -97,7 +97,7 @@ def standing(balloon: float) -> Start:
 
 
 RISE = 0.15
-"""mm a balloon of 5 mm is high at the start: a dome so flat that the film is nearly at rest."""
+"""Start height in mm of a 5 mm balloon: a dome flat enough to leave the film nearly at rest."""
 
 
 def nearly_flat(pocket: float, neck: float) -> Meridian:
@@ -106,7 +106,7 @@ def nearly_flat(pocket: float, neck: float) -> Meridian:
 
 
 def holding(neck: float, length: float, volume: float) -> Meridian:
-    """The shape of this volume, or the one that holds most."""
+    """The shape with this volume, or the shape with the largest volume."""
     most = _holding_most(neck, length).slope
     return _bisected(neck, length, most, lambda m: m.volume < volume)
 
@@ -142,15 +142,15 @@ def _holding_most(neck: float, length: float) -> Meridian:
 
 Triangle = tuple[int, int, int]
 WebNode = tuple[str, int]
-"""Which node of a half sector: pocket, outline or lumen with its step, or the junction."""
+"""A node of a half sector: pocket, outline or lumen with its step, or the junction."""
 
 
 @dataclass(frozen=True)
 class Web:
     """Angles in degrees of the nodes round the actuator's axis, and the triangles of half a sector.
 
-    ``reach`` is how many steps the outline of a lobe has nodes to either side; a node lies
-    between every two lobes, ``junction`` mm from the axis.
+    ``reach`` is the number of steps with nodes on a lobe's outline, to either side; one node lies
+    between neighbouring lobes, ``junction`` mm from the axis.
     """
 
     lobes: int
@@ -213,7 +213,7 @@ def web_of(lobes: int, radii: tuple[float, float, float, float, float], sectors:
 
     junction = _junction(axis, rim, hub, half)
     x, y = junction * math.cos(half), junction * math.sin(half)
-    # A node nearer to the junction than a quarter of a step is left to the junction.
+    # Drop a node within a quarter of a step of the junction.
     reach = math.floor(math.atan2(y, x - axis) / step - 0.25)
     bare = Web(lobes, reach, junction, ())
     lumen_turn = half / bare.lumen_steps
@@ -236,7 +236,7 @@ def _triangulated(places: dict[WebNode, Point]) -> tuple[tuple[WebNode, WebNode,
     """Delaunay triangles of the polygon whose corners are given counter-clockwise."""
     import shapely
 
-    # Corners meant to lie on the axis of symmetry must do so for the triangulation.
+    # Corners on the axis of symmetry must lie on it exactly for the triangulation.
     names = {(round(x, 9), round(y, 9)): place for place, (x, y) in places.items()}
     polygon = shapely.Polygon(list(names))
     triangles = []
@@ -248,15 +248,15 @@ def _triangulated(places: dict[WebNode, Point]) -> tuple[tuple[WebNode, WebNode,
     return tuple(sorted(triangles))
 
 
-# The coarse shell of a whole actuator: mid-surfaces that share the nodes of what is bonded.
+# The coarse shell of a whole actuator: mid-surfaces that share nodes where they are bonded.
 #
-# In each pocket rings of eight nodes or more at bore, neck, between them and the edge; the web
-# between the pockets and the neck rings are one layer of double thickness. Inlet tabs and strips
-# are left out. Lengths mm, volumes ul.
+# Each pocket has rings of eight nodes or more at bore, neck, edge and between neck and edge; the
+# web between the pockets and the neck rings are one layer of double thickness. Inlet tabs and
+# strips are omitted. Lengths mm, volumes ul.
 
 
 SECTORS = 8
-"""Nodes of a ring; a multiple of four."""
+"""Nodes per ring; a multiple of four."""
 RING_STEP = 0.25
 """Distance of the rings between neck and edge, in pocket radii."""
 
@@ -268,10 +268,10 @@ class CoarseMesh:
     """Nodes flat (``rest``) and inflated (``position``), and the triangles of every group.
 
     ``lower`` and ``upper`` are the free films, ``web`` and ``necks`` are bonded pairs. In each
-    group no edge has more than two triangles. ``cavities`` holds a closed surface a chamber,
-    normals out of the air. ``fixed`` are the nodes on the ground, ``tip`` those whose mean is the
-    tip and whose plane is its tilt, counter-clockwise from above; ``roots`` and ``poles`` are the
-    centres of the lowest and of the highest film over each chamber axis.
+    group an edge has at most two triangles. ``cavities`` holds one closed surface per chamber,
+    normals out of the air. ``fixed`` are the nodes on the ground. ``tip`` are nodes whose mean is
+    the tip and whose plane gives its tilt, counter-clockwise from above; ``roots`` and ``poles``
+    are the centres of the lowest and of the highest film over each chamber axis.
     """
 
     rest: tuple[Vector, ...]
@@ -288,17 +288,17 @@ class CoarseMesh:
 
     @property
     def single(self) -> tuple[Triangle, ...]:
-        """Film of single thickness."""
+        """Triangles of a single film."""
         return self.lower + self.upper
 
     @property
     def double(self) -> tuple[Triangle, ...]:
-        """Two films bonded."""
+        """Triangles of two bonded films."""
         return self.web + self.necks
 
     @property
     def height(self) -> float:
-        """Of the inflated start."""
+        """Height at the inflated start."""
         return max(z for _, _, z in self.position)
 
     def volume(self, chamber: str) -> float:
@@ -313,7 +313,7 @@ class CoarseMesh:
 
 
 def coarse_mesh(stack: RoundStack, start: Start = fullest, sectors: int = SECTORS) -> CoarseMesh:
-    """The mesh of a stack, inflated to what ``start`` makes of each pocket and neck radius."""
+    """The mesh of a stack, inflated to the ``start`` shape of each pocket and neck radius."""
     meridians = tuple(start(pocket, stack.neck) for pocket in stack.pockets)
     return _Builder(stack, meridians, sectors).mesh()
 
@@ -343,7 +343,7 @@ class _Builder:
         self.stack = stack
         self.sectors = sectors
         self.meridians = meridians
-        # As pockets draw in, their axes follow, or the web between them would be torn.
+        # The axes follow as pockets draw in, or the web between them would tear.
         gaps = (p - m.edge for p, m in zip(stack.pockets, meridians, strict=True))
         self.shift = min(gaps) if stack.lobes > 1 else 0.0
         self.rest: list[Vector] = []
@@ -496,7 +496,7 @@ class _Builder:
         )
 
     def _tip(self, discs: list[tuple[Ring, ...]]) -> tuple[int, ...]:
-        """The cap's centres; where they are fewer than three, points of its neck rims."""
+        """The cap's centres; with fewer than three, points of its neck rims."""
         quarter = self.sectors // 4
         if len(discs) >= 3:
             return tuple(disc[0][0] for disc in discs)
@@ -508,8 +508,8 @@ class _Builder:
 def annulus(inner: Ring, outer: Ring) -> list[Triangle]:
     """Triangles between two rings, seen counter-clockwise from above.
 
-    Diagonals alternate, so that the mesh has no hand that would twist the actuator. So do the edges
-    that triangles begin with, from which corotational elements take their axes.
+    Diagonals alternate, so that the mesh has no handedness that would twist the actuator. The first
+    edges of triangles, which set the axes of corotational elements, alternate too.
     """
     triangles: list[Triangle] = []
     for i in range(len(inner)):
@@ -520,7 +520,7 @@ def annulus(inner: Ring, outer: Ring) -> list[Triangle]:
 
 
 def reverse(triangle: Triangle) -> Triangle:
-    """Return it as seen from the other side, beginning with the same edge."""
+    """Return the triangle seen from the other side, beginning with the same edge."""
     a, b, c = triangle
     return b, a, c
 
@@ -529,15 +529,15 @@ def reverse(triangle: Triangle) -> Triangle:
 
 
 PRESSURE = 5.0
-"""kPa in each chamber that is told nothing else."""
+"""Default pressure of a chamber, kPa."""
 
 
 @dataclass(frozen=True)
 class CoarseActuator:
     """A stack of round balloons, the pressure in kPa of every chamber, and how it is meshed.
 
-    A ring has so many ``sectors``; it has the area of its circle if ``is_fair``, else it is
-    inscribed in it.
+    ``sectors`` is the number of nodes per ring. A ring has the area of its circle if ``is_fair``,
+    otherwise it is inscribed in the circle.
     """
 
     stack: RoundStack
@@ -571,12 +571,12 @@ class CoarseActuator:
         return self.young * self.stack.film.thickness
 
     def bending(self, films: int) -> float:
-        """Bending stiffness of so many films bonded, in mN mm."""
+        """Bending stiffness of ``films`` bonded films, in mN mm."""
         return self.young * (films * self.stack.film.thickness) ** 3 / (12 * (1 - self.poisson**2))
 
     @cached_property
     def mass(self) -> float:
-        """True mass of the films in kg, tabs left out."""
+        """True mass of the films in kg, without tabs."""
         return self.mesh.mass(
             self.stack.film.thickness, density_of(self.stack.film, "a simulation")
         )
@@ -587,7 +587,7 @@ class CoarseActuator:
 
     @property
     def size(self) -> float:
-        """Mean pocket radius over that of the 5 mm pocket that was measured."""
+        """Mean pocket radius relative to the measured pocket of 5 mm."""
         return sum(self.stack.pockets) / self.balloons / 2.5
 
     def volumes(self, requested: Mapping[str, float] | None, default: float) -> dict[str, float]:
@@ -601,11 +601,10 @@ def actuator(
     sectors: int = SECTORS,
     start: Start = fullest,
 ) -> CoarseActuator:
-    """An actuator under pressure: 5 kPa a chamber, or what is given by chamber in kPa, 0 elsewhere.
+    """An actuator under pressure: 5 kPa per chamber, or given by chamber in kPa and 0 elsewhere.
 
-    ``sectors`` nodes make a ring; ``start`` says how far each balloon is inflated. Raises
-    DesignError where the laminate has other than round pockets of one film, or a chamber is
-    unknown.
+    ``sectors`` is the number of nodes per ring; ``start`` the start shape of each balloon. Raises
+    DesignError if the pockets are not round or not of one film, or a chamber is unknown.
     """
     stack = round_stack(laminate)
     by_chamber = checked(stack.chambers, pressures, PRESSURE, "pressure", "kPa")
@@ -619,7 +618,7 @@ def checked(
     quantity: str,
     unit: str,
 ) -> dict[str, float]:
-    """Return a value for every chamber: the default, or what is requested and 0 for the rest."""
+    """Return a value for every chamber: the default, or the requested ones and 0 for the rest."""
     if requested is None:
         return dict.fromkeys(chambers, default)
     refuse_unknown(chambers, requested, quantity)

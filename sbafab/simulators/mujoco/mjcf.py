@@ -25,19 +25,19 @@ from sbafab.models.stack import Pose, Stack
 from sbafab.models.stack_loads import plate_chain
 
 ACCURACY = 0.02
-"""Largest error of the tip's place, as a share of the stack's length."""
+"""Largest error of the tip's position, as a share of the stack's length."""
 LINEAR_SHARE = 0.9
-"""Share of that which the linear tip may take: the joints are exact to the third order only."""
+"""Share of that error allowed for the linear tip: joints are exact to third order only."""
 RANGES = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
-"""kPa about the given pressures that are tried, largest first."""
+"""Ranges in kPa about the given pressures, tried in this order."""
 DRIVEN_SETTLING = 0.01
 """s: time constant of the stiffest motion of a level driven by balloons."""
 DT, SETTLING = 0.002, 0.05
-"""s: a step, and the time constant of each level, by dampers as of no actuator."""
+"""s: time step, and time constant of each level, set by artificial dampers."""
 MASS = 1e-5
-"""kg of a plate that stands in where a density is not known."""
+"""Default mass of a plate in kg, if a density is not known."""
 MIRROR = 100.0
-"""Stiffness that holds both halves of a tilt equal, as a multiple of the tilt's."""
+"""Stiffness that keeps both halves of a tilt equal, as a multiple of the tilt's."""
 FREEDOMS: tuple[tuple[str, ...], ...] = (
     ("rise",),
     ("tilt_x", "tilt_x_upper"),
@@ -46,15 +46,15 @@ FREEDOMS: tuple[tuple[str, ...], ...] = (
 """Joints that add up to each freedom of a level."""
 SPRINGS = ("rise", "tilt_x", "tilt_y")
 BY_JOINT, HALVES = np.array([1, 2, 0, 2, 1]), np.array([2.0, 2.0, 1.0, 2.0, 2.0])
-"""The freedom that each of JOINTS is a part of, and the number of its parts."""
+"""The freedom to which each of JOINTS belongs, and the number of joints per freedom."""
 POSE = "pressed"
 
 
 def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
-    """Return a stack as MJCF, in mm, kg and s, which settles in its pose at pressures (kPa, one a
-    chamber) from any start. Control of a chamber is by how many kPa it is above its pressure.
+    """Return a stack as MJCF, in mm, kg and s, which settles in its pose at pressures (kPa, one per
+    chamber) from any start. A chamber's control is the difference in kPa from its pressure.
 
-    Raises DesignError where the stack has no stable pose there.
+    Raises DesignError if the stack has no stable pose there.
     """
     pose = stack.pose(pressures)
     at = linearised(stack, pose)
@@ -83,8 +83,8 @@ def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
 
 
 def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
-    """Return by how many kPa pressures may differ from a pose's, each alone or all together, with
-    the linear tip within ACCURACY of the stack's; 0 where that is less than the last of RANGES.
+    """Return the range in kPa about a pose's pressures, changed singly or all together, in which
+    the linear tip is within ACCURACY of the stack's; 0 if it is less than the last of RANGES.
     """
     p = np.asarray(pose.pressures)
     each = np.concatenate([np.eye(stack.chambers), np.ones((1, stack.chambers))])
@@ -113,7 +113,7 @@ def length_of(pose: Pose) -> float:
 
 
 def _add_plates(world: ET.Element, stack: Stack) -> None:
-    """Add two bodies a level: what is between its halves, then its upper plate."""
+    """Add two bodies per level: the part between its halves, then its upper plate."""
     mass = plate_mass(stack) or MASS
     size = numbers((stack.outline, stack.pitch / 4))
     shape = {"type": "cylinder", "size": size, "contype": "0", "conaffinity": "0", "mass": "0"}
@@ -142,11 +142,11 @@ def _add_plates(world: ET.Element, stack: Stack) -> None:
 
 
 def _add_springs(tendons: ET.Element, at: Linearised) -> None:
-    """Add three springs a level, whose energy is q H q / 2 for the second derivatives H = L D L^T
-    by its freedoms: D are stiffnesses, and L says of which freedoms each spring's length is.
+    """Add three springs per level with the energy q H q / 2, where H = L D L^T are the second
+    derivatives by its freedoms: D holds stiffnesses, and L each spring's length by freedom.
 
-    Both halves of a tilt are held equal by stiffer springs: equality constraints of MuJoCo ignore
-    dampers, and blow up with masses as small as these.
+    Stiffer springs keep both halves of a tilt equal: MuJoCo's equality constraints ignore dampers,
+    and diverge with masses this small.
     """
     lower = np.linalg.cholesky(at.matrices)
     roots = np.diagonal(lower, axis1=1, axis2=2)
@@ -167,7 +167,7 @@ def _add_springs(tendons: ET.Element, at: Linearised) -> None:
 
 
 def _damped(tendons: ET.Element, name: str, stiffness: float, length: float) -> ET.Element:
-    """Add a spring with its damper, and no joints as yet."""
+    """Add a spring with its damper, without joints yet."""
     parts = {
         "name": name,
         "stiffness": number(stiffness),
@@ -179,7 +179,7 @@ def _damped(tendons: ET.Element, name: str, stiffness: float, length: float) -> 
 
 def _add_joints(tendon: ET.Element, level: int, ways: Array) -> None:
     """Add the joints of one level to a tendon's length, by its freedoms (3,)."""
-    # What is left by rounding alone does not count.
+    # Ignore coefficients that are only rounding.
     least = 1e-9 * float(np.abs(ways).max())
     for joints, way in zip(FREEDOMS, ways.tolist(), strict=True):
         for joint in joints if abs(way) > least else ():
@@ -188,7 +188,7 @@ def _add_joints(tendon: ET.Element, level: int, ways: Array) -> None:
 
 
 def _add_chambers(tendons: ET.Element, at: Linearised) -> None:
-    """Add a tendon a chamber: its length grows as the chamber's volume does, in ul."""
+    """Add a tendon per chamber: its length grows like the chamber's volume, in ul."""
     for chamber, rates in enumerate(at.filling, start=1):
         tendon = ET.SubElement(tendons, "fixed", {"name": f"chamber{chamber}"})
         for level, ways in enumerate(rates, start=1):
@@ -233,14 +233,14 @@ as no actuator does: states at rest alone mean something. Not in it: gravity, co
 class PressedChain:
     """A loaded model of ``chain_text`` driven by a stack's balloons at any pressures.
 
-    The springs of the file hold about one pose. Here they are taken out, and each step has the
-    forces of the stack's own springs, contacts included, at the joints' values: states at rest are
-    poses of the stack up to its highest pressure. Dampers follow the stiffness; soft motions settle
-    later than stiff ones, and a stack without pressure, whose films are slack, hardly at all.
+    The springs of the file are valid about one pose. Here they are removed, and each step applies
+    the forces of the stack's own springs, contacts included, at the joints' values: states at rest
+    are poses of the stack up to its highest pressure. Dampers follow the stiffness: soft motions
+    settle later than stiff ones, and a slack stack without pressure hardly settles.
     """
 
     def __init__(self, model: Any, stack: Stack) -> None:
-        """Take the springs out of ``model``, a mujoco.MjModel, and its actuators' gear."""
+        """Remove the springs and the actuators' gear from ``model``, a mujoco.MjModel."""
         self.model, self.stack = model, stack
         count = len(stack.levels)
         names = [[f"level{level + 1}_{joint}" for joint in JOINTS] for level in range(count)]
@@ -254,12 +254,12 @@ class PressedChain:
 
     def apply(self, data: Any, pressures: Sequence[float]) -> None:
         """Set the forces of the next step, ``qfrc_applied`` of a mujoco.MjData, at pressures in
-        kPa, one a chamber. Raises DesignError for pressures outside the stack's maps.
+        kPa, one per chamber. Raises DesignError for pressures outside the stack's maps.
         """
         tilt_x, tilt_y, rise, tilt_y_upper, tilt_x_upper = data.qpos[self.places].T
         at = np.stack([rise, tilt_x + tilt_x_upper, tilt_y + tilt_y_upper], axis=-1)
         _, gradient, matrices = self.stack.each(self.stack.springs(pressures)).energy(at)
-        # Both halves of a tilt carry its moment, and move by half.
+        # Both halves of a tilt carry its full moment, and each moves by half.
         data.qfrc_applied[self.dofs] = -gradient[:, BY_JOINT]
         stiff = np.einsum("lii->li", matrices)[:, BY_JOINT] * HALVES
         self.model.dof_damping[self.dofs] = DRIVEN_SETTLING * np.maximum(stiff, 0.0)

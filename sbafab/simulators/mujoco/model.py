@@ -1,4 +1,4 @@
-"""The actuator as a MuJoCo model (MJCF): a body a node, a flex a group of films."""
+"""The actuator as a MuJoCo model (MJCF): one body per node, one flex per group of films."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from sbafab.simulators.coarse.rounds import why_not_round
 from sbafab.simulators.coarse.shell import CoarseActuator, Triangle, actuator, area, nearly_flat
 
 DT = 0.01
-"""s: a step. The integrator is implicit; four times as long does as well."""
+"""Time step, s. The integrator is implicit; a step four times as long works too."""
 SOLVER_STEPS = 1000
-"""Of the solver in each time step; the usual 100 do not suffice for long stacks."""
+"""Solver iterations per time step; the default of 100 is too few for long stacks."""
 LENGTH = 10.0
-"""mm in a unit of the model's length. MuJoCo's contact of films keeps them a thousandth of a unit
-apart and calls them at rest below a twentieth of a unit in a second: in cm that is 0.01 mm, a
-quarter of a film, and in mm it takes forty times the iterations."""
+"""Model length unit, mm. MuJoCo's film contact keeps films a thousandth of a unit apart and treats
+them as at rest below a twentieth of a unit per second: with cm the gap is 0.01 mm, a quarter of a
+film; with mm the solver needs forty times the iterations."""
 START = "inflated"
 COLOURS = {
     "lower": "0.35 0.60 0.85 1",
@@ -33,7 +33,7 @@ COLOURS = {
 
 
 def model_text(actuator: CoarseActuator) -> str:
-    """The model as a file: node i is body ``n<i>``, which stands flat unless the key is loaded."""
+    """The model as a file: node i is body ``n<i>``, which is flat unless the keyframe is loaded."""
     root = ET.Element("mujoco", {"model": actuator.stack.name})
     option = ET.SubElement(
         root,
@@ -62,14 +62,14 @@ def model_text(actuator: CoarseActuator) -> str:
 
 
 def has_contact(actuator: CoarseActuator) -> bool:
-    """Return True if films touch: those of chambers that are told less than others."""
+    """Return True if films touch: films of chambers with a lower pressure than others do."""
     return len({pressure for _, pressure in actuator.pressures}) > 1
 
 
 def fixed_nodes(actuator: CoarseActuator) -> frozenset[int]:
-    """Nodes that stand still: the base; of a lone balloon its centre, so that it bulges both ways.
+    """Fixed nodes: the base, or the centre of a lone balloon, so that it bulges both ways.
 
-    That is how the CalculiX deck holds them.
+    The CalculiX deck holds them in the same way.
     """
     mesh = actuator.mesh
     return frozenset(mesh.roots if actuator.balloons == 1 else mesh.fixed)
@@ -83,7 +83,7 @@ def _add_nodes(world: ET.Element, actuator: CoarseActuator) -> None:
         if node in still:
             continue
         mass = _number(masses[node])
-        # It never turns, but MuJoCo wants a moment of inertia.
+        # It never turns, but MuJoCo requires a moment of inertia.
         ET.SubElement(
             body,
             "inertial",
@@ -137,7 +137,7 @@ def _add_start(keyframe: ET.Element, actuator: CoarseActuator) -> None:
 def film_groups(actuator: CoarseActuator) -> list[tuple[str, Sequence[Triangle], int]]:
     """Flexes with the number of films bonded in each. They share bodies where films are bonded.
 
-    In one flex an edge may have two triangles at most, so that it takes several.
+    An edge may have at most two triangles in one flex, so several are needed.
     """
     mesh = actuator.mesh
     groups = [
@@ -184,7 +184,7 @@ Not in it: gravity, inlet tabs and strips. Not validated by a measurement."""
 
 
 def _number(value: float) -> str:
-    """Nine digits, and no minus before a zero."""
+    """Format with nine digits, and no minus before a zero."""
     return f"{value + 0.0:.9g}"
 
 
@@ -197,7 +197,7 @@ def _lengths(values: Iterable[float] | Vector) -> str:
 
 MODEL, DATA, PYTHON = "actuator.xml", "actuator.json", "inflate.py"
 SECTORS = 16
-"""Nodes of a ring. Eight, as in SOFA's scenes, take a quarter of the time and rise by 13 % less."""
+"""Nodes per ring. Eight, as in SOFA's scenes, take a quarter of the time and rise 13 % less."""
 
 
 def why_no_model(laminate: Laminate) -> str | None:
@@ -211,14 +211,15 @@ def write_model(
     pressures: Mapping[str, float] | None = None,
     sectors: int = SECTORS,
 ) -> list[Path]:
-    """Writes the model, what its pressures act on, and a script to start from; the model first.
+    """Writes the model, its cavities, and an example script; returns the files, the model first.
 
-    ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere; ``sectors`` nodes
-    make a ring. Raises DesignError where the pockets are not round or a chamber is unknown.
+    ``pressures`` in kPa by chamber, 0 for omitted ones, or 5 kPa everywhere; ``sectors`` is the
+    number of nodes per ring. Raises DesignError if the pockets are not round or a chamber is
+    unknown.
     """
     coarse = actuator(laminate, pressures, sectors)
     if has_contact(coarse):
-        # Films that fall a long way onto each other take many iterations.
+        # Films that fall far onto each other need many iterations.
         coarse = replace(coarse, start=nearly_flat)
     texts = {
         MODEL: model_text(coarse),

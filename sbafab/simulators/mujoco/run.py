@@ -32,12 +32,12 @@ from sbafab.simulators.simulator import (
 
 SECONDS = 5.0
 RAMP = 1.0
-"""s in which a pressure rises from 0."""
+"""Duration of the pressure ramp from 0, s."""
 LEAST_TIME = 2 * RAMP
 TIP_PERIOD = 0.1
-"""s between two records of the tip."""
+"""Recording interval of the tip, s."""
 OLDEST = 4
-"""Up to version 3.17 a flex of dimension 2 stretches with a quarter of its modulus."""
+"""Oldest major version: up to 3.17 a flex of dimension 2 stretches at a quarter of its modulus."""
 INSTALL = 'install it with: pip install "sbafab[mujoco]"'
 
 
@@ -45,9 +45,9 @@ INSTALL = 'install it with: pip install "sbafab[mujoco]"'
 class MujocoRun:
     """A run: its states, and how it ended.
 
-    The tip of a state is that of the films' centres, as seen from those at the base. ``overlap`` is
-    the volume in ul in which films have passed through each other at the end; ``rate`` in steps per
-    s of real time; ``stopped`` is one sentence if it was stopped early.
+    The tip of a state is taken from the films' centres, relative to the centres at the base.
+    ``overlap`` is the volume in ul in which films have passed through each other at the end;
+    ``rate`` in steps per s of real time; ``stopped`` is one sentence if it was stopped early.
     """
 
     model: Path
@@ -73,10 +73,10 @@ def simulate(
 ) -> MujocoRun:
     """Writes the model of a laminate into a folder and inflates it.
 
-    ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere; ``sectors`` nodes
-    make a ring; ``limit`` is the most real time in s. Raises DesignError where no such model can
-    be made of the laminate, OutputError where mujoco is missing, VoidError where what it finds
-    cannot be.
+    ``pressures`` in kPa by chamber, 0 for omitted ones, or 5 kPa everywhere; ``sectors`` is the
+    number of nodes per ring; ``limit`` the maximum real time in s. Raises DesignError if the
+    laminate cannot be modelled, OutputError if mujoco is missing, VoidError if the result is
+    impossible.
     """
     refuse_time(seconds, LEAST_TIME)
     write_model(laminate, folder, pressures, sectors)
@@ -89,7 +89,7 @@ def simulate(
 
 
 def find_mujoco() -> Any:
-    """The package mujoco. Raises OutputError with what to do where it is missing or too old."""
+    """The package mujoco. Raises OutputError with a remedy if it is missing or too old."""
     try:
         import mujoco
     except ImportError as reason:
@@ -109,7 +109,7 @@ def run_model(
     """Inflates the model in a folder, for at most ``limit`` s of real time or until Ctrl-C.
 
     Raises OutputError if the model does not load, VoidError if a step is unstable or not solved;
-    the sentence says how far the tip was known.
+    the message says how far the tip was known.
     """
     mujoco = find_mujoco()
     path = folder / MODEL
@@ -169,7 +169,7 @@ class _Inflation:
         return self.data.xpos[1:] * self.told["length"]
 
     def step(self) -> None:
-        """One time step under the pressures of this time, which follow the films."""
+        """Take one time step under the current pressures, which follow the films."""
         share = self._share(self.data.time + self.model.opt.timestep)
         forces = np.zeros_like(self.nodes)
         for name, triangles in self.cavities.items():
@@ -182,22 +182,22 @@ class _Inflation:
         self.nodes = self._placed()
 
     def trouble(self, warnings: list[str]) -> str | None:
-        """Why the state cannot be believed."""
+        """The reason why the state is invalid, if any."""
         if warnings:
             return f'MuJoCo says "{" ".join(warnings[0].split())[:200]}"'
         if any(warning.number for warning in self.data.warning):
             return "MuJoCo warns of an unstable step"
-        # MuJoCo takes a force that is no number for none, and says nothing.
+        # MuJoCo silently treats a NaN force as zero.
         if not np.isfinite(self.data.qfrc_smooth).all() or not np.isfinite(self.nodes).all():
             return "a force or a place is no finite number"
         return None
 
     def _share(self, time: float) -> float:
-        """The part of the pressures that is on at a time in s."""
+        """The fraction of the pressures applied at a time in s."""
         return min(1.0, time / RAMP)
 
     def state(self) -> State:
-        """The state in every simulator's terms."""
+        """The state in the form shared by all simulators."""
         time = round(float(self.data.time), 9)
         poles, roots = (self.nodes[self.told[end]].mean(axis=0) for end in ("poles", "roots"))
         x, y, z = (float(p - r) for p, r in zip(poles, roots, strict=True))
@@ -243,7 +243,7 @@ USES = ("seconds",)
 
 
 def why_not(laminate: Laminate) -> str | None:
-    """Return why there is no coarse mesh: it is made of rings, so pockets must be round."""
+    """Return why a coarse mesh is impossible: it consists of rings, so pockets must be round."""
     return why_no_model(laminate)
 
 

@@ -65,10 +65,10 @@ LOG_FILE = "runSofa.log"
 
 @dataclass(frozen=True)
 class SofaJob:
-    """A scene to run, for so many ``seconds`` of simulated time.
+    """A scene to run for ``seconds`` of simulated time.
 
-    ``limit`` is the most real time in s it may take; ``volumes`` (ul above the start, by chamber)
-    are for scene "volume".
+    ``limit`` is the maximum real time in s; ``volumes`` (ul above the start, by chamber) apply to
+    scene "volume".
     """
 
     scene: Scene = "shell"
@@ -82,10 +82,10 @@ USUAL = SofaJob()
 
 @dataclass(frozen=True)
 class SofaRun:
-    """A valid run: its states, steps done, s they took, steps per s.
+    """A valid run: its states, steps done, their duration in s, steps per s.
 
     ``overlap`` is the volume in ul in which films have passed through each other at the end, None
-    where that is not known; ``stopped`` is one sentence if it was stopped early.
+    if unknown; ``stopped`` is one sentence if it was stopped early.
     """
 
     scene: Path
@@ -110,9 +110,9 @@ def simulate(
 ) -> SofaRun:
     """Writes the scenes of a laminate into a folder and runs one of them.
 
-    ``pressures`` in kPa by chamber, 0 for those left out, or 5 kPa everywhere. Raises DesignError
-    where no such scene can be made of the laminate, OutputError where runSofa is missing, VoidError
-    where what it ran cannot be believed.
+    ``pressures`` in kPa by chamber, 0 for omitted ones, or 5 kPa everywhere. Raises DesignError if
+    the scene cannot be made for the laminate, OutputError if runSofa is missing, VoidError if the
+    result is invalid.
     """
     name, dt = SCENES[job.scene]
     refuse_time(job.seconds, TIP_PERIOD)
@@ -140,7 +140,7 @@ def _no_such_scene(laminate: Laminate, scene: Scene) -> str:
 
 
 def find_program() -> str:
-    """The path of runSofa. Raises OutputError with what to do where it is not there."""
+    """The path of runSofa. Raises OutputError with a remedy if it is missing."""
     return program_path(
         "runSofa",
         "install SOFA 25.06 (https://www.sofa-framework.org) and put the folder that holds runSofa "
@@ -157,10 +157,10 @@ def run_scene(
     limit: float | None = None,
     progress: Progress | None = None,
 ) -> SofaRun:
-    """Runs a scene for so many s in steps of ``dt``; its log stays beside it in runSofa.log.
+    """Runs a scene for ``seconds`` in steps of ``dt`` s; its log remains beside it in runSofa.log.
 
     It is stopped after ``limit`` s of real time. Raises VoidError if it ends by itself, is killed
-    or logs what makes it void; the sentence says how far the tip was known.
+    or logs an error that makes it void; the message says how far the tip was known.
     """
     folder = scene.parent
     state, nodes = folder / TIP_FILE, folder / NODES_FILE
@@ -206,7 +206,7 @@ def _report(state: Path, dt: float, steps: int, progress: Progress | None) -> No
 
 
 def _trouble(ended: Ended, log: Log, times: list[float], seconds: float) -> str | None:
-    """Why a run cannot be believed."""
+    """The reason why a run is invalid, if any."""
     code = ended.code
     if ended.stopped is not None:
         return ended.stopped.words
@@ -223,7 +223,7 @@ def _trouble(ended: Ended, log: Log, times: list[float], seconds: float) -> str 
     return None
 
 
-# The files that SOFA wrote: the tip's record, and the log.
+# Files written by SOFA: the tip's record, and the log.
 
 
 TROUBLE = re.compile(r"\[ERROR\]|\bnan\b|Division by zero|Null determinant", re.IGNORECASE)
@@ -234,7 +234,7 @@ DONE = re.compile(r"(\d+) iterations done in (\S+) s \(\s*(\S+) FPS\s*\)")
 
 @dataclass(frozen=True)
 class Log:
-    """Contents of a log: its first line of trouble, steps done, s taken and steps per s."""
+    """Contents of a log: its first error, steps done, duration in s and steps per s."""
 
     trouble: str | None
     steps: int | None
@@ -245,7 +245,7 @@ class Log:
 def read_points(path: Path) -> list[tuple[float, list[Vector]]]:
     """Times in s and places in mm of the recorded nodes.
 
-    They end before the first record that is cut short or holds what is no finite number.
+    They end before the first record that is truncated or not finite.
     """
     if not path.is_file():
         return []
@@ -266,7 +266,7 @@ def read_points(path: Path) -> list[tuple[float, list[Vector]]]:
 
 
 def plugins_needed(scene: Path) -> list[str]:
-    """The plugins that a scene asks for."""
+    """The plugins required by a scene."""
     return NEEDED.findall(scene.read_text(encoding="utf-8")) if scene.is_file() else []
 
 
@@ -298,14 +298,14 @@ def _points(numbers: list[float]) -> Iterator[Vector]:
         yield numbers[i], numbers[i + 1], numbers[i + 2]
 
 
-# The films of a scene, of which a run records all nodes; a scene by itself records the tip alone.
+# The films of a scene. A run records all of their nodes; the scene itself records only the tip.
 
 
 NODES_FILE, RECORDED_SCENE = "nodes.state", "recorded.scn"
 
 
 class RecordedFilms:
-    """Nodes, films and chambers of a scene, as they stand in its file."""
+    """Nodes, films and chambers of a scene, as read from its file."""
 
     def __init__(self, scene: Path) -> None:
         self.root = ET.parse(scene).getroot()
@@ -336,7 +336,7 @@ class RecordedFilms:
     def overlap(self, places: Sequence[Vector]) -> float | None:
         """The volume in ul in which films have passed through each other.
 
-        None where the scene does not tell the flat shape.
+        None if the scene does not contain the flat shape.
         """
         films = [of for name, of in self._triangles("t") if name.startswith("membrane")]
         flat, start = self._places("rest_position"), self._places("position")
@@ -345,7 +345,7 @@ class RecordedFilms:
         return overlap(np.array(places), flat, start, np.concatenate(films))
 
     def _places(self, name: str) -> NDArray[np.float64] | None:
-        """Places (n, 3) of the films' nodes, as the scene gives them."""
+        """Positions (n, 3) of the films' nodes, as given in the scene."""
         body = self.body.find("MechanicalObject")
         words = None if body is None else body.get(name)
         return None if words is None else np.array(words.split(), dtype=float).reshape(-1, 3)
@@ -357,7 +357,7 @@ class RecordedFilms:
         tip: Sequence[Vector],
         places: Sequence[Vector] | None,
     ) -> State:
-        """The state at a time in s, from the places in mm of the tip's nodes and of all."""
+        """The state at a time in s, from the positions in mm of the tip's and of all nodes."""
         on = min(1.0, time / RAMP)
         pressures = {name: on * value for name, value in self.pressures.items()}
         volumes = {}
@@ -372,7 +372,7 @@ class RecordedFilms:
         return State(time, pressures, height, (x, y, z), tilt_of(tip), volumes)
 
     def _flat_tip(self) -> NDArray[np.float64]:
-        """The middle of the tip's nodes when flat; where the scene has no flat shape, the axis."""
+        """The middle of the tip's nodes when flat; the axis if the scene has no flat shape."""
         flat = self._places("rest_position")
         assert self.tip is not None
         mapping = self.tip.find("SubsetMapping")
@@ -390,7 +390,7 @@ USES = ("scene", "seconds", "volumes")
 
 
 def why_not(laminate: Laminate) -> str | None:
-    """Return why there can be no scene: a film whose modulus is not known."""
+    """Return why no scene can be made: the modulus of a film is not known."""
     return why_no_scene(laminate)
 
 
@@ -411,7 +411,7 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     result = simulate(laminate, folder, pressures, job, progress)
     figures: dict[str, float] = {}
     if laminate.tube is not None:
-        # How far the crowns of balloons lie from their tube's axis.
+        # Distance of the balloons' crowns from their tube's axis.
         _, crowns = read_points(result.scene.with_name(TIP_FILE))[-1]
         across = [2 * math.hypot(x, y) for x, y, _ in crowns]
         figures["diameter"] = sum(across) / len(across)

@@ -58,7 +58,7 @@ PLUGINS = {
     "UniformMass": "Sofa.Component.Mass",
     "WriteState": "Sofa.Component.Playback",
 }
-"""The plugin that brings each component; SOFA itself has DefaultAnimationLoop."""
+"""The plugin that provides each component; DefaultAnimationLoop is built into SOFA."""
 
 
 def root_node(dt: float) -> ET.Element:
@@ -84,7 +84,7 @@ def text(value: Attribute) -> str:
 
 
 def number(value: float) -> str:
-    """Nine digits, and no minus before a zero."""
+    """Format with nine digits, and no minus before a zero."""
     return f"{value + 0.0:.9g}"
 
 
@@ -97,7 +97,7 @@ def _flat(values: Iterable[float | Sequence[float]]) -> Iterable[float]:
 
 
 def document(root: ET.Element, comment: str) -> str:
-    """The scene as a file: what it is, the plugins it needs, its nodes."""
+    """The scene as a file: the comment, the required plugins, its nodes."""
     used = {element.tag for element in root.iter()}
     plugins = sorted({PLUGINS[tag] for tag in used if tag in PLUGINS})
     for place, plugin in enumerate(plugins):
@@ -109,30 +109,30 @@ def document(root: ET.Element, comment: str) -> str:
     return f'<?xml version="1.0"?>\n<!--\n{comment.strip()}\n-->\n{body}\n'
 
 
-# Parts that several scenes have: films, pressures, the tip's record.
+# Parts shared by several scenes: films, pressures, the tip's record.
 
 
 NODAL_BY_PRESSURE = 3.0
-"""mN/mm a kPa: nodal mass / dt^2 in pockets of 5 mm. The stiffness that air pressure lends a film
-is not in a step's matrix; a tenth of this holds too, but a long stack then swings for longer."""
+"""mN/mm per kPa: nodal mass / dt^2 in pockets of 5 mm. A step's matrix lacks the stiffness from air
+pressure; a tenth of this value is stable too, but a long stack then swings for longer."""
 LEAST_NODAL = 8.0
-"""mN/mm, for low pressures."""
+"""Least value in mN/mm, for low pressures."""
 TIP_FILE = "tip.state"
 TIP_PERIOD = 0.1
-"""s between two records of the tip."""
+"""Recording interval of the tip, s."""
 RAMP = 1.0
-"""s in which a pressure rises from 0."""
+"""Duration of the pressure ramp from 0, s."""
 
 
 def nodal_stiffness(highest: float, size: float) -> float:
-    """Nodal mass / dt^2 in mN/mm at which a shell under a pressure in kPa keeps still."""
+    """Nodal mass / dt^2 in mN/mm at which a shell under a pressure in kPa is stable."""
     return max(LEAST_NODAL, NODAL_BY_PRESSURE * highest * size)
 
 
 def scaled_mass(shell: Shell, dt: float, highest: float | None = None) -> float:
-    """Mass in kg that keeps the shell still at a time step in s: artificial.
+    """Artificial mass in kg that keeps the shell stable at a time step in s.
 
-    ``highest`` is the pressure in kPa to reckon with, by default the highest it is told.
+    ``highest`` is the design pressure in kPa, by default the highest requested.
     """
     most = max(shell.pressures.values()) if highest is None else highest
     return nodal_stiffness(most, shell.size) * len(shell.rest) * dt**2
@@ -151,7 +151,7 @@ def add_films(
     bending: Iterable[FilmGroup],
     share: float = 1.0,
 ) -> None:
-    """The films' elasticity, of ``share`` of the true modulus, a child node a group."""
+    """The films' elasticity, with ``share`` of the true modulus, one child node per group."""
     for group in membranes:
         add(
             _film(node, group),
@@ -174,7 +174,7 @@ def add_films(
 def add_pressure(
     node: ET.Element, name: str, triangles: Sequence[Triangle], pressure: float
 ) -> None:
-    """A chamber's air in kPa: up in one second, then held."""
+    """A chamber's pressure in kPa: raised within one second, then held."""
     chamber = child(node, name)
     add(chamber, "TriangleSetTopologyContainer", name="c", triangles=triangles)
     ramp = {
@@ -194,7 +194,7 @@ def add_pressure(
 
 
 def add_tip(node: ET.Element, nodes: Sequence[int]) -> None:
-    """Writes where the tip's nodes are, ten times a second."""
+    """Records the positions of the tip's nodes ten times a second."""
     tip = child(node, "tip")
     add(tip, "MechanicalObject", template="Vec3")
     add(tip, "SubsetMapping", handleTopologyChange="0", indices=nodes)
@@ -210,7 +210,7 @@ def add_tip(node: ET.Element, nodes: Sequence[int]) -> None:
     )
 
 
-# The comment at the top of every scene: contents, and what is scaled, fitted or artificial.
+# The comment at the top of every scene: contents, and the scaled, fitted or artificial values.
 
 
 UNITS = "Units: mm, kg, s; so force mN, pressure and modulus kPa, volume ul."
@@ -326,20 +326,20 @@ def _mass(shell: Shell, dt: float, highest: float) -> str:
 
 DT = 0.02
 VOLUME = 80.0
-"""ul above the start in a chamber of 15 balloons of 5 mm."""
+"""Volume in ul above the start in a chamber of 15 balloons of 5 mm."""
 VOLUME_PRESSURE = 10.0
-"""kPa that scene C's mass is made for; what its chambers come to is not known beforehand."""
+"""Design pressure in kPa of scene C's mass; its actual pressures are not known in advance."""
 STEPS = 25
-"""Of the solver in each time step at most. They do not bring it to its end, the next steps do."""
+"""Maximum solver iterations per time step. The solver converges over several time steps."""
 
 
 def shell_scene(shell: Shell) -> str:
-    """A: core components only; each chamber under its own pressure."""
+    """A: core components only; one pressure per chamber."""
     root = root_node(DT)
     add(root, "DefaultAnimationLoop")
     node = child(root, "sba")
     add(node, "EulerImplicitSolver", rayleighStiffness=0.05, rayleighMass=2)
-    # Without a matrix: that of the bending springs lacks every fourth node in SOFA 25.06.
+    # Without a matrix: SOFA 25.06 omits every fourth node from the bending springs' matrix.
     add(
         node,
         "CGLinearSolver",
@@ -357,9 +357,9 @@ def shell_scene(shell: Shell) -> str:
 
 
 def volume_scene(actuator: CoarseActuator, volumes: Mapping[str, float] | None = None) -> str:
-    """C: each chamber told how many ul it holds more than at the start (plugin SoftRobots).
+    """C: each chamber has a given volume in ul above the start (plugin SoftRobots).
 
-    ``volumes`` by chamber, 0 for those left out. Raises DesignError for an unknown chamber.
+    ``volumes`` by chamber, 0 for omitted ones. Raises DesignError for an unknown chamber.
     """
     usual = float(f"{VOLUME * actuator.balloons / 15 * actuator.size**3:.3g}")
     requested = actuator.volumes(volumes, usual)
@@ -413,33 +413,33 @@ def _add_bodies(node: ET.Element, shell: Shell, mass: float) -> None:
     add(node, "FixedProjectiveConstraint", indices=shell.fixed)
 
 
-# Scenes B and D: nine frames on the backbone that carry the films, or stand in for them.
+# Scenes B and D: nine frames on the backbone that carry the films, or replace them.
 
 
 FRAMES = 9
-"""Reference frames on the backbone (paper, Sec. 3.2.2), where there are balloons enough."""
+"""Reference frames on the backbone (paper, Sec. 3.2.2), if the stack has enough balloons."""
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 ALONG_Z = (0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5))
-"""Turns local x, a beam's own axis, upward."""
+"""Turns local x, the axis of a beam, upward."""
 
 FRAMES_START = nearly_flat
-"""Nine frames cannot draw a pocket's edge in: it must not be drawn in at the start either."""
+"""Nine frames cannot draw in a pocket's edge, so the start must not have it drawn in either."""
 FRAMES_DT = 0.05
 SOFTENING = 0.12
-"""Share of the true modulus: with it 5 kPa lift 15 balloons as high as in scene A."""
+"""Share of the true modulus at which 5 kPa lift 15 balloons as high as in scene A."""
 
 BEAM_DT = 0.02
 BEAM_MASS = 1e3
-"""Times the true mass: keeps the beam upright at 10 kPa."""
+"""Multiple of the true mass that keeps the beam upright at 10 kPa."""
 
 
 @dataclass(frozen=True)
 class Beam:
-    """The surrogate of a stack, scaled from what was fitted for 15 balloons of 5 mm.
+    """The surrogate of a stack, scaled from the fit for 15 balloons of 5 mm.
 
-    ``height`` (mm) without pressure, ``area`` (mm2) a chamber's pressure acts on, ``spring``
-    (mN/mm) of a chamber; ``radius`` (mm) and ``young`` (kPa) of the beam that has the stiffness
-    of the chambers' springs on their axes.
+    ``height`` (mm) without pressure, effective ``area`` (mm2) and ``spring`` (mN/mm) of a chamber;
+    ``radius`` (mm) and ``young`` (kPa) of the beam with the stiffness of the chambers' springs on
+    their axes.
     """
 
     height: float
@@ -485,7 +485,7 @@ def frames_scene(actuator: CoarseActuator) -> str:
 
 
 def beam_scene(actuator: CoarseActuator) -> str:
-    """D: nine frames as a beam, each chamber a prism of air; the film is only shown."""
+    """D: nine frames as a beam, each chamber a prism of air; the film is for display only."""
     beam = beam_of(actuator)
     mesh = actuator.mesh_from(standing(beam.height / actuator.balloons))
     root = root_node(BEAM_DT)
@@ -515,7 +515,7 @@ def beam_scene(actuator: CoarseActuator) -> str:
         showObject="1",
     )
     _add_skin(film, mesh, frames, mapForces="0", mapConstraints="0", mapMasses="0")
-    # The surface on which to hang a visual model.
+    # The surface that carries a visual model.
     shown = child(film, "surface")
     add(shown, "TriangleSetTopologyContainer", name="t", triangles=mesh.single + mesh.double)
     add_tip(film, mesh.tip)
@@ -523,7 +523,7 @@ def beam_scene(actuator: CoarseActuator) -> str:
 
 
 def frame_count(balloons: int) -> int:
-    """Frames on the backbone: no more than there are levels, or a balloon would wave."""
+    """Number of frames on the backbone: at most the number of levels, or a balloon would wave."""
     return min(FRAMES, balloons + 1)
 
 
@@ -559,7 +559,7 @@ def pair_of_frames(
 ) -> tuple[tuple[int, int], tuple[float, float]]:
     """The two frames next to a height and their weights, the nearer one first.
 
-    SkinningMapping reads a node's weights up to the first that is 0: that one must be the last.
+    SkinningMapping reads a node's weights up to the first 0, so a 0 must come last.
     """
     place = z / height * (frames - 1)
     below = min(frames - 2, max(0, math.floor(place)))
@@ -592,7 +592,7 @@ def _add_prism(
 def prism(
     axis: Point, area: float, height: float, frames: int = FRAMES
 ) -> tuple[list[Vector], list[Triangle]]:
-    """A closed square prism on a chamber's axis, four points a frame, normals outward."""
+    """A closed square prism on a chamber's axis, four points per frame, normals outward."""
     half = math.sqrt(area) / 2
     corners = ((half, half), (-half, half), (-half, -half), (half, -half))
     points = [
@@ -604,7 +604,7 @@ def prism(
     for start in range(0, 4 * (frames - 1), 4):
         for i in range(4):
             a, b = start + i, start + (i + 1) % 4
-            # Diagonals in turn: with all of one hand air would twist the prism.
+            # Alternate the diagonals: with a single direction air would twist the prism.
             if i % 2:
                 triangles += [(a, b, b + 4), (a, b + 4, a + 4)]
             else:
@@ -624,7 +624,7 @@ SHELL_FILE, FRAMES_FILE, VOLUME_FILE, BEAM_FILE = (
 )
 DATA, PYTHON = "actuator.json", "scene.py"
 LEAST_LOBES = 3
-"""A beam of fewer chambers bends by none, or one way only."""
+"""A beam with fewer chambers cannot bend, or bends in one plane only."""
 
 
 def why_no_scene(laminate: Laminate) -> str | None:
@@ -643,12 +643,12 @@ def write_scenes(
     pressures: Mapping[str, float] | None = None,
     volumes: Mapping[str, float] | None = None,
 ) -> list[Path]:
-    """Writes the scenes of a laminate with all that they load; the files, the default one first.
+    """Writes the scenes of a laminate and the files they load; returns them, the default one first.
 
-    ``pressures`` in kPa and ``volumes`` (scene C, above its start) in ul, by chamber; chambers
-    left out get 0. By default 5 kPa and some 80 ul in every chamber. Scenes B and C are for round
-    pockets of one film, scene D for three chambers of them or more. Raises DesignError where a
-    chamber is unknown, and for other pockets where the mesher is not installed.
+    ``pressures`` in kPa and ``volumes`` (scene C, above its start) in ul, by chamber; omitted
+    chambers get 0. The default is 5 kPa and some 80 ul in every chamber. Scenes B and C require
+    round pockets of one film, scene D also three chambers or more. Raises DesignError if a chamber
+    is unknown, or if other pockets need a mesher that is not installed.
     """
     texts = {}
     if why_not_round(laminate) is None:

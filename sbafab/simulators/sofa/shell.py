@@ -1,6 +1,6 @@
 """The films of an actuator for SOFA: nodes, triangles by stiffness, cavities.
 
-Stacks of round pockets take the coarse mesh; drawn pockets, several films and tubes the
+Stacks of round pockets use the coarse mesh; drawn pockets, several films and tubes use the
 conforming one.
 """
 
@@ -34,12 +34,12 @@ from sbafab.simulators.coarse.shell import (
 )
 
 Reading = Literal["tip", "crowns"]
-"""What the recorded nodes tell: a tip and its tilt, or crowns round a tube and their radius."""
+"""Meaning of the recorded nodes: a tip and its tilt, or crowns round a tube and their radius."""
 
 SECTORS = 12
-"""Nodes of a ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
+"""Nodes per ring in scene A. From 8 to 12 the height grows by 6.6 %, from 12 to 16 by 2.2 %."""
 COARSE_SECTORS = 8
-"""Nodes of a ring in the other scenes."""
+"""Nodes per ring in the other scenes."""
 
 
 class FilmGroup(NamedTuple):
@@ -53,11 +53,11 @@ class FilmGroup(NamedTuple):
 
 @dataclass(frozen=True)
 class Shell:
-    """Nodes at ``rest`` (flat) and at the start (``position``), and what hangs on them.
+    """Nodes at ``rest`` (flat) and at the start (``position``), and the films attached to them.
 
-    ``membranes`` share out all triangles; in a group of ``bending`` no edge has more than two.
+    ``membranes`` partition all triangles; in a group of ``bending`` an edge has at most two.
     ``cavities`` are closed surfaces, normals out of the air; ``pressures`` kPa by chamber.
-    ``fixed`` nodes stand still, ``tip`` nodes are recorded. ``mass`` is the true one in kg,
+    ``fixed`` nodes do not move, ``tip`` nodes are recorded. ``mass`` is the true mass in kg,
     ``size`` the largest pocket radius over 2.5 mm, ``about`` a sentence on the mesh.
     """
 
@@ -77,7 +77,7 @@ class Shell:
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
-    """7.5 ul in a pocket of 5 mm: with 80 ul more 15 balloons come near what 5 kPa hold."""
+    """7.5 ul in a pocket of 5 mm: 80 ul more brings 15 balloons near their volume at 5 kPa."""
     return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
 
 
@@ -87,9 +87,9 @@ def round_actuator(
     sectors: int = SECTORS,
     start: Start = nearly_flat,
 ) -> CoarseActuator:
-    """The coarse actuator of a stack of round pockets, its rings of the circles' area.
+    """The coarse actuator of a stack of round pockets; its rings have the area of the circles.
 
-    Raises DesignError where the pockets are not round or a chamber is unknown.
+    Raises DesignError if the pockets are not round or a chamber is unknown.
     """
     coarse = actuator(laminate, pressures, sectors, start)
     return replace(coarse, is_fair=True)
@@ -143,16 +143,16 @@ def film_groups(
 
 
 STEPS_ACROSS = 3.0
-"""Sides of triangles in the smallest pocket's radius, where its bonds are not narrower."""
+"""Triangle sides across the smallest pocket's radius, unless its bonds are narrower."""
 STRETCH, MASS, BENDING, RATIO, LOWEST = range(5)
-"""What is known of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
+"""Properties of a cell: E t in mN/mm, kg/mm2, mN mm, Poisson's ratio, its lowest film."""
 
 
 def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None = None) -> Shell:
-    """The shell of a laminate, flat at the start; a radial one wrapped round its tube.
+    """The shell of a laminate, flat at the start; a radial one is wrapped round its tube.
 
-    The mouths of inlets are open and free. Raises DesignError where a chamber is unknown, a
-    film's modulus is not known, or the mesher is not installed.
+    The mouths of inlets are open and free. Raises DesignError if a chamber is unknown, a film's
+    modulus is not known, or the mesher is not installed.
     """
     names = tuple(chamber.name for chamber in laminate.chambers)
     kilopascals = checked(names, pressures, PRESSURE, "pressure", "kPa")
@@ -193,12 +193,12 @@ def conforming_shell(laminate: Laminate, pressures: Mapping[str, float] | None =
 
 
 def _vectors(points: NDArray[np.float64]) -> tuple[Vector, ...]:
-    """Six decimals, and no minus before a zero."""
+    """Round to six decimals, without a minus before a zero."""
     return tuple((x, y, z) for x, y, z in (points.round(6) + 0.0).tolist())
 
 
 def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The new number of each node, -1 for those between corners; and the triangles' corners."""
+    """The new number of each node, -1 for mid-edge nodes; and the triangles' corners."""
     number = np.full(len(mesh.points), -1)
     used = np.unique(mesh.cells[:, :3])
     number[used] = np.arange(len(used))
@@ -207,13 +207,13 @@ def _linear(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def _walls(faces: NDArray[np.int64], corners: NDArray[np.int64]) -> tuple[Triangle, ...]:
     """A cavity's walls, normals out of the air."""
-    # Face 0 of a triangle looks down, face 1 up, each into the air that touches it.
+    # Face 0 of a triangle faces down, face 1 up, each into the air that touches it.
     walls = corners[faces[:, 0]]
     return _rows(np.where(faces[:, 1:] == 0, walls, walls[:, ::-1]))
 
 
 def _cells(stack: Layup, mesh: Mesh) -> NDArray[np.float64]:
-    """Return the properties of each cell, a row each: its films, one on the other, bonded."""
+    """Return the properties of each cell, one row each, for its stack of bonded films."""
     properties = np.zeros((len(mesh.cells), 5))
     thickness = np.zeros(len(mesh.cells))
     properties[:, LOWEST] = -1
@@ -247,8 +247,8 @@ def _membranes(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[
 def _bending(corners: NDArray[np.int64], cells: NDArray[np.float64]) -> tuple[FilmGroup, ...]:
     """Groups in which no edge has more than two triangles.
 
-    What begins with the same film lies side by side; films apart go together where they share
-    no node.
+    Cells with the same lowest film lie side by side; separate films share a group if they share no
+    node.
     """
     bins: list[tuple[float, set[int], list[NDArray[np.int64]]]] = []
     kinds, kind = np.unique(cells[:, [BENDING, LOWEST]], axis=0, return_inverse=True)
