@@ -1,4 +1,4 @@
-"""preview/assembled.png: an assembly at true proportions, a colour a part, with a scale bar."""
+"""preview/assembled.png: an assembly at true proportions, one colour per part, with a scale bar."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ELEVATION, AZIMUTH = 22.0, -58.0
-"""Degrees of the eye over the bench, and round it from x."""
+"""Elevation of the eye over the bench, and azimuth from x, degrees."""
 LAMP = (-0.35, 0.55, 0.76)
 ENLARGED = 2
 MARGIN, FOOT = 0.06, 0.17
@@ -39,9 +39,9 @@ def assembly_png(
 def assembly_pngs(
     assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
 ) -> tuple[bytes, bytes]:
-    """Return that picture, and one without caption and legend for a page that has its own."""
+    """Return that picture, and one without caption and legend for pages with their own."""
     surfaces = [placed_surface(placed, filled=True) for placed in assembled.parts]
-    # What lies inside a tube shows through nothing: no part is transparent.
+    # The content of a tube does not show through: no part is transparent.
     size = width * ENLARGED, height * ENLARGED
     box = MARGIN * size[0], MARGIN * size[1], (1 - MARGIN) * size[0], (1 - MARGIN - FOOT) * size[1]
     view = view_of(surfaces, ELEVATION, AZIMUTH, box)
@@ -64,7 +64,7 @@ def _png(picture: Image) -> bytes:
 
 
 def _write_bar(picture: Image, pixels_per_mm: float) -> None:
-    """A length bar alone, with letters that are read when the picture is printed small."""
+    """A length bar alone, with letters that stay legible when the picture is printed small."""
     from PIL import ImageDraw, ImageFont
 
     width, height = picture.size
@@ -101,7 +101,7 @@ def _edges(buffer: Buffer) -> NDArray[np.bool_]:
 
 
 def _legend(assembled: Assembled, paints: Mapping[str, RGB]) -> list[tuple[RGB, str]]:
-    """A line a colour: the parts that have it, and what they are."""
+    """One line per colour: the parts that have it, and what they are."""
     lines: dict[tuple[RGB, str], list[str]] = {}
     for placed in assembled.parts:
         kind = placed.part.kind if placed.made is None else placed.made.design.name

@@ -36,23 +36,23 @@ if TYPE_CHECKING:
     from sbafab.models.stack import Pose
     from sbafab.reports.inflated import Solids
 
-# Contacts and clearances of an arm that some of its chambers bend.
+# Contacts and clearances of an arm bent by some of its chambers.
 #
-# Each chamber alone and each two side by side are pressed, the others empty, while every other
-# actuator stands inflated; what stands on the arm goes along with its tip.
+# Each chamber alone and each pair of neighbours are pressurised, the others empty, while every
+# other actuator is inflated; parts on the arm move with its tip.
 
 
 FARTHEST = 10.0
-"""mm up to which clearances are looked for."""
+"""Clearances are computed up to this distance, mm."""
 SLIGHTEST = 0.1
-"""kPa, the least at which an arm is looked at."""
+"""Lowest pressure at which an arm is checked, kPa."""
 HALVINGS = 5
 FOOT = 3
-"""Levels from below that may rest on what the arm stands on."""
+"""Levels from below that may rest on the part under the arm."""
 
 
 class Clearance(NamedTuple):
-    """Mm that are left between a bent arm, with what stands on it, and another part."""
+    """Clearance in mm between a bent arm, with the parts on it, and another part."""
 
     other: str
     chambers: str
@@ -63,8 +63,8 @@ class Clearance(NamedTuple):
 class BentTouch:
     """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
 
-    It meets it from about ``from_kpa`` on, bent by ``bend`` degrees; ``measured`` is the paper's
-    bend where the model is off by more than a quarter of it.
+    Contact begins at about ``from_kpa``, at a bend of ``bend`` degrees; ``measured`` is the paper's
+    bend if the model is off by more than a quarter of it.
     """
 
     part: str
@@ -77,7 +77,7 @@ class BentTouch:
 
 
 class _Around(NamedTuple):
-    """An arm and what is round it: ``carried`` are solids on its top, when it is flat."""
+    """An arm and its surroundings: ``carried`` are solids on its top, when it is flat."""
 
     placed: PlacedSba
     arm_stack: Stack
@@ -94,11 +94,10 @@ def bent_arms(
     pressure: float,
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[Clearance | BentTouch]:
-    """Yield for each other part the least clearance, or each way of bending in which the arm meets
-    it.
+    """Yield for each other part the least clearance, or each bend at which the arm meets it.
 
-    ``rises`` is by what each actuator lifts what stands on it. No clearance is given for what the
-    arm stands on and for parts that stay farther away than ``FARTHEST``.
+    ``rises`` is how far each actuator lifts the parts on it. No clearance is given for the part
+    under the arm and for parts farther away than ``FARTHEST``.
     """
     arm_stack = stacks[placed.name]
     if arm_stack.chambers < 2:
@@ -130,7 +129,7 @@ def bent_arms(
 
 
 def _ways(chambers: int) -> list[tuple[int, ...]]:
-    """Return the sets of chambers that are pressed: each alone, and each two side by side."""
+    """Return the sets of pressurised chambers: each alone, and each two side by side."""
     alone: list[tuple[int, ...]] = [(i,) for i in range(chambers)]
     return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
 
@@ -173,20 +172,20 @@ def _around(
 
 
 class _Arm(NamedTuple):
-    """A bent arm's solids with those that stand on it; ``foot`` are those of its lowest levels."""
+    """A bent arm's solids and the parts on it; ``foot`` holds the solids of its lowest levels."""
 
     foot: Solids
     rest: Solids
 
     def beyond(self, part: str, placed: PlacedPart) -> Solids:
-        """Return the solids that may meet another part: its foot may rest on what the arm stands
-        on.
+        """Return the solids that may meet another part; the foot may rest on the part under the
+        arm.
         """
         return self.rest if part == placed.part.on else self.foot + self.rest
 
 
 def _moved(around: _Around, pose: Pose) -> _Arm:
-    """The bent arm and what stands on it."""
+    """The bent arm and the parts on it."""
     places = around.placed.upright(pose.frames[0]) + around.lift
     levels = (places[1:] + places[:-1]) / 2
     arm = _Arm([], [])
@@ -216,7 +215,7 @@ def _frame(placed: PlacedPart) -> NDArray[np.float64]:
 
 
 def _gap(arm: Solids, theirs: Solids) -> float:
-    """Mm between the nearest two, at most ``FARTHEST``."""
+    """Distance in mm between the nearest two, at most ``FARTHEST``."""
     least = FARTHEST
     pairs = ((box_gap(a, b), a, b) for a in arm for b in theirs)
     for boxes, a, b in sorted(pairs, key=lambda pair: pair[0]):
@@ -227,9 +226,7 @@ def _gap(arm: Solids, theirs: Solids) -> float:
 
 
 def _first(around: _Around, part: str, pressed: Sequence[int], pressure: float) -> Pose:
-    """Return approximately the first pose in which the arm meets another part, on the way to a
-    pressure.
-    """
+    """Return approximately the first pose in contact with another part, on the way to a pressure."""
     low, high = min(SLIGHTEST, pressure / 2), pressure
     pose = _bent(around.arm_stack, pressed, high)
     for _ in range(HALVINGS):
@@ -255,17 +252,17 @@ IN_THE_LUMEN = (
     "friction",
 )
 SEVERAL = 3
-"""Chambers of an arm that bends."""
+"""Number of chambers of a bending arm."""
 PAPERS = ("aperture", "brace", "standing")
-"""The assemblies that the paper built: figures of others stand beside nothing."""
+"""The assemblies built in the paper; only their figures have measured values beside them."""
 
 
 @dataclass(frozen=True)
 class AssemblyFigure:
-    """One figure of a part: value in ``unit``, model, and what the paper says, if it does.
+    """One figure of a part: value in ``unit``, model, and the paper's remark, if any.
 
-    ``measured`` is what it measured of a single actuator, where the model is off by more than a
-    quarter of that.
+    ``measured`` is the paper's value for a single actuator, if the model is off by more than a
+    quarter of it.
     """
 
     part: str
@@ -288,9 +285,9 @@ class Touch:
 
 @dataclass(frozen=True)
 class AssemblyPrediction:
-    """Figures at ``pressure_kpa``; ``touches`` are parts in each other's way when all stand up
-    straight, ``bent_touches`` what arms meet when bent; ``left_out`` says what no model reaches,
-    ``near_burst`` which parts are above half of their estimated burst pressure.
+    """Figures at ``pressure_kpa``; ``touches`` are parts that collide when all are upright,
+    ``bent_touches`` contacts of bent arms; ``left_out`` names what no model covers, ``near_burst``
+    the parts above half of their estimated burst pressure.
     """
 
     name: str
@@ -303,7 +300,7 @@ class AssemblyPrediction:
     near_burst: tuple[str, ...]
 
     def met(self) -> list[str]:
-        """Sentences on what inflated parts meet, and what would mend it."""
+        """Sentences on contacts of inflated parts, and remedies."""
         sentences = [
             f"{touch.part} and {touch.other} meet when inflated: they share "
             f"{touch.volume:.2f} mm3; move them apart, or give less pressure"
@@ -327,7 +324,7 @@ class Grip(NamedTuple):
     the upper end, in mm.
 
     In the assembly's ``lumen`` a balloon is ``room`` mm high; each stack pushes on the wall with
-    ``push`` N a kPa. Both are None without a lumen that it reaches.
+    ``push`` N per kPa. Both are None if it reaches no lumen.
     """
 
     part: str
@@ -363,8 +360,8 @@ def predict_assembly(
 ) -> AssemblyPrediction:
     """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
 
-    ``pause`` is called between parts of the work, which takes seconds; what it raises ends it.
-    Raises DesignError for pressures that the models do not reach, or past a part's estimated burst.
+    ``pause`` is called between parts of the work, which takes seconds; an exception from it stops
+    the work. Raises DesignError for pressures beyond the models or a part's estimated burst.
     """
     near = []
     for placed in assembled.parts:
@@ -433,7 +430,7 @@ def _arm(
 def _figures_of_arm(
     placed: PlacedSba, arm_stack: Stack, pressure: float, load_g: float
 ) -> Iterator[tuple[AssemblyFigure, FigureKey]]:
-    """Yield figures, each with that of the same kind in a design's own prediction."""
+    """Yield figures, each with the matching figure of a design's own prediction."""
     name, weight = placed.name, load_g * 1e-3 * GRAVITY
     at, stack_model = Conditions(kpa=pressure), ModelId.ELASTIC_STACK
 
@@ -473,19 +470,19 @@ def _figures_of_arm(
         sag = float(np.linalg.norm(hung.tip - free.tip))
         paper = "lifts 1.2 g (Sec. 5)" if load_g == MARBLE_G else ""
         words = f"sag of the tip, {load_g:g} g across it"
-        # A sag is a load over a stiffness.
+        # Sag is load over stiffness.
         yield figure(words, sag, "mm", paper), key(Quantity.HELD_STIFFNESS)
 
 
 def _free_stroke(placed: PlacedSba, pressure: float) -> float:
-    """Return the free stroke in mm as in ``predict``: the stack's maps are only near."""
+    """Return the free stroke in mm as in ``predict``: the stack's maps are approximate."""
     design, laminate = placed.made.design, placed.made.laminate
     kinds = Counter(balloons_of(design, laminate, factors_of(design)))
     return free_rise(kinds, pressure).stroke
 
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
-    """Return hold of a radial actuator in the assembly's lumen; None for one of another form."""
+    """Return hold of a radial actuator in the assembly's lumen; None for other forms."""
     design, laminate = placed.made.design, placed.made.laminate
     form = design.form
     pockets = form.pockets
@@ -511,7 +508,7 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
 def _grip_figures(
     hold: Grip, stacks: int, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
-    """Diameter of a radial actuator, and how hard its stacks hold in the assembly's lumen."""
+    """Diameter of a radial actuator, and the hold of its stacks in the assembly's lumen."""
     name, paper = hold.part, "about 28 (Sec. 2.1)"
     diameters = (
         ("diameter, deflated", hold.deflated, "tube and films", "15.33 (Sec. 2.1)"),
@@ -534,9 +531,7 @@ def _grip_figures(
 
 
 def _stacks(assembled: Assembled) -> dict[str, Stack]:
-    """Return the stacks of all actuators with round pockets, by part; parts of one design share
-    one.
-    """
+    """Return the stacks of all actuators with round pockets, by part; shared within a design."""
     by_design: dict[int, Stack] = {}
     by_part = {}
     for placed in assembled.parts:
@@ -551,7 +546,7 @@ def _stacks(assembled: Assembled) -> dict[str, Stack]:
 
 
 def _rise(placed: PlacedPart, part_stack: Stack, pressure: float) -> NDArray[np.float64]:
-    """Return by what (3,) in mm an actuator lifts what stands on its top."""
+    """Return the vector (3,), mm, by which an actuator lifts the parts on its top."""
     free = part_stack.pose((pressure,) * part_stack.chambers)
     ends = np.array([[0.0, 0.0, part_stack.flat_height], [0.0, 0.0, free.height]])
     low, high = placed.upright(ends)
@@ -566,12 +561,12 @@ def _touches(
     rises: Mapping[str, NDArray[np.float64]],
     pressure: float,
 ) -> Iterator[Touch]:
-    """Other parts that an actuator meets when all stand up straight."""
+    """Other parts that an actuator meets when all are upright."""
     names = [part.name for part in assembled.parts]
     solid_parts = _upright(placed, stacks[placed.name], pressure, lifted(assembled, placed, rises))
     moved = carried(assembled, placed.name)
     for neighbour in assembled.parts:
-        # What stands on it moves along, and what it stands on it touches as it does flat.
+        # Parts on it move along; the part under it touches it as when flat.
         if (
             neighbour.name in moved
             or neighbour.name == placed.part.on

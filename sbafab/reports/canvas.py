@@ -35,20 +35,20 @@ KEY: tuple[tuple[Tone, str], ...] = (
     ("cut bond", "bond, cut"),
     ("shade", "open gap"),
 )
-"""What the colours are, in the picture's foot and beside it on a page."""
+"""Meaning of the colours, in the picture's foot and beside it on a page."""
 LEVELS = 60
 PAPER = (255, 255, 255)
 INK = (40, 44, 50)
 SHADOW = 70
 SMALLEST = 15
-"""Pixels of the words, at least: a picture on a page is often shown smaller than it is."""
+"""Least letter size, pixels: pages often show a picture smaller than it is."""
 BLUR = 8
 STRIP = 64
-"""Rows of the picture that are reduced at once: enlarged and in full colour they are large."""
+"""Rows reduced at once: enlarged and in full colour they are large."""
 
 
 class Canvas:
-    """Painted later covers painted earlier. One byte a pixel keeps the fills fast."""
+    """Later paint covers earlier paint. One byte per pixel keeps the fills fast."""
 
     def __init__(self, width: int, height: int, supersample: int) -> None:
         from PIL import Image, ImageDraw
@@ -81,7 +81,7 @@ class Canvas:
         """The picture over the soft shadow of ``footprint``, with caption and key of ``films``."""
         self._image.putpalette([part for colour in self._index for part in colour])
         picture = self._backdrop(footprint).convert("RGB")
-        # What nothing is painted on is backdrop.
+        # Unpainted pixels are backdrop.
         whole = self._enlarged
         x0, top, right, bottom = self._image.getbbox() or (0, 0, *self._image.size)
         last = -(-bottom // whole)
@@ -94,9 +94,7 @@ class Canvas:
         return out.getvalue()
 
     def _reduced(self, box: tuple[int, int, int, int], behind: Image) -> Image:
-        """Return what is painted within the ``box`` of the picture, over what lies ``behind`` it
-        there.
-        """
+        """Return the paint within the ``box`` of the picture, over the picture ``behind`` it."""
         from PIL import ImageChops
 
         whole = self._enlarged
@@ -104,8 +102,8 @@ class Canvas:
         inside = self._image.crop((whole * x0, whole * top, whole * right, whole * bottom))
         painted = inside.convert("RGB").reduce(whole)
         empty = inside.point([255] + [0] * 255, "L").reduce(whole).convert("RGB")
-        # Where the canvas is empty it is white: taking off what the backdrop lacks of white,
-        # in proportion, leaves no bright rim round the solid.
+        # The empty canvas is white: subtracting the backdrop's difference from white, in
+        # proportion, leaves no bright rim around the solid.
         lack = ImageChops.multiply(ImageChops.invert(behind), empty)
         return ImageChops.subtract(painted, lack)
 
@@ -147,7 +145,7 @@ class Canvas:
 
 
 def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
-    """One closed ring for a piece with holes: each hole joined by a slit to what is right of it."""
+    """One closed ring for a piece with holes: a slit joins each hole to the contour right of it."""
     merged = list(rings[0])
     for hole in sorted(rings[1:], key=lambda ring: -max(ring)[0]):
         first = max(range(len(hole)), key=lambda i: hole[i])
@@ -176,9 +174,9 @@ def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Poi
 
 
 DENSITY = 1.45
-"""Samples a pixel along a triangle's side: more than the root of 2, so that none is missed."""
+"""Samples per pixel along a triangle's side: more than the root of 2, so none is missed."""
 MOST = 4_000_000
-"""Samples that are held at once."""
+"""Most samples in memory at once."""
 AMBIENT = 0.58
 
 
@@ -209,7 +207,7 @@ class Buffer(NamedTuple):
 def view_of(
     surfaces: Sequence[Surface], elevation: float, azimuth: float, box: Sequence[float]
 ) -> View:
-    """The view from so many degrees over the bench and round it from x, filling a box.
+    """The view from an elevation over the bench and an azimuth from x, degrees, filling a box.
 
     The ``box`` is left, top, right, bottom in pixels.
     """
@@ -238,7 +236,7 @@ def rasterize(
 ) -> Buffer:
     """Return the depth buffer of the surfaces; ``lamp`` is the direction to the light, in the view.
 
-    Faces are lit one by one, or smoothly where ``normals`` (n, 3) of the points are given.
+    Faces are lit one by one, or smoothly if ``normals`` (n, 3) of the points are given.
     """
     size = width * height
     buffer = Buffer(
@@ -268,7 +266,7 @@ def _paint(
     smooth: NDArray[np.float64] | None,
 ) -> None:
     corners = view.flat(surface.points)[surface.faces]
-    # Pixels count downward: what faces the eye runs clockwise there.
+    # Pixels count downward, so faces toward the eye run clockwise there.
     a, b, c = (corners[:, i, :2] for i in range(3))
     twice = (c - a)[:, 0] * (b - a)[:, 1] - (c - a)[:, 1] * (b - a)[:, 0]
     front = np.flatnonzero(twice > 1e-12)
@@ -280,7 +278,7 @@ def _paint(
     corners, light, long = _longest_first(corners, light)
     along = np.ceil(DENSITY * long).astype(np.int64) + 2
     across = np.ceil(DENSITY * twice / np.maximum(long, 1e-9)).astype(np.int64) + 2
-    # Triangles of like size are sampled together.
+    # Triangles of similar size are sampled together.
     grids = np.column_stack([_power_of_two(along), _power_of_two(across)])
     for n, m in np.unique(grids, axis=0):
         samples = np.flatnonzero((grids == (n, m)).all(axis=1))
@@ -300,7 +298,7 @@ def _light(
 
 
 def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the light of what faces along normals (n, 3) in the view: from AMBIENT to 1."""
+    """Return the light of faces with normals (n, 3) in the view: from AMBIENT to 1."""
     light: NDArray[np.float64] = AMBIENT + (1 - AMBIENT) * np.clip(normals @ lamp, 0, 1)
     return light
 
@@ -308,7 +306,9 @@ def lit(normals: NDArray[np.float64], lamp: NDArray[np.float64]) -> NDArray[np.f
 def _longest_first(
     corners: NDArray[np.float64], light: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Corners and their light turned so that the longest side comes first; its length in pixels."""
+    """Corners and their light, rotated so that the longest side comes first; its length in
+    pixels.
+    """
     sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
     lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
     first = lengths.argmax(axis=1)
@@ -370,7 +370,7 @@ def draw_length_bar(
     pixels_per_mm: float,
     font: FreeTypeFont | ImageFont,
 ) -> None:
-    """A bar that ends at ``right``, no longer than ``widest`` pixels, its length in mm above it."""
+    """A bar that ends at ``right``, at most ``widest`` pixels long, with its length in mm above."""
     bar = max(step for step in BARS if step * pixels_per_mm <= widest or step == BARS[0])
     start = right - bar * pixels_per_mm
     words = f"{bar:g} mm"

@@ -1,7 +1,7 @@
 """Charts as SVG for screen and print, in mm.
 
-Colours are told apart by the colour blind (Okabe and Ito), dashes and markers tell lines apart in
-grey. The key stands below the axes, where it covers nothing. Text stays text.
+The colours are distinct for the colour blind (Okabe and Ito); dashes and markers distinguish lines
+in grey. The key is below the axes, where it covers nothing. Text stays text.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ AXES = 88.0, 64.0
 HEAD, FOOT, RIM = 16.0, 12.0, 6.0
 """Titles above the axes, numbers and label below them, and the rim right of them."""
 ROW, SIGN = 4.4, 11.0
-"""Height of a row of the key, and length of the piece of curve in it."""
+"""Height of a row of the key, and length of its curve sample."""
 MOST_STEPS = 8
 """Steps between the numbers at an axis."""
 MARGIN = 0.05
-"""Share of the values' range by which an axis goes on."""
+"""Margin of an axis, as a share of the values' range."""
 SPECKS = (
     "m-.7 0a.7 .7 0 1 0 1.4 0a.7 .7 0 1 0-1.4 0z",
     "m-.7-.5l.2-.2l.5.5l.5-.5l.2.2l-.5.5l.5.5l-.2.2l-.5-.5l-.5.5l-.2-.2l.5-.5z",
@@ -47,7 +47,7 @@ SPECKS = (
 SPECK_GRID = 4
 """Specks of one colour in the same 1/4 mm are drawn once."""
 BAR = 0.4
-"""Half of a bar's width, of the distance between two."""
+"""Half of a bar's width, as a share of the distance between two."""
 MOST_NAMES = 8
 """Names below bars, as many as have room."""
 
@@ -63,7 +63,7 @@ class ChartCurve(NamedTuple):
 
 
 class ChartPoints(NamedTuple):
-    """Measured points, +- an error each (0 draws no bar)."""
+    """Measured points, each with an error +- (0 draws no bar)."""
 
     label: str
     x: Sequence[float]
@@ -82,7 +82,7 @@ class ChartSpecks(NamedTuple):
 
 
 class ChartBars(NamedTuple):
-    """A bar a name of the panel, on top of those before: ``y`` are whole numbers."""
+    """One bar per name of the panel, on top of the earlier ones: ``y`` are whole numbers."""
 
     label: str
     y: Sequence[int]
@@ -98,7 +98,7 @@ class Panel(NamedTuple):
     curves: Sequence[ChartCurve]
     points: Sequence[ChartPoints] = ()
     from_zero: bool = True
-    """Axes begin at 0 where nothing is negative: lengths of bars and slopes then mean something."""
+    """Axes begin at 0 if nothing is negative, so that lengths of bars and slopes have a meaning."""
     specks: Sequence[ChartSpecks] = ()
     bars: Sequence[ChartBars] = ()
     names: Sequence[str] = ()
@@ -106,7 +106,7 @@ class Panel(NamedTuple):
 
 
 def chart_svg(title: str, panels: Sequence[Panel], in_row: int = 1000) -> str:
-    """Return the panels under one title, so many in a row."""
+    """Return the panels under one title, this many in a row."""
     elements, width, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
     for first in range(0, len(panels), in_row):
         drawn, end, below = _row(panels[first : first + in_row], first + 1)
@@ -134,7 +134,7 @@ def _row(panels: Sequence[Panel], first: int) -> tuple[list[str], float, float]:
 
 
 class _Scale(NamedTuple):
-    """An axis: the values at its ends, and those that numbers stand at with their texts."""
+    """An axis: the values at its ends, and its tick values with their texts."""
 
     low: float
     high: float
@@ -184,7 +184,7 @@ def _plot(panel: Panel, begin: float) -> _Plot:
 
 
 def _scale(values: Iterable[float], from_zero: bool, least: float = 0.0) -> _Scale:
-    """Return the axis of values, those that are no finite numbers left out.
+    """Return the axis of values, ignoring those that are not finite.
 
     Numbers stand ``least`` or more apart.
     """
@@ -195,7 +195,7 @@ def _scale(values: Iterable[float], from_zero: bool, least: float = 0.0) -> _Sca
     least = max(least, (high - low) / MOST_STEPS)
     power = 10.0 ** math.floor(math.log10(least))
     step = next(each * power for each in (1, 2, 2.5, 5, 10) if each * power >= least * (1 - 1e-9))
-    # A number at the end of an axis is not lost to rounding.
+    # Rounding does not drop a number at the end of an axis.
     counts = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
     return _Scale(low, high, [(count * step, _number(count * step)) for count in counts])
 
@@ -256,7 +256,7 @@ def _specks(plot: _Plot, place: int) -> Iterator[str]:
     """Yield the specks of a label in panel number ``place``, ``specks<place>.<number>``."""
     for number, specks in enumerate(plot.panel.specks, start=1):
         middles = (plot.at(*pair) for pair in zip(specks.x, specks.y, strict=True))
-        # In a sweep of many designs most lie on others.
+        # In a sweep of many designs most specks coincide.
         places = dict.fromkeys(
             (round(x * SPECK_GRID) / SPECK_GRID, round(y * SPECK_GRID) / SPECK_GRID)
             for x, y in middles
@@ -342,7 +342,7 @@ def _key_row(plot: _Plot, number: int, row: _KeyRow) -> str:
     return sign + draw.text((x + SIGN + 2, y + 0.9), row.label, size=draw.SMALL)
 
 
-# A predicted relation as a chart, with what the paper measured.
+# A predicted relation as a chart, with the paper's measurements.
 
 
 def relation_svg(name: str, relation: Relation) -> str:

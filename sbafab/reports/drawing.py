@@ -50,7 +50,7 @@ def document(width: float, height: float, title: str, elements: Iterable[str]) -
 
 
 def film_fill(film: Film) -> str:
-    """Return the fill of a film: masks are hatched, so that a grey print still tells them."""
+    """Return the fill of a film: masks are hatched, so that a grey print still shows them."""
     return f"url(#{_hatch_id(film.shade % len(MASKS))})" if film.is_mask else ink(film).fill
 
 
@@ -59,7 +59,7 @@ def _hatch_id(shade: int) -> str:
 
 
 def _definitions(drawn: str) -> str:
-    """The hatch of PTFE, and those of the further masks that are drawn."""
+    """The hatch of PTFE, and of further masks in the drawing."""
     hatches = {_hatch_id(shade): colours for shade, colours in enumerate(MASKS)}
     used = [
         _hatch(n, colours) for n, colours in hatches.items() if n == "PTFE" or f"url(#{n})" in drawn
@@ -143,8 +143,8 @@ def arrow(tip: Point, toward: Point) -> str:
 def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> list[str]:
     """A dimension between two points, drawn ``distance`` from them along unit vector ``away``.
 
-    ``away`` stands square to the line from a to b, along x or y. Where the arrows do not fit
-    between the extension lines they point inward from outside.
+    ``away`` is perpendicular to the line from a to b, along x or y. If the arrows do not fit
+    between the extension lines, they point inward from outside.
     """
     (u, v) = away
     along = _unit(a, b)
@@ -183,7 +183,7 @@ def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> l
 
 
 def across(a: Point, b: Point) -> list[str]:
-    """A width marked on the part itself, its words elsewhere; arrows outside where it is narrow."""
+    """A width marked on the part itself, its label elsewhere; arrows outside if it is narrow."""
     (u, v) = _unit(a, b)
     if math.dist(a, b) >= 6 * ARROW:
         return [line([a, b], colour=GREY), arrow(a, (-u, -v)), arrow(b, (u, v))]
@@ -192,9 +192,9 @@ def across(a: Point, b: Point) -> list[str]:
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Positions as near as may be to the wanted ones (sorted), at least ``gap`` apart.
+    """Positions as near as possible to the wanted ones (sorted), at least ``gap`` apart.
 
-    They stay between ``low`` and ``high`` where there is room for all of them.
+    They stay between ``low`` and ``high`` if all fit.
     """
     if not targets:
         return []
@@ -239,7 +239,7 @@ MOST_RADII = 3
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle or arc to point at, and the words for all of its kind.
+    """A circle or arc to point at, and the label for all of its kind.
 
     ``centre`` and ``radius`` are mm, like ``toward``, the point of an arc to point at; a
     ``phantom`` is not an edge of the profile.
@@ -254,7 +254,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class WidthDimension:
-    """A width to draw across, from ``start`` to ``end`` in mm, and its words."""
+    """A width to draw across, from ``start`` to ``end`` in mm, and its label."""
 
     words: str
     start: Point
@@ -265,7 +265,7 @@ Dimension = Circle | WidthDimension
 
 
 def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
-    """All that a drawing of a layer gives the size of, beside its overall width and height."""
+    """Everything dimensioned in a drawing of a layer, beside its overall width and height."""
     profile = layer.profile
     around = circumscribed(profile)
     widths = inlet_width(laminate, layer), piece_width(profile)
@@ -278,7 +278,7 @@ def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
 
 
 def balloons(laminate: Laminate) -> str:
-    """Return number of balloons in words: 15 balloons, or 3 stacks of 1 balloon side by side."""
+    """Return the number of balloons as text: 15 balloons, or 3 stacks of 1 balloon side by side."""
     high = f"{laminate.balloons} balloon{'s' if laminate.balloons > 1 else ''}"
     stacks = sum(len(chamber.centres) for chamber in laminate.chambers)
     on_sheet = any(layer.role == "sheet" for layer in laminate.layers)
@@ -291,9 +291,9 @@ def length(value: float) -> str:
 
 
 def circles(laminate: Laminate, layer: Layer) -> list[Circle]:
-    """The full circles of a profile, equal ones together, named after what they are.
+    """The full circles of a profile, equal ones together, named by their meaning.
 
-    Not the outline of a single disc: its overall width says it.
+    The outline of a single disc is left out: its overall width gives it.
     """
     groups: dict[tuple[str, float], list[Contour]] = {}
     for contour in layer.profile.contours:

@@ -1,8 +1,8 @@
 """Inflated actuators as surfaces, from poses of the elastic stack; parts of an assembly as solids.
 
-Each balloon is two films turned round its chamber's axis on the plane midway between two plates,
-and set up to the plates, which may lean; its meridian is that of the balloon between plates as far
-apart as these (``models.balloon``). What is bonded round the pockets follows their edges inward.
+Each balloon is two films revolved around its chamber's axis on the plane midway between two plates,
+and sheared to the plates, which may be tilted; its meridian is the one between parallel plates at
+this distance (``models.balloon``). The bonded web around the pockets follows their edges inward.
 """
 
 from __future__ import annotations
@@ -36,28 +36,28 @@ if TYPE_CHECKING:
     Solids = list[manifold3d.Manifold]
 
 FINE, COARSE = 56, 28
-"""Facets of a balloon round its axis."""
+"""Facets of a balloon around its axis."""
 SAGITTA = 0.02
-"""mm by which a chord of the web may leave its arc."""
+"""Largest distance of the web's chords from their arc, mm."""
 INSIDE = 0.05
-"""mm from the end of a tab at which its width is taken."""
+"""Distance from the end of a tab at which its width is measured, mm."""
 HIDDEN = 0.3
-"""mm by which the web reaches into a pocket, between its films."""
+"""Overlap of the web into a pocket, between its films, mm."""
 REACH = 2.5
-"""mm over which what is drawn in at a pocket's edge fades out."""
+"""Distance over which the inward displacement of a pocket's edge fades out, mm."""
 LEAST_GAP = 0.02
-"""mm that a balloon is open at least, so that its films are two."""
+"""Least opening of a balloon, mm, so that its films stay separate."""
 SAME = 100
 """Pressures and gaps that agree to 1 / SAME kPa and mm share a meridian."""
 FLATTEST = 0.12
-"""Least share of its height that a film keeps where plates lean into it."""
+"""Least share of its height that a film keeps under tilted plates."""
 
 
 class InflatedPart(NamedTuple):
     """A closed surface of an inflated actuator: a chamber's balloons, or the bonded web.
 
-    ``chamber`` is its place in the laminate's, None for the web; ``normals`` (n, 3) are those of
-    the points.
+    ``chamber`` is its place in the laminate's, None for the web; ``normals`` (n, 3) are at the
+    points.
     """
 
     name: str
@@ -71,8 +71,8 @@ def inflated(
 ) -> list[InflatedPart]:
     """The parts of a laminate in a pose, in mm on its base: the web first, then each chamber.
 
-    Balloons have ``around`` facets round their axes, and half as many rings a film if that is less.
-    Raises DesignError where a balloon finds no balance.
+    Balloons have ``around`` facets around their axes, and half as many rings per film if that is
+    less. Raises DesignError if a balloon has no equilibrium.
     """
     levels = [_Level(pose, i) for i in range(len(stack.levels))]
     meridians = _meridians(stack, pose)
@@ -89,8 +89,8 @@ def inflated(
 
 
 class FilmMeridian(NamedTuple):
-    """One film from neck to rim: radii in mm and shares of the height to its plate; ``drawn`` is by
-    how much its pocket's edge has come in, ``pocket`` where that was, both in mm.
+    """One film from neck to rim: radii in mm and shares of the height to its plate; ``drawn`` is
+    the inward displacement of its pocket's edge, ``pocket`` the edge's original radius, both in mm.
     """
 
     radii: Array
@@ -100,7 +100,7 @@ class FilmMeridian(NamedTuple):
 
 
 class _Level:
-    """The frame midway between two plates, and how far the plates are from its plane."""
+    """The frame midway between two plates, and the distance of the plates from its plane."""
 
     def __init__(self, pose: Pose, i: int) -> None:
         origins, axes = pose.frames
@@ -128,7 +128,7 @@ class _Level:
 
 
 def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
-    """The films of each level and chamber; alike ones are worked out once."""
+    """The films of each level and chamber; equal ones are computed once."""
     keys = [
         [
             (int(kind), round(SAME * p), max(round(SAME * gap), round(SAME * LEAST_GAP)))
@@ -169,11 +169,11 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
     at_axis = level.heights(*(np.full(1, value) for value in axis))
     sides = []
     for height, middle, sign in ((above, at_axis[1][0], 1), (below, at_axis[0][0], -1)):
-        # Where plates lean so far that they meet the films keep a little height.
+        # If tilted plates would meet, the films keep a little height.
         clipped = sign * np.maximum(sign * height, FLATTEST * abs(middle))
         sides.append(level.points(x, y, shares[:, None] * clipped))
     rows = len(radii)
-    # Down over the upper film, round the rim, which both films share, and back under the lower one.
+    # Down over the upper film, around the shared rim, and back under the lower film.
     points = np.concatenate([sides[0], sides[1][-2::-1]]).reshape(-1, 3)
     k, j = np.meshgrid(np.arange(2 * rows - 2), np.arange(around), indexing="ij")
     a, b = k * around + j, k * around + (j + 1) % around
@@ -215,7 +215,7 @@ def _webs(
 
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
-    """The plate of a level without its pockets and ears; inlet tabs belong to the lowest."""
+    """The plate of a level without its pockets and ears; inlet tabs are part of the lowest."""
     lower, upper = laminate.tpe_layers[2 * i : 2 * i + 2]
     radius = stack.maps[stack.levels[i]].balloon.pocket - HIDDEN
     pockets = union(disc((float(x), float(y)), radius) for x, y in stack.axes)
@@ -223,7 +223,7 @@ def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
 
 
 def _trimmed(laminate: Laminate, plate: Region) -> Region:
-    """The plate as it is when the ears are snipped off; its inlet tabs stay."""
+    """The plate after the ears are cut off; its inlet tabs stay."""
     if laminate.registration != "ears":
         return plate
     tabs = [plate & _tab(plate, inlet) for inlet in laminate.inlets]
@@ -260,9 +260,9 @@ def _normals(surface: Surface) -> Array:
 
 
 def pressed(stack: Stack, volumes_ul: Sequence[float], rounds: int = 60) -> Pose:
-    """The pose whose chambers hold these volumes in ul, found by their pressures.
+    """The pose whose chambers hold these volumes in ul, found through their pressures.
 
-    Raises DesignError for volumes that the stack's highest pressure does not reach.
+    Raises DesignError for volumes beyond the stack's highest pressure.
     """
     volumes = np.asarray(volumes_ul, dtype=float)
     if volumes.shape != (stack.chambers,) or not (np.isfinite(volumes) & (volumes >= 0)).all():
@@ -301,20 +301,20 @@ def _out_of_reach(volumes: Array, pose: Pose) -> DesignError:
     )
 
 
-# Inflated parts of an assembly as solids, where they stand.
+# Inflated parts of an assembly as solids, in place.
 
 
 TOUCHING = 0.05
-"""mm3 that two parts may share: touching, as in the check of the deflated assembly."""
+"""Overlap in mm3 that still counts as touching, as in the check of the deflated assembly."""
 
 
 def shared_volume(first: Solids, second: Solids) -> float:
-    """Return the volume that lies in both, mm3."""
+    """Return the volume of their intersection, mm3."""
     return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
 
 
 def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
-    """Return the distance between the boxes of two solids, mm; 0 or less where they meet."""
+    """Return the distance between the boxes of two solids, mm; 0 or less if they meet."""
     box_a, box_b = (np.array(solid.bounding_box()).reshape(2, 3) for solid in (a, b))
     return float(np.maximum(box_a[0] - box_b[1], box_b[0] - box_a[1]).max())
 
@@ -322,7 +322,7 @@ def box_gap(a: manifold3d.Manifold, b: manifold3d.Manifold) -> float:
 def lifted(
     assembled: Assembled, placed: PlacedPart, rises: Mapping[str, NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """Return by what (3,) in mm a part is lifted by the actuators under it."""
+    """Return the vector (3,), mm, by which the actuators under a part lift it."""
     lift = np.zeros(3)
     while placed.part.on is not None:
         if placed.part.at == "top":
@@ -332,7 +332,7 @@ def lifted(
 
 
 def carried(assembled: Assembled, name: str) -> set[str]:
-    """Return a part and all that hangs on it."""
+    """Return a part and everything fixed on it, directly or not."""
     names = {name}
     for part in assembled.parts:
         if part.part.on in names:
@@ -357,8 +357,8 @@ def manifold(surface: Surface) -> manifold3d.Manifold:
 
 
 def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
-    """A part that no elastic stack inflates, its pockets filled; one round a tube is the cylinder
-    that it becomes, free.
+    """A part without an elastic stack, its pockets filled; one around a tube is its free inflated
+    cylinder.
     """
     widest = None
     if placed.made is not None:
@@ -375,7 +375,7 @@ def as_it_is(placed: PlacedPart, lift: NDArray[np.float64]) -> Solids:
     return [round_it.transform(rows)]
 
 
-# The balloons of an inflated radial actuator as a surface, to be looked at.
+# The balloons of an inflated radial actuator as a surface, for display.
 
 
 ACROSS, ALONG, HALVINGS = 13, 17, 50
@@ -439,8 +439,8 @@ def _lens(pockets: Slots, height: float) -> Surface:
 
 
 def _half_angle(width: float, height: float) -> float:
-    """Half the angle of an arc of length ``width`` that rises half of ``height``, up to a circle's
-    quarter: height = width (1 - cos a) / a.
+    """Half the angle of an arc of length ``width`` and rise ``height`` / 2, up to a quarter circle:
+    height = width (1 - cos a) / a.
     """
     low, high = 1e-6, math.pi / 2
     for _ in range(HALVINGS):

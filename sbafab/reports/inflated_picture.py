@@ -48,7 +48,7 @@ EMPTY: RGB = (172, 205, 229)
 FULL: RGB = (244, 156, 62)
 """Films of the web, of a chamber without pressure, and of the fullest one."""
 PALEST = 0.4
-"""What of the colour a chamber shows at a tenth of the highest pressure, so that it is told."""
+"""Share of its colour that a chamber shows at a tenth of the highest pressure, to be visible."""
 MARGIN, FOOT = 0.06, 0.1
 GROUND = -0.06
 
@@ -57,10 +57,10 @@ GROUND = -0.06
 class PictureRequest:
     """The request for a picture.
 
-    ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, those not named 0; with "" for the
-    name, of all. ``elevation`` and ``azimuth`` in degrees are where the eye stands; ``width`` and
-    ``height`` in pixels. A moving picture goes from flat to there and back (``inflate``), or lets
-    the pressure go round the chambers (``circle``).
+    ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, 0 by default; the name "" means
+    all. ``elevation`` and ``azimuth`` of the eye are in degrees, ``width`` and ``height`` in
+    pixels. An animation goes from flat to this pose and back (``inflate``), or moves the pressure
+    around the chambers (``circle``).
     """
 
     pressures_kpa: Mapping[str, float]
@@ -74,7 +74,7 @@ class PictureRequest:
 
 
 def pose_of(laminate: Laminate, stack: Stack, wish: PictureRequest) -> Pose:
-    """The pose that a wish names. Raises DesignError for a chamber that is not there."""
+    """The pose of a request. Raises DesignError for an unknown chamber."""
     if wish.volumes_ul is not None:
         volumes = _by_chamber(laminate, wish.volumes_ul)
         empty = [c.name for c in laminate.chambers if not {"", c.name} & set(wish.volumes_ul)]
@@ -105,9 +105,9 @@ def write_picture(
     path: Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
-    """Writes ``path``, as what its ending says, and returns the pose shown.
+    """Writes ``path`` in the format of its suffix, and returns the pose shown.
 
-    Raises DesignError for an ending that is none of ENDINGS and for poses that cannot be.
+    Raises DesignError for a suffix not in ENDINGS and for impossible poses.
     """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -155,7 +155,7 @@ def animation(
     ending: str = ".gif",
     progress: Callable[[int, int], None] | None = None,
 ) -> bytes:
-    """Poses one after the other, for ever, as GIF or WebP."""
+    """Poses one after the other, in an endless loop, as GIF or WebP."""
     from PIL import Image
 
     shown = [(pose, inflated(laminate, stack, pose, COARSE)) for pose in poses]
@@ -173,7 +173,7 @@ def animation(
             method=4,
         )
         return out.getvalue()
-    # One palette for all: that of the first, the middle and the last third beside each other.
+    # One palette for all: from the first, the middle and the last third frame side by side.
     third = len(images) // 3
     sample = Image.new("RGB", (images[0].width, 3 * images[0].height))
     for place, image in enumerate((images[0], images[third], images[2 * third])):
@@ -194,7 +194,7 @@ def animation(
 
 
 def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
-    """Poses of a moving picture, which ends where it began."""
+    """Poses of an animation, which ends where it began."""
     turns = [number / wish.frames * math.tau for number in range(wish.frames)]
     poses: list[Pose] = []
     if wish.motion == "circle":
@@ -213,7 +213,7 @@ def _poses(stack: Stack, last: Pose, wish: PictureRequest) -> list[Pose]:
 
 
 def _swell(cosine: float) -> float:
-    """Part of the pressure by how far round a chamber is: full at 1, none from -0.5 on."""
+    """Share of the pressure by distance around from a chamber: full at 1, none from -0.5 on."""
     share: float = max(0.0, (cosine + 0.5) / 1.5) ** 1.5
     return share
 
@@ -226,7 +226,7 @@ def _images(
     progress: Callable[[int, int], None] | None = None,
     within: Sequence[Surface] = (),
 ) -> list[Image]:
-    """All poses seen from one place at one scale, at which the surfaces ``within`` fit too."""
+    """All poses seen from one place at one scale, which also fits the surfaces ``within``."""
     width, height = wish.width, wish.height
     box = MARGIN * width, MARGIN * height, (1 - MARGIN) * width, (1 - MARGIN - FOOT) * height
     every = [*within, *(part.surface for _, parts in shown for part in parts)]
@@ -244,7 +244,7 @@ def _images(
 
 
 def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
-    """The web's, or a chamber's by its part of the highest pressure."""
+    """The web's colour, or a chamber's by its share of the highest pressure."""
     if part.chamber is None:
         return WEB
     share = pose.pressures[part.chamber] / most if most > 0 else 0.0
@@ -289,16 +289,17 @@ def _write_glb(parts: Sequence[InflatedPart], pose: Pose, path: Path) -> None:
     )
 
 
-# Pictures of an actuator that no model inflates: flat, as PNG and as GLB for viewers.
+# Pictures of an actuator without a model for inflation: flat, as PNG and as GLB for viewers.
 
 
 WHY = "no model inflates pockets that are not nearly round, or stand round a tube"
 
 
 def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) -> None:
-    """Writes ``path``, as what its ending says: the solid before inflation, so named in a PNG.
+    """Writes ``path`` in the format of its suffix: the solid before inflation, so labelled in a
+    PNG.
 
-    Raises DesignError for the ending of a moving picture, and for one that is none of ENDINGS.
+    Raises DesignError for the suffix of an animation, and for one not in ENDINGS.
     """
     ending = path.suffix.lower()
     if ending in MOVING:
@@ -323,7 +324,7 @@ LAMP = (-0.42, 0.62, 0.66)
 """Direction to the light: right, up, toward the eye."""
 ENLARGED = 2
 CREVICES = ((0.35, 0.5), (1.2, 0.35))
-"""Radius in mm within which nearer surfaces shade a place, and by how much at most."""
+"""Radius in mm within which nearer surfaces shade a place, and the most by which they do."""
 EDGE_MM = 0.5
 """Jump in depth that is drawn as an edge."""
 EDGE = 0.72
@@ -343,9 +344,9 @@ class LitBody(NamedTuple):
 def rendered(
     bodies: Sequence[LitBody], view: View, width: int, height: int, ground: float
 ) -> Image:
-    """The bodies before white paper, over a plane z = ``ground`` mm that takes their shadow.
+    """The bodies on a white background, over a plane z = ``ground`` mm with their shadow.
 
-    ``view`` is of the picture ``width`` by ``height`` pixels.
+    ``view`` fits a picture of ``width`` by ``height`` pixels.
     """
     from PIL import Image
 
@@ -371,7 +372,7 @@ def rendered(
 
 
 def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
-    """By what part places are darkened that lie behind what is round them."""
+    """Darkening of pixels that lie behind their surroundings, as a share."""
     far = float(buffer.depth[buffer.body >= 0].min()) if (buffer.body >= 0).any() else 0.0
     depth = np.where(buffer.body < 0, far, buffer.depth)
     dark = np.zeros_like(depth)
@@ -382,7 +383,7 @@ def _crevices(buffer: Buffer, scale: float) -> NDArray[np.float64]:
 
 
 def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
-    """Means over squares about so many pixels wide, twice, for a soft edge."""
+    """Box means over squares about this many pixels wide, twice, for a soft edge."""
     half = max(1, round(pixels / 2))
     for _ in range(2):
         for axis in (0, 1):
@@ -396,7 +397,7 @@ def _blurred(values: NDArray[np.float64], pixels: float) -> NDArray[np.float64]:
 
 
 def _edges(buffer: Buffer) -> NDArray[np.bool_]:
-    """Pixels at which one body ends against another, or steps back far."""
+    """Pixels at which one body ends in front of another, or jumps in depth."""
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
     edges = np.zeros(depth.shape, dtype=bool)
     for axis in (0, 1):
@@ -422,7 +423,7 @@ def _shadow(
     hit = np.zeros(shape)
     near = np.exp(-rise[inside] / 12.0)
     np.maximum.at(hit, ((y[inside] // cell).astype(int), (x[inside] // cell).astype(int)), near)
-    # Points are sparse where triangles are large: the blur closes what lies between.
+    # Points are sparse where triangles are large: the blur closes the gaps.
     soft = _blurred(hit, SOFT_MM * view.scale / cell) * 2.2
     soft = _blurred(np.clip(soft, 0, 1), SOFT_MM * view.scale / cell)
     full = np.repeat(np.repeat(soft, cell, axis=0), cell, axis=1)[: size[1], : size[0]]

@@ -25,7 +25,7 @@ from sbafab.reports.drawing import (
     length,
 )
 
-PAGE = (420.0, 297.0)  # A3: the most a drawing may fill
+PAGE = (420.0, 297.0)  # A3: the largest drawing
 MARGIN = 10.0
 BLOCK, NOTE_ROW = 22.5, 4.2
 """Height of the title block with up to one note, and of every further one."""
@@ -123,7 +123,7 @@ def _count(count: int, noun: str) -> str:
 
 
 def _films(laminate: Laminate, pinned: bool, at: Point) -> list[str]:
-    """The key: films, and the marks of pins, seams and folds where there are any."""
+    """The key: films, and the marks of pins, seams and folds if there are any."""
     parts: list[str] = []
     films = dict.fromkeys(layer.film for layer in laminate.layers)
     for row, film in enumerate(films):
@@ -183,9 +183,9 @@ def _scale_bar(scale: float, end: Point) -> list[str]:
 
 
 MOST_NAMES = 3
-"""Seams that a caption names."""
+"""Most seams that a caption names."""
 PAST_FOLD = 3.0
-"""mm on the page by which a fold's line is drawn past the film."""
+"""Length by which a fold's line extends past the film, mm on the page."""
 CAPTION, LEFT, UNDER, PAD = 17.0, 11.0, 10.0, 3.0
 ROW = 4.8
 LEAD = 5.0
@@ -205,7 +205,7 @@ class CardFrame:
 
 @dataclass(frozen=True)
 class Card:
-    """One pattern with all that its drawing says; ``bounds`` holds phantom circles too.
+    """One pattern with all content of its drawing; ``bounds`` includes phantom circles.
 
     ``pins`` are the dowel pins that hold all its layers when they are laid; ``seams`` and ``folds``
     join any of its layers to others.
@@ -399,7 +399,7 @@ def _centre_mark(centre: Point, radius: float) -> list[str]:
 
 
 def _overall(card: Card, frame: CardFrame) -> list[str]:
-    """Width below and height at the left, outside everything that is drawn."""
+    """Width below and height at the left, outside the whole drawing."""
     profile = card.layers[0].profile
     low_x, low_y, high_x, high_y = profile.bounds
     x0, top = frame.at((low_x, high_y))
@@ -417,7 +417,7 @@ def _overall(card: Card, frame: CardFrame) -> list[str]:
 
 
 def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[str]:
-    """Words in a column at the right, each with a leader to what it measures."""
+    """Labels in a column at the right, each with a leader to its feature."""
     aims = sorted(((_aim(mark, frame), mark) for mark in card.marks), key=lambda item: item[0][1])
     rows = draw.spread([aim[1] for aim, _ in aims], ROW, *room)
     parts: list[str] = []
@@ -434,7 +434,7 @@ def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> list[
 
 
 def _aim(mark: Circle | WidthDimension, frame: CardFrame) -> Point:
-    """Return the point on the page toward which a mark pulls its words."""
+    """Return the point on the page that a mark's label should be near."""
     if isinstance(mark, WidthDimension):
         return min(frame.at(mark.start), frame.at(mark.end), key=lambda p: (-p[0], p[1]))
     if mark.phantom:
@@ -454,6 +454,6 @@ def _touch(mark: Circle, frame: CardFrame, elbow: Point) -> Point:
 
 
 def cells(cards: Sequence[Card], scale: float) -> Point:
-    """The cell that holds every card at this scale."""
+    """The cell size that holds every card at this scale."""
     sizes = [card.cell(scale) for card in cards]
     return max(size[0] for size in sizes), max(size[1] for size in sizes)

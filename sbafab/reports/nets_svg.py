@@ -1,4 +1,4 @@
-"""The nets of a laminate in colour, a plan of every interface, with the faults at their places."""
+"""The nets of a laminate in colour: a plan of every interface, with its faults marked."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from sbafab.rules.nets import Connectivity, NetFault, declared
 COLOURS = (
     *("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#b2a300", "#6a51a3"),
 )
-"""Of the nets in their order, from the ninth on again from the first. Most are the colours that
-M. Okabe and K. Ito (2008) chose to be distinct in colour blindness."""
+"""Colours of the nets in their order, repeated from the ninth on. Most are the colours that M.
+Okabe and K. Ito (2008) chose to be distinct in colour blindness."""
 NO_NET = "#bbbbbb"
 FAULT = "#c00000"
 WIDE = 180.0
@@ -28,7 +28,7 @@ RADIUS = 2.2
 
 @dataclass(frozen=True)
 class NetArea:
-    """A void of an interface, counted from 1, with its net, "" for none, and the net's colour.
+    """A void of an interface, counted from 1, with its net, "" if none, and the net's colour.
 
     ``nets`` are all nets that it belongs to: several are a short.
     """
@@ -115,7 +115,7 @@ def _plan(
 ) -> Sequence[str]:
     gap = laminate.interfaces[number - 1]
     areas = [area for area in shown.areas if area.interface == number]
-    # A void of two nets is filled in the one's colour and outlined in the other's.
+    # A void of two nets is filled in one colour and outlined in the other.
     edges = [shown.colours[area.nets[1]] if area.nets[1:] else "none" for area in areas]
     drawn = [
         f'<path d="{area.path}" fill="{area.colour}" fill-rule="evenodd" stroke="{edge}" '

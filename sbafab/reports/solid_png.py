@@ -1,7 +1,7 @@
 """preview/solid.png: the flat actuator in shaded 3D, cut open at one chamber.
 
-A laminate is a stack of prisms seen from above, so painting it from the bottom up hides exactly
-what is hidden; within one prism the walls go far to near, then its top face.
+A laminate is a stack of prisms seen from above, so painting it from the bottom up gives correct
+occlusion; within one prism the walls go far to near, then its top face.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sbafab.reports.canvas import Canvas, Tone, keyhole
 
 ELEVATION = math.radians(36.0)
 TURN = math.radians(62.0)
-"""How far the eye stands round from the face of the cut that runs through the inlet."""
+"""Angle of the eye from the face of the cut that runs through the inlet."""
 LIGHT = math.radians(-50.0)
 FACTORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30)
 HEIGHT_SHARE = 0.6
@@ -29,7 +29,7 @@ SAGITTA_PX = 0.4
 
 
 class Prism(NamedTuple):
-    """A region from ``z`` up by ``thickness`` (true mm); ``covered`` of its top is in shade."""
+    """A region from ``z`` up by ``thickness`` (true mm); its top is in shade where ``covered``."""
 
     name: str
     region: Region
@@ -58,7 +58,7 @@ class Camera(NamedTuple):
         )
 
     def lift(self, z: float) -> float:
-        """Pixels up the picture for a true height."""
+        """Pixels upward for a true height."""
         return z * self.rise
 
 
@@ -80,7 +80,9 @@ class Shape(NamedTuple):
 
 
 def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> bytes:
-    """The TPE solid, cut open at one chamber, as PNG; height exaggerated as its caption says."""
+    """The TPE solid, cut open at one chamber, as PNG; with the height exaggerated as stated in its
+    caption.
+    """
     laminate = parted(laminate)
     cut = cutaway(laminate)
     factor = _factor(laminate)
@@ -102,7 +104,7 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
 
 
 def _factor(laminate: Laminate) -> int:
-    """A round exaggeration that gives a pleasing height."""
+    """A round factor of exaggeration that gives a pleasing height."""
     breadth = math.sqrt(laminate.layers[-1].profile.area)
     most = HEIGHT_SHARE * breadth / laminate.thickness
     return max(step for step in FACTORS if step <= max(most, 1.0))

@@ -16,15 +16,15 @@ from sbafab.laminate.laminate import Inlet, Interface, Laminate, Layer, Pin
 from sbafab.reports import drawing as draw
 from sbafab.reports.drawing import BOND, length
 
-# The dowel pins that the section cuts: through which layers each stands, and in which steps.
+# The dowel pins that the section cuts: the layers each passes through, and its press steps.
 
 
 @dataclass(frozen=True)
 class Rod:
     """A pin in the plane of the section, from ``span`` start to end.
 
-    It holds layers ``stacks``, lowest and highest index of each stack that is pressed by itself,
-    and is in at the press steps ``steps``.
+    It holds the layers ``stacks``, the lowest and highest index of each stack pressed by itself,
+    and is in place at the press steps ``steps``.
     """
 
     name: str
@@ -80,13 +80,13 @@ def _stands(laminate: Laminate, pin: Pin) -> tuple[tuple[tuple[int, int], ...], 
 
 
 MOST_BALLOONS = 4
-"""Up to so many balloons are shown in full."""
+"""Most balloons shown in full."""
 BEYOND_LUMEN = 3.25
 
 
 @dataclass(frozen=True)
 class SectionSlab:
-    """A layer cut by the plane: where along it there is film."""
+    """A layer cut by the plane: the spans with film."""
 
     layer: Layer
     spans: tuple[Interval, ...]
@@ -94,21 +94,21 @@ class SectionSlab:
 
 @dataclass(frozen=True)
 class Joint:
-    """An interface cut by the plane: where along it the films are bonded."""
+    """An interface cut by the plane: the spans where the films are bonded."""
 
     interface: Interface
     spans: tuple[Interval, ...]
 
     @property
     def layer(self) -> int:
-        """Index of the layer in whose height it is drawn: a mask, or the film above."""
+        """Index of the layer at whose height it is drawn: a mask, or the film above."""
         masks = self.interface.masks
         return masks[0].index if masks else self.interface.above.index
 
 
 @dataclass(frozen=True)
 class FoldEnd:
-    """A fold cut by the plane, at ``s`` along it; its film lies ahead of it, or behind."""
+    """A fold cut by the plane, at ``s`` along it; its film is on the far or the near side."""
 
     lower: Layer
     upper: Layer
@@ -121,9 +121,9 @@ class StackSection:
     """The cut, in mm along the plane from the chamber's axis, positive toward its inlet.
 
     ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0 for none).
-    ``lumen`` is the axis of the actuator along the plane, where there is a lumen. ``cropped``
-    says that what lies beyond ``low`` is not shown. ``tab`` runs from the outline to its mouth.
-    ``is_bored``: the chamber's axis runs through bores.
+    ``lumen`` is the position of the actuator's axis along the plane, if it has a lumen.
+    ``cropped``: the section beyond ``low`` is not shown. ``tab`` runs from the outline to its
+    mouth. ``is_bored``: the chamber's axis runs through bores.
     """
 
     chamber: str
@@ -144,7 +144,7 @@ class StackSection:
 def chamber_section(laminate: Laminate) -> StackSection:
     """The section in the plane of the first chamber's axis and its inlet.
 
-    Without a chamber it is that along x through the first port.
+    Without a chamber it is the section along x through the first port.
     """
     name, origin = _axis(laminate)
     inlet = next((candidate for candidate in laminate.inlets if candidate.chamber == name), None)
@@ -153,7 +153,8 @@ def chamber_section(laminate: Laminate) -> StackSection:
     lumen = -(origin[0] * direction[0] + origin[1] * direction[1]) if laminate.lumen else None
     patterns = {layer.pattern: layer.profile for layer in layers}
     if not any(section(region, origin, direction) for region in patterns.values()):
-        # The chamber lies outside every layer: rule sealing names it, the picture has the films.
+        # The chamber lies outside every layer: rule sealing reports it, the picture shows the
+        # films.
         low_x, low_y, high_x, high_y = laminate.layers[0].profile.bounds
         origin = ((low_x + high_x) / 2, (low_y + high_y) / 2)
     cuts = {name: section(region, origin, direction) for name, region in patterns.items()}
@@ -189,7 +190,7 @@ def chamber_section(laminate: Laminate) -> StackSection:
 def _fold_ends(
     laminate: Laminate, slabs: Sequence[SectionSlab], origin: Point, direction: Point
 ) -> Iterator[FoldEnd]:
-    """Yield the folds that the plane meets, where the films shown end at them."""
+    """Yield the folds cut by the plane, if the films shown end at them."""
     spans = {slab.layer.index: slab.spans for slab in slabs}
     for fold in laminate.folds:
         (x, y), (u, v) = fold.line
@@ -220,7 +221,7 @@ def _tab(inlet: Inlet, origin: Point) -> Interval:
 
 
 def _shown(laminate: Laminate) -> tuple[tuple[Layer, ...], int, int]:
-    """Layers to show, how many balloons are left out, and above which layer."""
+    """The layers to show, the number of balloons left out, and the layer above which they are."""
     count = laminate.balloons
     if count <= MOST_BALLOONS:
         return laminate.layers, 0, 0
@@ -238,7 +239,7 @@ def _clipped(spans: Sequence[Interval], low: float) -> tuple[Interval, ...]:
 
 
 def opening(spans: Sequence[Interval], at: float) -> Interval | None:
-    """The opening between two spans that holds ``at``; None where ``at`` is covered or outside."""
+    """The opening between two spans that holds ``at``; None if ``at`` is covered or outside."""
     before = [end for _, end in spans if end <= at]
     after = [start for start, _ in spans if start >= at]
     if not before or not after or any(start < at < end for start, end in spans):
@@ -254,16 +255,16 @@ TALLEST_FILM = 8.0
 BREAK = 13.0
 ROW_STEP = 6.0
 SLIT = 0.18
-"""Share of the gap drawn open above and below a mask, so that one sees what does not bond."""
+"""Share of the gap drawn open above and below a mask, to show what does not bond."""
 EXAGGERATIONS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60, 80, 100)
 STEEL = "#ccd2d8"
 SEAM = 1.0
-"""mm on the page by which a bond without a gap is drawn high."""
+"""Height of a bond without a gap on the page, mm."""
 PAST = 2.0
-"""mm by which a pin's axis is drawn past its ends."""
+"""Length by which a pin's axis extends past its ends, mm."""
 
 SectionDimension = tuple[Interval, str]
-"""A stretch of the section to give the length of, and its name (may be empty)."""
+"""A stretch of the section to dimension, and its name (may be empty)."""
 
 
 @dataclass(frozen=True)
@@ -368,7 +369,7 @@ def _seam(joint: Joint, view: StackView) -> list[str]:
 
 
 def _fold(fold: FoldEnd, view: StackView) -> list[str]:
-    """The film that goes round from one half to the other, and the line of the fold."""
+    """The film that continues from one half to the other, and the line of the fold."""
     x, away = view.x(fold.s), -1.0 if fold.is_ahead else 1.0
     bottom = view.y(fold.lower.z, fold.lower.index)
     top = view.y(fold.upper.z + fold.upper.film.thickness, fold.upper.index)
@@ -447,7 +448,7 @@ def _breaks(view: StackView) -> list[str]:
 
 
 def _reach(section: StackSection) -> float:
-    """Return the distance by which the layers above the break go toward the inlet."""
+    """Return the shift of the layers above the break toward the inlet."""
     above = [s for s in section.slabs if s.layer.index > section.break_above]
     return max(end for slab in above for _, end in slab.spans)
 
@@ -599,7 +600,7 @@ def _legend(view: StackView, page: float) -> list[str]:
 
 
 def _bonding(films: Iterable[Film]) -> str:
-    """Return the material that flows into a gap: the structural film, if there is one alone."""
+    """Return the material that flows into a gap: the structural film if it is the only one."""
     structural = [film.material for film in films if not film.is_mask]
     return structural[0] if len(structural) == 1 else "the film that melts"
 
@@ -608,7 +609,7 @@ def _bonding(films: Iterable[Film]) -> str:
 
 
 class StackLabel(NamedTuple):
-    """Words for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
+    """Label for the place ``s`` along the section, ``z`` high in or beside a layer (its index)."""
 
     words: str
     s: float
