@@ -226,7 +226,7 @@ def _gap(arm: Solids, theirs: Solids) -> float:
 
 
 def _first(around: _Around, part: str, pressed: Sequence[int], pressure: float) -> Pose:
-    """Return approximately the first pose in contact with another part, on the way to a pressure."""
+    """Return approximately the first pose in contact with another part, up to a pressure."""
     low, high = min(SLIGHTEST, pressure / 2), pressure
     pose = _bent(around.arm_stack, pressed, high)
     for _ in range(HALVINGS):

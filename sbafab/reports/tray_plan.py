@@ -1,7 +1,7 @@
-"""tray.pdf: pages to print at 1:1, with a place for every part in the order in which it is laid.
+"""tray.pdf: pages to print at 1:1, with a place for every part in the order of laying.
 
-Each laminate of a press cycle has pages of its own, which all cycles use. Parts lie on their
-outlines, upper side up, so that a wrong or a missing one shows. Ours; not tried.
+Each laminate of a press cycle has its own pages, which all cycles reuse. Parts lie on their
+outlines, upper side up, so that a wrong or missing part is noticed. Ours; not tried.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from sbafab.pressing.schedule import layers_in_words
 from sbafab.reports.underlay import BAR, BLACK, CLOSE, FILM, GREY, MASK, PAPER, PdfPage, pdf
 
 SIDE, HEAD, FOOT = 12.0, 34.0, 12.0
-"""mm of the page that stay free: left and right, above and below."""
+"""Margins of the page: left and right, above and below, mm."""
 GAP, WORDS, HEADING = 2.5, 2.6, 3.4
 """mm between two places, and the sizes of labels and of a step's heading."""
 LABEL = 3.6
-"""mm of a place, below its part, for the label."""
+"""Height of a place's label below its part, mm."""
 LETTER = 0.58
-"""Mean width of a label's letter, of its size: a little more than Helvetica's digits have."""
+"""Mean width of a label's letters, in font sizes: slightly above Helvetica's digits."""
 MOST_NAMED = 8
-"""Serials of a place that stand in its heading; of more, the first and the last."""
+"""Up to this many serials of a place are in its heading; otherwise the first and the last."""
 
 
 @dataclass(frozen=True)
 class TrayPlace:
-    """A part on a page: where its frame's origin lies, mm from the page's lower left corner."""
+    """A part on a page: its frame's origin in mm from the page's lower left corner."""
 
     layer: Layer
     region: Region
@@ -40,7 +40,9 @@ class TrayPlace:
 
 @dataclass(frozen=True)
 class TraySheet:
-    """One page of a laminate: its size in mm, its parts, and each step's heading with its place."""
+    """One page of a laminate: its size in mm, its parts, and the heading of each step with its
+    position.
+    """
 
     size: tuple[float, float]
     places: tuple[TrayPlace, ...]
@@ -63,7 +65,7 @@ def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | No
 
 
 def tray_sheets(laminate: Laminate) -> tuple[TraySheet, ...]:
-    """Return the pages of one laminate; a part that is wider than the paper gets a wider page."""
+    """Return the pages of one laminate; a part wider than the paper gets a wider page."""
     steps = [*_laid(laminate)]
     boxes = [region.bounds for _, parts in steps for _, region in parts]
     wide = max(box[2] - box[0] for box in boxes) + 2 * SIDE
@@ -149,7 +151,7 @@ def _label(layer: Layer) -> str:
 
 
 def _width(layer: Layer, region: Region) -> float:
-    """Return the width of a place, mm: that of its part or of its label, if that is wider."""
+    """Return the width of a place, mm: the wider of its part and its label."""
     return max(region.bounds[2] - region.bounds[0], LETTER * WORDS * len(_label(layer)))
 
 
@@ -158,7 +160,7 @@ def _height(region: Region) -> float:
 
 
 def _place_words(runs: Runs, place: int, batch: str | None) -> str:
-    """Return which laminates use a page, in words; empty for a single one."""
+    """Return the laminates that use a page, as text; empty for a single one."""
     if runs.copies == 1:
         return ""
     last = runs.copies + 1
@@ -169,7 +171,7 @@ def _place_words(runs: Runs, place: int, batch: str | None) -> str:
 
 
 def _head(page: PdfPage, title: str) -> None:
-    """Title, use, and the bars that show whether the print has the right size."""
+    """Title, use, and the bars that check the size of the print."""
     top = page.height - 12
     page.text((SIDE, top), title, 4.4, bold=True)
     lines = (
@@ -191,7 +193,7 @@ def _head(page: PdfPage, title: str) -> None:
 
 
 def _drawn(sheet: TraySheet) -> PdfPage:
-    """Return what all laminates of a cycle share: the places with their labels."""
+    """Return the content common to all laminates of a cycle: the places with their labels."""
     page = PdfPage(*sheet.size)
     for at, words in sheet.headings:
         page.text(at, words, HEADING, bold=True)

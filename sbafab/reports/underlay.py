@@ -1,10 +1,10 @@
 """underlay.pdf: pages to print at 1:1 and to lay up on, below the release film; seams.pdf: the
-paths of seams on the films in hand.
+paths of seams on their films.
 
-It shows the edges of all that no pin holds, as it lies in the stack: seen from above, the axis of
-the actuator where the cross is. A cycle of many laminates that one page does not hold is spread
-over several, whole laminates on each: their dotted frames are cut out and laid edge to edge. Ours;
-how much steadier it makes a hand was not measured.
+It shows the edges of every layer without pins at its place in the stack, seen from above, with the
+actuator's axis at the cross. If a cycle of many laminates does not fit one page, it is spread over
+several, with whole laminates on each: their dotted frames are cut out and laid edge to edge. Ours;
+its effect on placement by hand was not measured.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ PAPER = (210.0, 279.4)
 PLATEN = (152.4, 152.4)
 """mm: the paper's heated area."""
 BAR = 100.0
-"""mm of the bars that show whether a print has the right size."""
+"""Length of the bars that check the size of a print, mm."""
 CLOSE = 0.3
-"""mm by which a bar may be off: at 15 mm from the middle the print is then 0.05 mm off."""
+"""Tolerance of a bar, mm: at 15 mm from the middle the print is then 0.05 mm off."""
 SIDE, HEAD = 25.0, 52.0
-"""mm of the page that stay free of the drawing: left and right, and above."""
+"""Margins of the page: left and right, and above, mm."""
 BEYOND = 8.0
-"""mm by which the cross reaches past the outermost line."""
+"""Length of the cross beyond the outermost line, mm."""
 FILM: Rgb = (0.05, 0.25, 0.55)
 MASK: Rgb = (0.85, 0.4, 0.0)
 GREY: Rgb = (0.55, 0.55, 0.55)
@@ -62,7 +62,7 @@ TRIM = (
 
 @dataclass(frozen=True)
 class Leaf:
-    """One page: its size in mm, and which places of a cycle lie on it, counted from 1.
+    """One page: its size in mm, and its places of a cycle, counted from 1.
 
     ``trim`` is the frame to cut out, in the frame of the places. ``is_plate``: it is the base
     plate's own edge, with its cut corner.
@@ -76,7 +76,7 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Guide:
-    """An outline to lay by: contours of films or masks, the patterns that have it, the steps."""
+    """An outline to align to: contours of films or masks, its patterns, the steps."""
 
     region: Region
     is_mask: bool
@@ -99,10 +99,10 @@ def underlay_pdf(
     places: Sequence[Point] = ((0.0, 0.0),),
     platen: tuple[float, float] = PLATEN,
 ) -> bytes | None:
-    """The pages; None for a laminate of which pins hold every part in every step.
+    """The pages; None for a laminate whose parts are all held by pins in every step.
 
-    They show the laminate at each of the ``places`` that it has in the press, and the edge of the
-    base plate, as large as the ``platen`` (mm), to be cut out along.
+    They show the laminate at each of its ``places`` in the press, and the edge of the base plate,
+    as large as the ``platen`` (mm), as a line to cut along.
     """
     outlines = guides(laminate)
     if not outlines:
@@ -124,11 +124,10 @@ def underlay_pdf(
 def leaves(
     laminate: Laminate, places: Sequence[Point], platen: tuple[float, float] = PLATEN
 ) -> tuple[Leaf, ...]:
-    """Return the places that lie on each page, whole rows and columns of them; none without a
-    guide.
+    """Return the places on each page, in whole rows and columns; empty without a guide.
 
-    A laminate that is itself larger than the paper gets a page as large as it takes. No page
-    reaches past the base plate, which is as large as the ``platen``.
+    A laminate larger than the paper gets a page that fits it. No page reaches past the base plate,
+    which is as large as the ``platen``.
     """
     outlines = guides(laminate)
     if not outlines:
@@ -160,7 +159,7 @@ def leaves(
 
 
 def _runs(steps: Sequence[float], size: float, room: float) -> list[list[float]]:
-    """Rows or columns page by page, as evenly as may be, at least one on each."""
+    """Rows or columns per page, as even as possible, at least one on each."""
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
     most = max(1, int((room - size) / pitch + 1 + 1e-9)) if pitch else 1
     pages = -(-len(steps) // most)
@@ -171,8 +170,8 @@ def _runs(steps: Sequence[float], size: float, room: float) -> list[list[float]]
 def _between(
     steps: Sequence[float], here: Sequence[float], box: Bounds, plate: Bounds, axis: int
 ) -> tuple[float, float]:
-    """From half-way to the page before to half-way to the next; at an end as far as the cross, or
-    the plate.
+    """From midway to the previous page to midway to the next; at an end up to the cross, or the
+    plate.
     """
     low, high = box[axis], box[axis + 2]
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
@@ -184,12 +183,12 @@ def _between(
 
 
 def _beyond(free: float) -> float:
-    """Return the reach of paper past what is drawn on it, with so much of the plate free there."""
+    """Return the margin of paper beyond the drawing, where that much of the plate is free."""
     return min(BEYOND, max(free, 0.0))
 
 
 def _foot(outlines: Sequence[Guide]) -> float:
-    """Room below the drawing for what its lines are, mm."""
+    """Room for the legend below the drawing, mm."""
     return 24 + ROW * (len(outlines) + len(NOTES))
 
 
@@ -201,7 +200,7 @@ def _draw(
     leaf: Leaf,
     plate: Contour,
 ) -> None:
-    """The laminates of a page, numbered where there are several, its trim frame in its middle."""
+    """The laminates of a page, numbered if there are several, with its trim frame in the middle."""
     box = _bounds(outlines)
     foot = _foot(outlines)
     x0, low, right, top = leaf.trim
@@ -237,10 +236,10 @@ def _laminate(page: PdfPage, laminate: Laminate, outlines: tuple[Guide, ...], sh
 
 
 def guides(laminate: Laminate) -> tuple[Guide, ...]:
-    """Return all that is laid by hand in any step, equal outlines once, in order of steps."""
+    """Return everything laid by hand in any step, equal outlines once, in order of steps."""
     shapes: dict[tuple[object, bool], tuple[Region, list[Layer], list[int]]] = {}
     parts = assembly(laminate)
-    # What is laid down again as one whole stack has no edge to lie by.
+    # A whole stack that is laid down again has no edge to align to.
     for step in (part for part in parts if part.adds):
         for bed in beds(parts, step):
             for layer in _loose(laminate, step, bed):
@@ -262,7 +261,7 @@ def guides(laminate: Laminate) -> tuple[Guide, ...]:
 
 
 def _loose(laminate: Laminate, step: AssemblyStep, bed: Bed) -> Iterator[Layer]:
-    """The layers whose edges show where a bed lies that no pin of the step holds."""
+    """The layers with visible edges where a part without a pin lies in the step."""
     layers = distinct_layers(laminate, bed.layers)
     pinned = [layer for layer in layers if set(step.pins) & set(laminate.pins_holding(layer))]
     if bed.made_in is None:
@@ -291,7 +290,7 @@ def _stroke(page: PdfPage, guide: Guide) -> None:
 
 
 def _cross(page: PdfPage, bounds: Bounds, shift: Point) -> None:
-    """Lines through the axis, seen past all that lies on the page."""
+    """Lines through the axis, extending past the page's content."""
     low_x, low_y, high_x, high_y = bounds
     x, y = shift
     page.stroke(GREY, THIN)
@@ -300,7 +299,7 @@ def _cross(page: PdfPage, bounds: Bounds, shift: Point) -> None:
 
 
 def _bars(page: PdfPage) -> None:
-    """A bar along each way of the page."""
+    """One bar along each direction of the page."""
     page.stroke(BLACK, THIN)
     y, x = page.height - HEAD + 8, 14.0
     x0, low = (page.width - BAR) / 2, page.height - HEAD - BAR
@@ -336,12 +335,12 @@ def _notes(page: PdfPage, outlines: tuple[Guide, ...], sha256: str, leaf: Leaf) 
     page.text((page.width - 46, y + ROW), f"design {sha256[:12]}", WORDS)
 
 
-# Paths of seams, on the films as they lie in hand.
+# Paths of seams on their films.
 
 
 SEAMS = "seams.pdf"
 START = 0.8
-"""mm: radius of the circle where a path begins."""
+"""Radius of the circle at the start of a path, mm."""
 SEAM_USE = (
     "Print at 100 % (“actual size”, not “fit to page”). Measure both bars: if either is not",
     f"{BAR:g} mm, {CLOSE:g} more or less, do not use this print. Lay the films over it, edges on",
@@ -353,8 +352,8 @@ SEAM_USE = (
 def seams_pdf(
     laminate: Laminate, design_sha256: str, offsets: Mapping[str, Point] | None = None
 ) -> bytes | None:
-    """Return pages of seam paths at 1:1, one for all seams of the same films in hand; None without
-    a seam. Paths lie where the seams are made, for tools with ``offsets`` too, which a line says.
+    """Return pages of seam paths at 1:1, one for all seams of the same films; None without a seam.
+    Paths are at the seams, also for tools with ``offsets``, which a line of text says.
     """
     steps: dict[tuple[int, ...], list[tuple[int, Seam]]] = {}
     for step in laying(laminate):
@@ -422,23 +421,23 @@ def _seam_page(
 
 # Pages of lines, curves and words as PDF, in millimetres and to scale.
 #
-# PDF 1.4 without compression, dates or fonts of its own: the same pages give the same bytes with
-# every version of every library. Arcs become Bezier curves that leave them by 5e-6 of their radius.
+# PDF 1.4 without compression, dates or embedded fonts: the same pages give the same bytes with
+# every version of every library. Arcs become Bezier curves, within 5e-6 of their radius.
 
 
 POINTS = 72 / 25.4
-"""Of a millimetre."""
+"""PDF points per mm."""
 MOST_SWEEP = math.pi / 4
 ENCODING = "cp1252"
-"""Of the fonts that every reader has."""
+"""Encoding of the fonts that every reader has."""
 Rgb = tuple[float, float, float]
 BLACK: Rgb = (0.0, 0.0, 0.0)
 
 
 class PdfPage:
-    """A page, its lower left corner at (0, 0); what is drawn later covers what was earlier.
+    """A page, its lower left corner at (0, 0); later elements cover earlier ones.
 
-    Below it lies what is drawn on the page ``under``, which several pages share.
+    The content of the page ``under``, which several pages may share, lies below.
     """
 
     def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
@@ -446,7 +445,7 @@ class PdfPage:
         self._drawn: list[str] = [f"{POINTS:.10f} 0 0 {POINTS:.10f} 0 0 cm 1 J 1 j"]
 
     def stroke(self, colour: Rgb, width: float, dashes: Iterable[float] = ()) -> None:
-        """Set colour, width and dashes (mm) of the lines that follow."""
+        """Set colour, width and dashes (mm) of the following lines."""
         shades = " ".join(map(coord, colour))
         on = " ".join(map(coord, dashes))
         self._drawn.append(f"{shades} RG {coord(width)} w [{on}] 0 d")
@@ -457,7 +456,7 @@ class PdfPage:
         self._drawn.append(" ".join(path))
 
     def chain(self, edges: Sequence[Edge], by: Point) -> None:
-        """An open line of straight edges and arcs, moved by so many mm."""
+        """An open line of straight edges and arcs, shifted by an offset in mm."""
         x, y = coord(by[0]), coord(by[1])
         path = [f"{_at(edges[0].start)} m", *map(_drawn, edges), "S"]
         self._drawn.append(f"q 1 0 0 1 {x} {y} cm {' '.join(path)} Q")
@@ -466,13 +465,13 @@ class PdfPage:
         self._drawn.append(f"{_at(start)} m {_at(end)} l S")
 
     def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
-        """Words that begin at a point, ``size`` mm; what Windows-1252 does not hold becomes "?"."""
+        """Words that begin at a point, ``size`` mm; characters outside Windows-1252 become "?"."""
         font = "F2" if bold else "F1"
         self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
     def objects(self, number: int, under: int | None = None) -> tuple[bytes, bytes]:
-        """The page and what is drawn on it, as objects of a file; the latter has this number, and
-        what is under it that one.
+        """The page and its content as PDF objects; ``number`` is the content's, ``under`` the
+        underlay's.
         """
         box = f"[0 0 {self.width * POINTS:.4f} {self.height * POINTS:.4f}]"
         contents = f"{number} 0 R" if under is None else f"[{under} 0 R {number} 0 R]"
@@ -483,12 +482,12 @@ class PdfPage:
         )
 
     def beneath(self) -> bytes:
-        """What is drawn, as an object that leaves the scale of the page as it was."""
+        """The page's content, as an object that leaves the scale of the page unchanged."""
         return _stream(["q", *self._drawn, "Q"])
 
 
 def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
-    """The whole file; a printer that obeys it prints at actual size."""
+    """The whole file, set to print at actual size."""
     font = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding >>"
     unders = list(dict.fromkeys(page.under for page in pages if page.under is not None))
     numbers = {under: 5 + 2 * len(pages) + n for n, under in enumerate(unders)}
@@ -516,7 +515,7 @@ def _stream(drawn: Sequence[str]) -> bytes:
 
 
 def _file(objects: Iterable[bytes]) -> bytes:
-    """Numbered objects with the table of where each begins; the last one is the file's title."""
+    """Numbered objects with the table of their offsets; the last one is the file's title."""
     data = bytearray(b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n")
     places = []
     for index, body in enumerate(objects, 1):

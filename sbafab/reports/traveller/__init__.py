@@ -1,1 +1,1 @@
-"""traveller.html: what the technician has at the laser and the press."""
+"""traveller.html: the technician's page at the laser and the press."""

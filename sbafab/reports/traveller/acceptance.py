@@ -1,4 +1,4 @@
-"""What follows the last joint: trimming, tubes, leak and proof tests, and wrapping round a tube."""
+"""After the last joint: trimming, tubes, leak and proof tests, and wrapping around a tube."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from sbafab.reports.traveller.job import Work
 from sbafab.reports.traveller.shapes import STATION, straight_run
 
 MOST_COPIES = 36
-"""Copies up to which each has a box."""
+"""Up to this many copies each has a box."""
 
 
 def values(work: Work) -> dict[str, Any]:
-    """Return what ``acceptance.html.j2`` prints."""
+    """Return the values for ``acceptance.html.j2``."""
     design, laminate = work.design, work.laminate
     masks = [mask for gap in laminate.interfaces for mask in gap.masks]
     filled, hours = _filled(work), cure_hours(design)
@@ -59,7 +59,7 @@ def values(work: Work) -> dict[str, Any]:
 
 
 def adhesive_words(work: Work) -> str:
-    """Return the adhesive of the tubes; a blank, and what it must bond, if none is stated."""
+    """Return the adhesive of the tubes; if none is stated, a blank and what it must bond."""
     films = work.laminate.glued_films
     adhesive = adhesive_for(work.design, films)
     if adhesive is not None:
@@ -69,9 +69,7 @@ def adhesive_words(work: Work) -> str:
 
 
 def _tab_films(work: Work) -> str:
-    """Return the two films that each tube of drawn layers goes between; empty where a tab has no
-    others.
-    """
+    """Return the two films around each tube of drawn layers; empty if a tab has no others."""
     laminate = work.laminate
     if not work.design.form.is_drawn or len(laminate.interfaces) == 1:
         return ""
@@ -88,7 +86,7 @@ def _tab_films(work: Work) -> str:
 
 
 def _upper_side(work: Work) -> str:
-    """Return words for the side of a tab that is marked."""
+    """Return the name of the marked side of a tab."""
     if not work.schedule.steps:
         return "the upper side, on which the highest layer lies"
     below = "the base is below"
@@ -98,7 +96,7 @@ def _upper_side(work: Work) -> str:
 
 
 def _depth(work: Work) -> str:
-    """Return how deep a tube goes into a tab, and how far the shortest drawn one runs straight."""
+    """Return how deep a tube goes into a tab, and the straight run of the shortest drawn one."""
     laminate = work.laminate
     length = min(inlet.length for inlet in laminate.inlets)
     if not work.design.form.is_drawn:
@@ -113,7 +111,7 @@ def _depth(work: Work) -> str:
 
 
 def _serials(work: Work) -> tuple[str, ...]:
-    """Return the serial of each copy of a batch, a box for each; none for one copy, or for many."""
+    """Return the serial of each copy of a batch, one box each; none for one copy, or for many."""
     count = work.copies
     if not 1 < count <= MOST_COPIES:
         return ()
@@ -121,7 +119,7 @@ def _serials(work: Work) -> tuple[str, ...]:
 
 
 def _boxes(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of boxes for each of several; a single one needs no name."""
+    """Return the labels of boxes, one for each of several; a single one needs none."""
     return tuple(names) if len(names) > 1 else ()
 
 
@@ -147,25 +145,26 @@ def _filled(work: Work) -> list[str]:
 
 
 SHARE = 0.6
-"""Of the estimated burst pressure, above which nothing is proved: ours."""
+"""Share of the estimated burst pressure that no proof test exceeds: ours."""
 USUAL_PROOF = Acceptance().proof_pressure_kpa
-"""kPa, below the burst pressure of the paper's film; it says nothing of another film."""
+"""kPa, below the burst pressure of the paper's film; it does not apply to other films."""
 STEP = 5.0
-"""kPa to which a lowered proof pressure is rounded down."""
+"""Step in kPa for rounding down a lowered proof pressure."""
 RAMP = 10
-"""Seconds in which the proof pressure is raised: ours."""
+"""Time for raising the proof pressure, s: ours."""
 
 
 class Proof(NamedTuple):
-    """The proof test's pressure in kPa (None: nobody can say), and where it comes from."""
+    """The proof test's pressure in kPa (None if unknown), and its source."""
 
     kilopascals: float | None
     basis: str
 
 
 def proof(work: Work) -> Proof:
-    """Return the pressure of the proof test: the kit's, or less for what would burst near it. Of a
-    film that nobody has burst it is what the kit or the design states in place of the usual one.
+    """Return the pressure of the proof test: the kit's, or less for an actuator that would burst
+    near it. For a film without a burst test it is the kit's or the design's own value, not the
+    default.
     """
     kit_pressure = work.design.acceptance.proof_pressure_kpa
     estimate = burst(work.laminate)
@@ -206,14 +205,16 @@ def leak_words(work: Work) -> str:
 
 
 def proof_words(work: Work) -> str:
-    """Return pressure and time of the proof test, a blank where nobody can say."""
+    """Return pressure and time of the proof test; a blank if unknown."""
     return (
         f"{units.plain(proof(work).kilopascals)} kPa for {work.design.acceptance.proof_seconds:g} s"
     )
 
 
 def fitting(work: Work) -> str:
-    """Return what joins tube and supply, with the bore of the tube where the kit knows it."""
+    """Return the connector between tube and supply, with the bore of the tube if the kit states
+    it.
+    """
     tube = kit_of(work.design).tubes.get(tube_name(work.design))
     bore = None if tube is None else tube.inner_diameter
     of = "" if bore is None else f" of {units.millimetres(bore)}"

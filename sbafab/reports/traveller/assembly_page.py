@@ -45,7 +45,7 @@ _NAMES = re.compile(r'(\b(?:id|aria-labelledby)="|\bhref="#|url\(#)')
 
 @dataclass(frozen=True)
 class DesignWork:
-    """One design of the assembly; ``folder`` leads to its files from the page."""
+    """One design of the assembly; ``folder`` is the path to its files from the page."""
 
     work: Work
     folder: str
@@ -61,9 +61,9 @@ class DesignWork:
 
 @dataclass(frozen=True)
 class AssemblyJob:
-    """The order behind an assembly's traveller; ``findings`` are those between parts.
+    """The order behind an assembly's traveller; ``findings`` are from checks between parts.
 
-    ``lowered`` are limits below the usual ones, of the checks between parts and of all designs.
+    ``lowered`` are limits below the defaults, for the checks between parts and for all designs.
     """
 
     assembled: Assembled
@@ -78,7 +78,7 @@ class AssemblyJob:
 
 
 def assembly_html(job: AssemblyJob) -> str:
-    """Return the whole page, each pattern named with the mark of its design."""
+    """Return the whole page, each pattern prefixed with the mark of its design."""
     job = _with_marks(job)
     name = job.assembled.assembly.name
     text = record_text(name, job.sha256, job.generator)
@@ -124,7 +124,7 @@ def assembly_html(job: AssemblyJob) -> str:
 
 
 def _chapter(design: DesignWork, number: int, mark: str) -> str:
-    """Return the chapter on one design, with ids that no other chapter has."""
+    """Return the chapter on one design, with ids unique on the page."""
     page: dict[str, Any] = context(design.work)
     page["shapes"] = definitions(pattern_regions(design.work.laminate))
     html = (
@@ -213,17 +213,17 @@ def _cautions(job: AssemblyJob) -> list[PageWarning]:
 
 
 def _bill(job: AssemblyJob) -> list[bill.Item]:
-    """Return films of all designs together, each design's other items, and what is bought."""
+    """Return the films of all designs together, each design's other items, and bought items."""
     items = _films(job)
     for design in job.works:
-        # Films are summed over the designs, and what a sheet is wrapped with is a part here.
+        # Films are summed over the designs; the tube under a wrapped sheet is a part here.
         items += [_named(item, design) for item in bill.bill(design.work) if item.kind == "other"]
     items += bought(job.assembled, job.assembled.assembly.order.copies)
     return list(dict.fromkeys(items))
 
 
 def _named(item: bill.Item, design: DesignWork) -> bill.Item:
-    """Return a design's item under its name."""
+    """Return a design's item labelled with the design's name."""
     return bill.Item(f"{item.name} ({design.name})", item.what, item.quantity)
 
 
@@ -280,7 +280,7 @@ def _marks(job: AssemblyJob) -> dict[str, str]:
 
 
 def _not_together(job: AssemblyJob) -> str:
-    """Return why unlike designs do not share the press; empty where there is only one."""
+    """Return why different designs do not share the press; empty for a single design."""
     if len(job.works) < 2:
         return ""
     sizes = [
@@ -321,8 +321,8 @@ def _times(job: AssemblyJob) -> list[bill.Time]:
 
 
 def _total_time(job: AssemblyJob, worked: float, cure: float, is_known: bool) -> bill.Time:
-    """Return the hours until all actuators can be tested, and what comes after; at least what is
-    known where press minutes are not.
+    """Return the hours until all actuators can be tested, and the work after that; a lower bound if
+    press minutes are unknown.
     """
     least, more = ("", "") if is_known else ("at least ", " and the press minutes")
     joints = sum(placed.part.on is not None for placed in job.assembled.parts)
@@ -372,7 +372,9 @@ def join_pages(assembled: Assembled) -> list[JoinPage]:
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
-    """Yield parts in building order; a line goes in while both ends of its lumen are in reach."""
+    """Yield parts in building order; a line is inserted while both ends of its lumen are in
+    reach.
+    """
     parts = assembled.parts
     for placed in parts:
         if placed.made is not None and placed.part.on is not None:
@@ -464,7 +466,7 @@ def _fix(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
 
 
 def _spot(placed: PlacedPart, carrier: PlacedPart) -> str:
-    """Return the place of a part's middle and the way the part is turned."""
+    """Return the position of a part's middle and the part's rotation."""
     part = placed.part
     x, y = part.offset
     if part.at == "outside":
@@ -475,7 +477,7 @@ def _spot(placed: PlacedPart, carrier: PlacedPart) -> str:
     if not (x or y or has_mark):
         return "axis on axis"
     if x or y:
-        # What is up on an upper face is down on a lower one, looked at from below.
+        # Up on an upper face is down on a lower one, seen from below.
         up = -y if _is_below(placed) else y
         sides = [_aside(x, "right", "left"), _aside(up, "up", "down")]
         words.append(f"its middle {' and '.join(filter(None, sides))}")
@@ -504,9 +506,9 @@ def _mark(placed: PlacedPart) -> str:
 
 
 def _heading(placed: PlacedPart, carrier: PlacedPart) -> str:
-    """Return the glued face of a part and the way its mark points: an SBA bends by its tabs."""
+    """Return the glued face of a part and the direction of its mark: an SBA bends by its tabs."""
     face = {"sba": "base", "tube": "start"}.get(placed.part.kind, "underside")
-    # On a lower face the part lies upside down, and is looked at from below.
+    # On a lower face the part is upside down and seen from below.
     turn = _angle(placed) + placed.turn
     turn += _angle(carrier) - 180 if _is_below(placed) else -_angle(carrier)
     turn = round(turn, 6) % 360
@@ -515,7 +517,7 @@ def _heading(placed: PlacedPart, carrier: PlacedPart) -> str:
 
 
 def _angle(placed: PlacedPart) -> float:
-    """Return the degrees from a part's x to its mark."""
+    """Return the angle in degrees from a part's x to its mark."""
     if placed.made is None:
         return 0.0
     x, y = placed.made.laminate.inlets[0].direction
@@ -553,8 +555,8 @@ def _bend(placed: PlacedSba, carrier: PlacedPart) -> Iterator[Action]:
 
 
 def _tab(placed: PlacedPart) -> str:
-    """Return the direction of chamber1's tab: at no turn round the tube, then on toward the tube's
-    end.
+    """Return the direction of chamber1's tab: without a turn around the tube, then toward the
+    tube's end.
     """
     turn = placed.part.turn % 360
     plain = {
@@ -609,7 +611,7 @@ def _glue(placed: PlacedPart, carrier: PlacedPart) -> Iterator[Action]:
 
 
 def _adhesive(placed: PlacedPart) -> str | None:
-    """Return the adhesive of a part; a sheet wrapped round its tube falls back on its design's."""
+    """Return the adhesive of a part; for a sheet wrapped around its tube, its design's."""
     wrap = None if placed.made is None else placed.made.design.form.wrap
     return placed.part.glue or (wrap.glue if wrap is not None else None)
 
@@ -645,13 +647,13 @@ def _supply(
 
 
 def _leak_pressures(actuators: Sequence[PlacedSba]) -> str:
-    """Return the leak tests' pressures, one number where the designs agree."""
+    """Return the leak tests' pressures, one number if the designs agree."""
     pressures = {actuator.made.design.acceptance.leak_pressure_kpa for actuator in actuators}
     return " or ".join(f"{pressure:g}" for pressure in sorted(pressures))
 
 
 def _castings(assembled: Assembled) -> list[str]:
-    """Return what must have cured before the day on which parts are joined."""
+    """Return what must have cured by the day of joining."""
     names = [placed.name for placed in assembled.parts if isinstance(placed.part, Cup)]
     cast = f"{joined_words(names)}: cast and cured as its section under Join the parts says."
     return [cast] if names else []
@@ -721,7 +723,7 @@ def _across(placed: PlacedSba) -> str | None:
 
 
 def bought(assembled: Assembled, copies: int) -> list[Item]:
-    """Return rows of the bill of materials for what is not cut from film."""
+    """Return rows of the bill of materials for everything not cut from film."""
     items = [item for placed in assembled.parts for item in _items(placed, copies)]
     if any(placed.made is not None and placed.made.laminate.inlets for placed in assembled.parts):
         items.append(THREAD)
@@ -733,11 +735,11 @@ def bought(assembled: Assembled, copies: int) -> list[Item]:
 
 
 POUR = 10.0
-"""ml of silicone that can be weighed and mixed well: ours."""
+"""Smallest amount of silicone that can be weighed and mixed well, ml: ours."""
 
 
 def _items(placed: PlacedPart, copies: int) -> Iterator[Item]:
-    """Yield what is bought for a part, and for a cup what it is cast from and in."""
+    """Yield bought items of a part, and for a cup its casting material and mould."""
     if placed.made is not None:
         return
     yield _item(placed, copies)

@@ -1,4 +1,4 @@
-"""The base plate and what goes with it: holes, pins, build-up, pad and release films."""
+"""The base plate and its accessories: holes, pins, build-up, pad and release films."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sbafab.reports.traveller import units
 from sbafab.reports.traveller.job import Work
 
 MOST_LISTED = 9
-"""Places of a plate up to which each is listed."""
+"""Up to this many places of a plate each is listed."""
 
 
 class PlateHole(NamedTuple):
@@ -37,7 +37,7 @@ class PlateHole(NamedTuple):
 
 
 class PlatePlace(NamedTuple):
-    """A further place of the plate: the shift of its holes from those of the first, mm."""
+    """A further place of the plate: the shift of its holes from the first place's, mm."""
 
     place: int
     x: float
@@ -50,9 +50,7 @@ def places(work: Work) -> list[PlatePlace]:
 
 
 def grid(work: Work) -> str:
-    """Return the places of a full plate in one sentence; empty where a list of them is short
-    enough.
-    """
+    """Return the places of a full plate in one sentence; empty if a short list names them."""
     every = work.runs.places
     if len(every) <= MOST_LISTED:
         return ""
@@ -66,7 +64,7 @@ def grid(work: Work) -> str:
 
 
 def holes(work: Work) -> list[PlateHole]:
-    """Return every hole of the plate's first place; films have the diameter ``films`` there."""
+    """Return every hole of the plate's first place; ``films`` are the holes' diameters in films."""
     laminate, press = work.laminate, work.design.press
     platen = press.platen
     corner_x, corner_y = plate_corner(laminate, platen, work.runs.places)
@@ -86,14 +84,14 @@ def holes(work: Work) -> list[PlateHole]:
 
 
 def size(work: Work) -> str:
-    """Return the base plate's size in words."""
+    """Return the base plate's size as text."""
     press = work.design.press
     low_x, low_y, high_x, high_y = whole_plate(work.laminate, press.platen, work.runs.places).bounds
     return units.size(high_x - low_x, high_y - low_y)
 
 
 def _sizes(hole: PinHole | None) -> tuple[str, str, str]:
-    """Return depth, push-out hole and pins of a hole, as the table has them."""
+    """Return depth, push-out hole and pins of a hole, as in the table."""
     if hole is None:
         return "not used", "", ""
     lengths = joined_words([f"{length:g}" for length in hole.lengths])
@@ -109,23 +107,23 @@ def has_underlay(step: Step) -> bool:
 
 
 def hot_prints(work: Work) -> int:
-    """Return the prints of the underlay that lie in the closed press, all cycles counted."""
+    """Return the number of underlay prints in the closed press, over all cycles."""
     return work.runs.count * sum(has_underlay(step) for step in work.schedule.steps)
 
 
 def prints(work: Work) -> int:
-    """Return the prints of the underlay that are needed: one a hot closing, one a tray."""
+    """Return the number of underlay prints needed: one per hot closing, one per tray."""
     return hot_prints(work) + trays(work)
 
 
 def trays(work: Work) -> int:
-    """Return the trays that films rest in between steps: one a cycle of several laminates."""
+    """Return the number of trays for films between steps: one per cycle of several laminates."""
     return work.runs.count if work.runs.together > 1 else 0
 
 
 def release_films(work: Work) -> int:
-    """Return the release films that all cycles need: two new ones each time the press closes on a
-    step, and one for films that are turned over.
+    """Return the release films for all cycles: two new ones each time the press closes on a step,
+    and one for films that are turned over.
     """
     return 2 * work.runs.count * len(work.schedule.steps) + turns_over(work)
 
@@ -139,7 +137,7 @@ RELEASE_FILM = "Release film"
 
 
 def items(work: Work) -> list[tuple[str, str, str, int]]:
-    """Return rows of the bill of materials: name, specification, quantity in words and number."""
+    """Return rows of the bill of materials: name, specification, quantity as text and as number."""
     laminate, plan = work.laminate, work.schedule
     if not plan.steps:
         return []
@@ -212,9 +210,9 @@ TAPE = "polyimide tape (silicone adhesive, rated 260 °C)"
 
 
 PUNCH_PLAY = 0.1
-"""mm by which the punch is thinner than the push-out hole."""
+"""Difference in mm between the push-out hole and the punch."""
 
 
 def punch(diameter: float) -> float:
-    """Return the diameter of the punch for pins of a diameter, mm."""
+    """Return the diameter of the punch for pins of this diameter, mm."""
     return round(push_out(diameter) - PUNCH_PLAY, 2)

@@ -20,7 +20,7 @@ from sbafab.reports.traveller.job import Action, Work
 from sbafab.reports.traveller.shapes import Picture, flat, label, pattern_id
 
 WIDEST = 110.0
-"""mm of the page that the platen takes."""
+"""Width of the platen's picture on the page, mm."""
 
 
 SORTING = (
@@ -42,7 +42,7 @@ class PatternRow:
 
 @dataclass(frozen=True)
 class CopyRow:
-    """The serial of a copy, and the cycle and the place in which it is pressed, from 1."""
+    """The serial of a copy, with its cycle and place in the press, from 1."""
 
     copy: int
     serial: str
@@ -110,7 +110,7 @@ def _summary(work: Work, runs: Runs) -> str:
 
 
 def _cycles_basis(work: Work, runs: Runs) -> str:
-    """Return why so many copies share a cycle, and where the work may pause."""
+    """Return why this many copies share a cycle, and where the work may pause."""
     sentences = [
         "Copies are alike layer by layer and share the pressure evenly (ours: the paper does not "
         "say how many it pressed at once)."
@@ -165,7 +165,7 @@ def _identity(work: Work) -> tuple[Action, ...]:
 
 
 def cycles_of(runs: Runs, size: int) -> str:
-    """Return the names of the cycles of a size, in words."""
+    """Return the names of the cycles of a size as text."""
     numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
     first, last = cycle_name(numbers[0]), cycle_name(numbers[-1])
     if len(numbers) == 1:
@@ -174,7 +174,7 @@ def cycles_of(runs: Runs, size: int) -> str:
 
 
 def _picture(work: Work, runs: Runs) -> str:
-    """Return the places on the base plate, numbered as they are laid."""
+    """Return the places on the base plate, numbered in the order of laying."""
     laminate = work.laminate
     plate = whole_plate(laminate, _platen(work), runs.places)
     low_x, low_y, high_x, high_y = plate.bounds

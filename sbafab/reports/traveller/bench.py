@@ -1,4 +1,4 @@
-"""bench.html: what is made, measured and read once for a bench; and practice that each page needs.
+"""bench.html: work and measurements done once per bench; and practice common to all pages.
 
 All of it is ours; the paper gives none.
 """
@@ -55,13 +55,12 @@ HOLDING: Mapping[HoldDown, str] = {
         "The vacuum stays on until the last part is picked up."
     ),
 }
-"""What holds a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
+"""Ways to hold a film under the beam, by ``laser.hold_tpe`` and ``laser.hold_ptfe``."""
 SILICONE = " PTFE hardly sticks to acrylic or rubber adhesives: the carrier's must be silicone."
 
 
 def before_cutting(works: Sequence[Work]) -> list[Action]:
-    """Return the actions before cutting: films come clean and flat under the beam, their parts are
-    held.
+    """Return the actions before cutting: films lie clean and flat under the beam, held in place.
 
     None of it was tried, and the actions say so.
     """
@@ -73,13 +72,13 @@ def _films(works: Sequence[Work]) -> list[Film]:
 
 
 def hold_down(work: Work, film: Film) -> HoldDown:
-    """Return how a film is held under the beam: masks as PTFE is, the others as TPE."""
+    """Return how a film is held under the beam: masks like PTFE, others like TPE."""
     laser = work.design.laser
     return laser.hold_ptfe if film.is_mask else laser.hold_tpe
 
 
 def _holding(works: Sequence[Work], film: Film) -> Action:
-    """Return the holding of one film on sheets of which each part comes free."""
+    """Return how a film is held on sheets whose parts all come free."""
     count, lightest = 0, math.inf
     for work in works:
         for layers in work.laminate.patterns.values():
@@ -112,7 +111,7 @@ def _holding(works: Sequence[Work], film: Film) -> Action:
 
 
 def after_cutting(works: Sequence[Work]) -> list[Action]:
-    """Return the actions by which parts leave the sheet clean, and none is lost."""
+    """Return the actions for taking parts off the sheet, clean and without losing any."""
     actions = [
         Action(
             "Wipe the soot off both faces of every part with isopropanol, let it dry: soot in a "
@@ -134,9 +133,7 @@ def after_cutting(works: Sequence[Work]) -> list[Action]:
 
 
 def _threading(works: Sequence[Work]) -> list[Action]:
-    """Return the trial on the pins that the rule pin-fit asks for; of the design that stretches
-    most.
-    """
+    """Return the trial on the pins required by rule pin-fit, for the design that stretches most."""
     tight = [
         (finding.measured, finding.limit or 0.0, work)
         for work in works
@@ -159,7 +156,7 @@ def _threading(works: Sequence[Work]) -> list[Action]:
 
 
 def _loose(work: Work) -> tuple[int, int]:
-    """Return the numbers of needed and spare pieces of masks that fall into several."""
+    """Return the numbers of needed and spare pieces of masks with several pieces."""
     loose = spare = 0
     for layers in work.laminate.patterns.values():
         pieces = len(layers[0].profile.pieces)
@@ -174,12 +171,12 @@ def _loose(work: Work) -> tuple[int, int]:
 
 
 MOST_RAISED = 5.0
-"""C by which the platens may be set hotter than the schedule says: ours."""
+"""Excess in C that the platens may have over the schedule's temperature: ours."""
 
 
 class HeatBlank(NamedTuple):
-    """A point of a step's time-temperature line, in words, with a blank for the time read; ``id``
-    tells that from the others.
+    """A point of a step's time-temperature line as text, with a blank for the time read; ``id``
+    identifies that blank.
     """
 
     point: str
@@ -188,7 +185,9 @@ class HeatBlank(NamedTuple):
 
 
 def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
-    """Return time-temperature line of a step, from the melting point to the end of its clock."""
+    """Return the time-temperature line of a step, from the melting point to the end of its
+    clock.
+    """
     return [
         HeatBlank(point.point, _heat_words(point, step, heating), f"heat-{step.step}-{number}")
         for number, point in enumerate(step.time_temperature, 1)
@@ -196,7 +195,7 @@ def heat_blanks(step: Step, heating: Heating) -> list[HeatBlank]:
 
 
 def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
-    """Return the point so short that three of them fit on one line of the page."""
+    """Return the point as a short text: three of them fit on one line of the page."""
     if point.point == END:
         return f"end ({units.minutes(step.minutes)} later)"
     name = "melting" if point.point == MELTING else point.point
@@ -206,7 +205,7 @@ def _heat_words(point: HeatPoint, step: Step, heating: Heating) -> str:
 
 
 def _constants(point: HeatPoint, heating: Heating) -> str:
-    """Return the time constants to a point of known temperature, in words."""
+    """Return the time constants to a point of known temperature, as text."""
     assert point.edge_c is not None
     return f"{heating.constants_to(point.edge_c):.2f} τ"
 
@@ -228,25 +227,25 @@ FILM_CLASSES = (
     FilmClass("ultra super low pressure", "LLLW", 200, 600),
     FilmClass("super low pressure", "LLW", 500, 2500),
 )
-"""Two-sheet films of Fujifilm Prescale, by the ranges that its maker lists as far as we know: the
-list was not opened, so the page has them compared with the box."""
+"""Two-sheet films of Fujifilm Prescale, by the ranges in its maker's list as far as we know: the
+list was not opened, so the page asks to compare them with the box."""
 COLD = "checks the pressure once, cold; compare this range with its box"
 
 
 def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
-    """Return the least and the largest pressure in kPa that any place of the films gets."""
+    """Return the least and the largest pressure in kPa anywhere on the films."""
     steps = [step for work in works for step in work.schedule.steps]
     low = min(min(step.film_kpa, step.bond_kpa, step.plate_kpa) for step in steps)
     return low, max(max(step.edge_kpa, step.film_kpa) for step in steps)
 
 
 def film_classes(low: float, high: float) -> list[FilmClass]:
-    """Return the fewest classes that cover a range in kPa, as far as classes do."""
+    """Return the fewest classes that cover a range in kPa, as far as possible."""
     return [film for film in FILM_CLASSES if film.low < high and film.high > low]
 
 
 def film_words(works: Sequence[Work]) -> str:
-    """Return which pressure-indicating film covers what the films get."""
+    """Return the pressure-indicating films that cover the pressures on the films."""
     low, high = pressure_range(works)
     classes = film_classes(low, high)
     names = joined_words(
@@ -265,14 +264,14 @@ def film_words(works: Sequence[Work]) -> str:
 TEMPLATE = "bench.html.j2"
 NAME = "bench.html"
 WANTED = 0.05
-"""Share to which a gauge should set the pressure: ours."""
+"""Accuracy of setting the pressure on a gauge, as a share: ours."""
 
 
 class BasePlatePage(NamedTuple):
-    """The base plate of a design: its file, how true its holes are made, their table.
+    """The base plate of a design: its file, the accuracy of its holes, and their table.
 
-    ``counted`` mm is what the rules count for it, ``coarse`` what they would for a CNC mill's;
-    ``command`` changes the design for that one, empty where its plate needs no better machine.
+    ``counted`` is the error in mm that the rules count for it, ``coarse`` for a CNC mill's plate;
+    ``command`` adapts the design to the latter, empty if its plate needs no better machine.
     """
 
     name: str
@@ -290,7 +289,7 @@ class BasePlatePage(NamedTuple):
 
 
 class Pressed(NamedTuple):
-    """A design's press steps, and what the force would be on its laminate alone."""
+    """A design's press steps, and the force on its laminate alone."""
 
     name: str
     steps: tuple[Step, ...]
@@ -304,7 +303,7 @@ def bench_html(
     works: Sequence[Work],
     further_tools: Sequence[Tool] = (),
 ) -> str:
-    """Return the page of what is done once for a bench, for all designs of a folder."""
+    """Return the page of work done once per bench, for all designs of a folder."""
     films = dict.fromkeys(layer.film for work in works for layer in work.laminate.layers)
     materials = list(dict.fromkeys(film.material for film in films))
     nominal = [name for name, _, measured in kerf_states(works[0].job, materials) if not measured]
@@ -331,8 +330,8 @@ def bench_html(
 
 
 def _trials(works: Sequence[Work]) -> dict[str, str]:
-    """Return the films, in words, whose bond and whose adhesive are to be tried: all that bond but
-    the paper's.
+    """Return the names of films whose bond and adhesive need a trial: all that bond, except the
+    paper's.
     """
     papers = [(PAPER_PRODUCT, PAPER_THICKNESS)]
     bonded = [film for work in works for film in films_without_minutes(work.laminate, papers)]
@@ -378,7 +377,7 @@ def _pressed(work: Work) -> Pressed:
 
 
 def _heat_and_force(works: Sequence[Work]) -> dict[str, Any]:
-    """Return what the page says of time, temperature and force."""
+    """Return the page's values on time, temperature and force."""
     first, heating = works[0].schedule.steps[0], works[0].schedule.heating
     points = {point.point: point for point in first.time_temperature}
     start, melting = points[START], points.get(MELTING)
@@ -410,7 +409,7 @@ def _after(point: HeatPoint, heating: Heating) -> str:
 
 
 LOUPE = "10x with a scale of 0.1 mm"
-"""Half a division is read; unaided, one minute of arc is 0.09 mm at 300 mm."""
+"""Readings are to half a division; by eye, one minute of arc is 0.09 mm at 300 mm."""
 
 
 class Tool(NamedTuple):
@@ -431,7 +430,7 @@ HOLDERS: Mapping[HoldDown, Tool] = {
 
 
 def tools(works: Sequence[Work]) -> list[Tool]:
-    """Return the tools, without what is used up."""
+    """Return the tools, without consumables."""
     laminates = [work.laminate for work in works]
     rows = [
         Tool("Laser or drag knife", "cuts the film sheets; exhaust on"),

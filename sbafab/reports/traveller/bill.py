@@ -1,4 +1,4 @@
-"""What a job takes: bill of materials, cut list, minutes, and notes on the cut files."""
+"""Requirements of a job: bill of materials, cut list, minutes, and notes on the cut files."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from sbafab.spreadsheet import csv_text
 class Item:
     """A row of the bill of materials.
 
-    ``quantity`` is in words, ``number`` what must be at hand, None where it is not counted;
-    ``area`` in m2 is that of all of them, where they are film. ``kind``: film that parts are cut
-    from, or what a sheet is wrapped round its tube with.
+    ``quantity`` is a text, ``number`` the count needed, None if it is not counted; ``area`` in m2
+    is the total area of film. ``kind``: film that parts are cut from, or the tube that a sheet is
+    wrapped around.
     """
 
     name: str
@@ -66,7 +66,7 @@ def bill_csv(work: Work) -> str | None:
 
 
 def bill(work: Work) -> list[Item]:
-    """Return all that must be at hand before the work starts, for all copies."""
+    """Return everything needed before the work starts, for all copies."""
     laminate, underlay = work.laminate, work.job.underlay
     items = [*_films(work)]
     if laminate.tube_count:
@@ -108,7 +108,7 @@ def bill(work: Work) -> list[Item]:
 
 
 def _underlay(work: Work, path: str) -> Item:
-    """Return the pages to print, and the paper where A4 and Letter are too small."""
+    """Return the pages to print, and the paper if A4 and Letter are too small."""
     spread = leaves(work.laminate, work.runs.places, work.schedule.steps[0].platen_mm)
     width, height = (max(leaf.size[axis] for leaf in spread) for axis in (0, 1))
     paper = "A4 or Letter"
@@ -167,7 +167,7 @@ class Cut:
 
 
 def cut_list(work: Work) -> list[Cut]:
-    """Return every pattern that is cut once, in the order of its first layer."""
+    """Return every pattern that is cut, once, in the order of its first layer."""
     return [
         _cut(work, layers)
         for layers in work.laminate.patterns.values()
@@ -205,9 +205,9 @@ def _cut(work: Work, layers: tuple[Layer, ...]) -> Cut:
 
 
 def _cut_length(work: Work, layer: Layer) -> float:
-    """Return the length of the beam's path round a layer, mm; of its edges where it is on no sheet.
+    """Return the length of the beam's path around a layer, mm; of its edges if it is on no sheet.
 
-    Equal pieces are one part of a nest, cut as many times more.
+    Equal pieces are one part of a nest with a higher count.
     """
     laminate = work.laminate
     profile = laminate.as_cut(layer) if laminate.folds else layer.profile
@@ -224,7 +224,7 @@ def _cut_length(work: Work, layer: Layer) -> float:
 
 
 def _spares(work: Work, layers: Sequence[Layer]) -> int:
-    """Return the number of a pattern's spares on the sheets."""
+    """Return the number of spares of a pattern on the sheets."""
     key = work.design.name, layers[0].pattern
     cut = sum(
         count
@@ -237,7 +237,7 @@ def _spares(work: Work, layers: Sequence[Layer]) -> int:
 
 
 def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool]]:
-    """Return each material, the words on the kerf of its cut files, and True if it was measured."""
+    """Return each material, the text on the kerf of its cut files, and True if it was measured."""
     states = []
     for material in materials:
         kerf = job.kerf.get(material)
@@ -252,7 +252,7 @@ def kerf_states(job: Job, materials: Sequence[str]) -> list[tuple[str, str, bool
 
 
 def kerf_notes(works: Sequence[Work]) -> list[str]:
-    """Return the kerf of the cut files, a line for films of which the same is known."""
+    """Return the kerf of the cut files, one line for films with the same text."""
     layers = (layer for work in works for layer in work.laminate.layers)
     materials = list(dict.fromkeys(layer.film.material for layer in layers))
     by_words: dict[str, list[str]] = {}
@@ -261,19 +261,19 @@ def kerf_notes(works: Sequence[Work]) -> list[str]:
     return [f"{joined_words(names)}: {words}" for words, names in by_words.items()]
 
 
-# Times, next to the paper's.
+# Times, beside the paper's.
 
 
 PAPER_MINUTES = 105.0
 """1.75 h for a 1-DoF or 3-DoF actuator (paper Sec. 4)."""
 CONNECT_MINUTES = 2.0
-"""Minutes to connect one tube to the test bench and free it again: ours."""
+"""Minutes to connect one tube to the test bench and disconnect it: ours."""
 CURE_HOURS = 24.0
-"""Hours in which the adhesive of the tubes cures where neither order nor kit says so: ours."""
+"""Curing time of the tubes' adhesive in hours if neither order nor kit states one: ours."""
 
 
 class Time(NamedTuple):
-    """A row of the time table: the work, its estimate, and what that is made of."""
+    """A row of the time table: the work, its estimate, and the estimate's parts."""
 
     what: str
     took: str
@@ -281,12 +281,12 @@ class Time(NamedTuple):
 
 
 def laser_minutes(work: Work) -> float:
-    """Return the minutes of laser of all sheets."""
+    """Return the laser minutes of all sheets."""
     return sum(sheet.minutes for sheet in work.sheets)
 
 
 def laser_basis(work: Work) -> str:
-    """Return lengths and speeds that the estimate of the laser's time assumes."""
+    """Return lengths and speeds behind the estimate of the laser's time."""
     laser = work.design.laser
     cut = sum(sheet.cut_length for sheet in work.sheets)
     travel = sum(sheet.travel for sheet in work.sheets)
@@ -314,7 +314,7 @@ def _batch(work: Work) -> list[Time]:
 
 
 def times(work: Work) -> list[Time]:
-    """Return the rows of the time table, the total last but for the paper's."""
+    """Return the rows of the time table; the total comes last but for the paper's."""
     plan = work.schedule
     rows = []
     if work.sheets:
@@ -332,7 +332,7 @@ def times(work: Work) -> list[Time]:
         metres = sum(seam.length_mm for seam in plan.seams)
         rows.append(Time("Seams", "", f"{metres:.0f} mm of path; nobody stated their speed"))
     rows += [*_batch(work), *_waiting_rows(work), total_time(work)]
-    # The paper's minutes are those of a stack of balloons.
+    # The paper's minutes are for a stack of balloons.
     if not work.design.form.is_drawn:
         took = units.whole_minutes(PAPER_MINUTES)
         basis = "1-DoF or 3-DoF: handling and press; nothing on warming, cooling, curing"
@@ -350,8 +350,8 @@ def _handling_basis(work: Work) -> str:
 
 
 class Waiting(NamedTuple):
-    """Minutes beside handling and press: ``warm`` before the clock of every step, ``cool`` after
-    it, ``cure`` and ``test`` of one copy.
+    """Minutes in addition to handling and press: ``warm`` before the clock of every step, ``cool``
+    after it, ``cure`` and ``test`` of one copy.
     """
 
     warm: float
@@ -403,8 +403,8 @@ def _waits(what: str, steps: int, each: float, basis: str) -> Time:
 
 
 def total_time(work: Work) -> Time:
-    """Return the hours that one actuator takes, and what they are made of; at least what is known
-    where the press minutes are not.
+    """Return the hours for one actuator, and their parts; a lower bound if the press minutes are
+    unknown.
     """
     plan = work.schedule
     each, row = waiting(work), "Total, one actuator"

@@ -18,14 +18,14 @@ from sbafab.rules.nets import connectivity
 from sbafab.rules.registration_yield import simulate
 
 ROUGHER = (0.5, 1.5, 2.0, 2.5)
-"""Times the hand that the design states."""
+"""Factors on the stated hand placement error."""
 BUILDS = 1000
-"""Enough for a slope: the interval of 95 % is 3 in a hundred at most."""
+"""Enough builds for a slope: the 95 % interval is at most 3 in a hundred."""
 
 
 class Hand(NamedTuple):
-    """A hand that shifts by up to ``placement`` mm and turns by up to ``turn`` degrees, and the
-    ``share`` of builds that keep every limit with it.
+    """A placement error of up to ``placement`` mm and ``turn`` degrees by hand, and the ``share``
+    of builds that keep every limit at it.
     """
 
     placement: float
@@ -34,12 +34,16 @@ class Hand(NamedTuple):
 
 
 def at_roughest(laminate: Laminate, limits: Limits) -> Measures:
-    """Return the places that the roughest hand can make narrow; they serve steadier hands too."""
+    """Return the margins that the largest placement error can violate; smaller errors use them
+    too.
+    """
     return Measures(laminate, _rougher(limits, ROUGHER[-1]))
 
 
 def rougher_hands(places: Measures, limits: Limits) -> tuple[Hand, ...]:
-    """Return the yields of steadier and rougher hands; empty if the roughest loses no build."""
+    """Return the yields at smaller and larger placement errors; empty if the largest loses no
+    build.
+    """
     roughest = _hand(places, places.limits)
     if roughest.share == 1:
         return ()
@@ -76,7 +80,9 @@ class Inspected:
 
 
 class _Chapter(NamedTuple):
-    """The page's chapter on one design; ``design_hand`` is the hand that the design states."""
+    """The page's chapter on one design; ``design_hand`` is the placement error that the design
+    states.
+    """
 
     name: str
     open: Sequence[Finding]
@@ -85,11 +91,11 @@ class _Chapter(NamedTuple):
     hands: Sequence[Hand]
     remedies: Sequence[str]
     nets: str
-    """A drawing of the nets with their faults; empty for a design that declares none."""
+    """A drawing of the nets with their faults; empty if the design declares none."""
 
 
 def findings_html(title: str, sha256: str, generator: str, inspected: Sequence[Inspected]) -> str:
-    """Return the whole page, a chapter for each design."""
+    """Return the whole page, with one chapter per design."""
     chapters = [_chapter(design) for design in inspected]
     page = frame(title, sha256, generator)
     return environment(HERE).get_template(TEMPLATE).render(**page, shapes="", chapters=chapters)
@@ -120,7 +126,7 @@ def _design_hand(inspected: Inspected) -> Hand | None:
 
 
 def _hands(inspected: Inspected) -> tuple[Sequence[Hand], Sequence[str]]:
-    """Return rougher hands and remedies; empty where the builds could not be counted."""
+    """Return larger placement errors and remedies; empty if the builds could not be counted."""
     if inspected.laminate is None or inspected.limits is None or _design_hand(inspected) is None:
         return (), ()
     places = at_roughest(inspected.laminate, inspected.limits)
@@ -129,7 +135,7 @@ def _hands(inspected: Inspected) -> tuple[Sequence[Hand], Sequence[str]]:
 
 
 def _remedies(places: Measures) -> Iterator[str]:
-    """Yield what leaves less to the hand, cheapest first."""
+    """Yield remedies that need less accuracy by hand, cheapest first."""
     yield (
         "Print underlay.pdf at 1:1 and lay up on it: its lines show where every edge goes that no "
         "pin holds. Nobody has measured how much steadier that makes a hand; the first row is for "

@@ -1,4 +1,4 @@
-"""The order behind a traveller, what its pages share, and a box to tick."""
+"""The order behind a traveller, values shared by its pages, and a box to tick."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHORT_HASH = 12
 
 
 def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
-    """Return the values that every page prints: style, head and foot."""
+    """Return the values common to all pages: style, head and foot."""
     short = sha256[:SHORT_HASH]
     return {
         "title": title,
@@ -35,7 +35,7 @@ def frame(title: str, sha256: str, generator: str) -> dict[str, Any]:
 
 
 def css_string(words: str) -> str:
-    """Return words as a CSS string that can neither end early nor leave the style element."""
+    """Return a text as a CSS string that cannot end early or leave the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'
 
 
@@ -43,9 +43,9 @@ def css_string(words: str) -> str:
 class Job:
     """The order behind a traveller.
 
-    ``kerf`` by material, None where it was not measured; ``fixture`` the path of the base plate's
-    cut file, ``underlay`` that of the page to lay up on, ``solid_png`` the bytes of the picture of
-    the solid. ``lowered`` are limits below the usual ones.
+    ``kerf`` is by material, None if it was not measured; ``fixture`` is the path of the base
+    plate's cut file, ``underlay`` of the page to lay up on, ``solid_png`` the bytes of the solid's
+    picture. ``lowered`` are limits below the defaults.
     """
 
     design_sha256: str
@@ -61,8 +61,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Work:
-    """A design with its laminate and its schedule, the ``sheets`` that hold all its copies, and its
-    order: all that its pages are made from.
+    """A design with its laminate, its schedule, the ``sheets`` for all copies, and its order: the
+    input of its pages.
     """
 
     design: Design
@@ -73,18 +73,20 @@ class Work:
 
     @property
     def copies(self) -> int:
-        """Number of actuators that are made."""
+        """Number of actuators to make."""
         return self.design.order.quantity
 
     @property
     def runs(self) -> Runs:
-        """The press runs of all copies."""
+        """The press cycles of all copies."""
         return design_runs(self.design, self.laminate)
 
 
 @dataclass(frozen=True)
 class Action:
-    """One thing to do. ``layers`` are laid in it; ``ticks`` label one box each, or there is one."""
+    """An action. ``layers`` are laid in it; ``ticks`` label one box each; without them there is one
+    box.
+    """
 
     text: str
     layers: tuple[int, ...] = ()

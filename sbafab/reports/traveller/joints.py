@@ -1,4 +1,4 @@
-"""Seams and folds on the technician's pages, in their order among the press steps."""
+"""Seams and folds on the technician's pages, in order among the press steps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sbafab.reports.traveller.shapes import flat as flat_matrix
 from sbafab.reports.underlay import SEAMS
 
 WIDEST = 90.0
-"""mm: the longer side of a picture on the page."""
+"""Longer side of a picture on the page, mm."""
 RIM, PAST_FOLD, NUMBER = 5.0, 3.0, 3.5
 """mm on the page: free round a picture, of a fold line past the part, and letters of numbers."""
 HOT_TIP = (
@@ -38,8 +38,8 @@ SEAM_INK, PATH_INK = "#d1495b", "#1a1a1a"
 
 @dataclass(frozen=True)
 class JointPage:
-    """One seam or fold as it stands on the page: ``dials`` by name, blanks where nobody stated a
-    value; ``picture`` is inline SVG.
+    """One seam or fold on the page: ``dials`` by name, with blanks for values that are not stated;
+    ``picture`` is inline SVG.
     """
 
     step: int
@@ -52,7 +52,7 @@ class JointPage:
 
 
 def joint_pages(work: Work) -> list[JointPage]:
-    """Return the seams and folds of a laminate, by the number of their step."""
+    """Return the seams and folds of a laminate, by step number."""
     pages = [*_seams(work), *_folds(work)]
     return sorted(pages, key=lambda page: page.step)
 
@@ -113,7 +113,7 @@ def _seam_actions(work: Work, step: SeamStep) -> Iterator[Action]:
 
 
 def _laid_for_a_seam(laminate: Laminate, step: SeamStep) -> Iterator[Action]:
-    """Yield the laying of a seam's films: over or under those in hand, or on the turned work."""
+    """Yield the laying of a seam's films: over or under the films so far, or on the turned work."""
     held = [index for index in step.layers if index not in step.adds]
     if step.from_below:
         yield Action(
@@ -131,7 +131,7 @@ def _laid_for_a_seam(laminate: Laminate, step: SeamStep) -> Iterator[Action]:
 
 
 def _upper_face_down(layer: Layer) -> str:
-    """Return which face of a layer is laid down on work that is turned over."""
+    """Return the face of a layer that is laid down when the work is turned over."""
     upper, lower = layer.faces
     if upper != lower:
         return f", {upper} face down"
@@ -139,7 +139,7 @@ def _upper_face_down(layer: Layer) -> str:
 
 
 def _start_words(laminate: Laminate, step: SeamStep, seam: Seam) -> str:
-    """Return where a path begins from the left and lower edge of the films as they lie in hand."""
+    """Return the start of a path from the left and lower edge of the films as they lie."""
     x, y = seam.path[0][0].start
     low_x, low_y, high_x, _ = _box([laminate.layer(index).profile for index in step.layers])
     if step.from_below:
@@ -182,10 +182,10 @@ def _folds(work: Work) -> Iterator[JointPage]:
 
 
 class _Opened(NamedTuple):
-    """Two halves of a film opened about their fold line, which lies along x through (0, 0).
+    """Two halves of a film unfolded about their fold line, which runs along x through (0, 0).
 
-    The lower half lies above the line on the page. ``lengths`` are those of the lower and the upper
-    half square to the line, mm, and ``ends`` words for where they end.
+    The lower half lies above the line on the page. ``lengths`` are of the lower and the upper half,
+    perpendicular to the line, mm; ``ends`` describe where they end.
     """
 
     fold: Fold
@@ -212,7 +212,7 @@ def _opened(laminate: Laminate, fold: Fold) -> _Opened:
 
 
 def _fold_picture(laminate: Laminate, flat: _Opened, name: str) -> str:
-    """Return the flat part from above: the fold line dash-dot, both halves' numbers and lengths."""
+    """Return the flat part from above: a dash-dot fold line, both halves' numbers and lengths."""
     low_x, low_y, high_x, high_y = _box(flat.halves)
     scale = min(WIDEST / max(high_x - low_x, high_y - low_y), 4.0)
     width, height = scale * (high_x - low_x) + 4 * RIM, scale * (high_y - low_y) + 2 * RIM
@@ -255,7 +255,7 @@ def _box(regions: Sequence[Region]) -> Bounds:
 
 
 def _picture(laminate: Laminate, step: SeamStep, seam: Seam) -> str:
-    """Return the films in hand as they lie, the seam as wide as it is, and its path."""
+    """Return the films as they lie, the seam at its width, and its path."""
     stack = [laminate.layer(index) for index in step.layers]
     words = f"Seam {step.seam} {'from below, turned over' if step.from_below else 'from above'}"
     low_x, low_y, high_x, high_y = _box([*(layer.profile for layer in stack), seam.region])

@@ -1,4 +1,4 @@
-"""Alignment of what is laid by hand: along which edge, or at which place of its sheet."""
+"""Alignment of layers laid by hand: along an edge, or at a place on their sheet."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from sbafab.reports.traveller import units
 from sbafab.reports.traveller.shapes import Bed
 
 STATION = 0.25
-"""mm between the points at which two edges are compared."""
+"""Spacing of the points at which two edges are compared, mm."""
 
 
 EQUAL = 0.02
-"""mm by which a distance may differ and still be the same to a hand."""
+"""Distances that differ by less than this are the same to a hand, mm."""
 
 
 class Lip(NamedTuple):
-    """Distance in mm by which an edge lies outside another, below 0 inside; ``all_round`` without
-    breaks.
+    """Distance in mm by which an edge lies outside another, below 0 inside; ``all_round`` if it
+    does so without breaks.
     """
 
     outside: float
@@ -37,7 +37,7 @@ class Lip(NamedTuple):
 class PiecePlace:
     """The place of a piece: mm from the lower left corner of its sheet.
 
-    ``x`` and ``y`` are those of the balloon's middle, ``left`` and ``low`` of the piece's edges.
+    ``x`` and ``y`` are of the balloon's middle, ``left`` and ``low`` of the piece's edges.
     """
 
     what: str
@@ -49,9 +49,7 @@ class PiecePlace:
 
 
 class Things:
-    """The things that a step lays, lowest first: single layers, and stacks of earlier steps as one
-    each.
-    """
+    """The items that a step lays, lowest first: single layers, and each stack of earlier steps."""
 
     def __init__(self, laminate: Laminate, lying: Sequence[Bed]) -> None:
         self.laminate = laminate
@@ -64,10 +62,11 @@ class Things:
         return self.things[0][0] == index
 
     def line_up(self, index: int, numbered: bool = True) -> str:
-        """Return along what the edge of a layer, or of the stack that it begins, is laid; empty for
+        """Return what the edge of a layer, or of the stack above it, is aligned with; empty for
         none.
 
-        It is what lies below, or above the lowest; a sheet's edges are too far off.
+        It is the edge below, or for the lowest layer the one above; a sheet's edges are too far
+        off.
         """
         place = next(i for i, thing in enumerate(self.things) if thing[0] == index)
         if len(self.things) < 2:
@@ -99,8 +98,8 @@ class Things:
 
 
 def face_down(layer: Layer) -> str:
-    """Return which face of a layer is laid down, ", tpu face down"; empty for a film laid as it
-    was cut whose faces do not differ.
+    """Return the face of a layer that is laid down, ", tpu face down"; empty for a film with equal
+    faces, laid as it was cut.
     """
     upper, lower = layer.faces
     if upper != lower:
@@ -109,9 +108,9 @@ def face_down(layer: Layer) -> str:
 
 
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
-    """Return the lowest separator mask among layers round one axis that reaches out to one side.
+    """Return the lowest separator mask among layers around one axis that reaches out to one side.
 
-    It does so over the inlet tab, under a balloon larger than those between. None without one.
+    It reaches out over the inlet tab, under a balloon larger than those between. None without one.
     """
     if len(laminate.chambers) != 1 or len(laminate.chambers[0].centres) > 1:
         return None
@@ -127,7 +126,7 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
 
 @cached
 def lip(region: Region, reference: Region) -> Lip | None:
-    """Return the distance between the outlines of two regions; None where it mostly varies."""
+    """Return the distance between the outlines of two regions; None if it mostly varies."""
     outline = Region(reference.outers)
     distances = []
     for contour in region.outers:
@@ -146,7 +145,7 @@ def lip(region: Region, reference: Region) -> Lip | None:
 
 
 def places(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed]) -> tuple[PiecePlace, ...]:
-    """Return the places of all that is laid on a sheet by hand; empty for steps without a sheet."""
+    """Return the places of everything laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
         return ()
@@ -190,8 +189,8 @@ def _middle(bounds: Bounds) -> Point:
 
 
 def _widest(laminate: Laminate, layers: Sequence[int], highest: bool) -> Layer:
-    """Return the layer whose outline is seen round all others, of several the highest or the
-    lowest.
+    """Return the layer whose outline is visible around all others; the highest or lowest of
+    several.
     """
     reach = {
         layer.pattern: round(sum(contour.area for contour in layer.profile.outers), 6)

@@ -1,7 +1,7 @@
 """traveller.html: one page that goes from the laser to the press and comes back with an actuator.
 
-Self-contained: style and pictures stand in it, nothing is fetched. Same input, same bytes: the
-date of a print is written by the browser that prints.
+Self-contained: style and pictures are inline, nothing is fetched. Same input, same bytes: the
+browser writes the date of a print.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ def traveller_html(work: Work) -> str:
 
 
 def context(work: Work) -> dict[str, Any]:
-    """Return the values that the templates print of one design."""
+    """Return the values of one design for the templates."""
     laminate, job = work.laminate, work.job
     text = record_text(laminate.name, job.design_sha256, job.generator)
     other_marks = _other_marks(work)
-    # A drawing's notes say how it is laid up; what other families note is to be trimmed.
+    # A drawing's notes concern its lay-up; other families' notes concern trimming.
     is_drawn = work.design.form.is_drawn
     notes = tuple(f"{note.rstrip('.')}." for note in laminate.notes)
     return {
@@ -110,7 +110,7 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def to_be_ready(works: Sequence[Work]) -> dict[str, Any]:
-    """Return what must be cut, printed and dry before films are laid up."""
+    """Return the preparations before the lay-up: cut, printed and dry."""
     pressed = [work for work in works if work.schedule.steps]
     underlaid = [work for work in works if work.job.underlay is not None]
     return {
@@ -122,14 +122,14 @@ def to_be_ready(works: Sequence[Work]) -> dict[str, Any]:
 
 
 def _turned(laminate: Laminate) -> str:
-    """Return the layers that are cut turned over, in words; none is so by a fold alone."""
+    """Return the layers that are cut turned over, as text; folds do not count."""
     roots = {laminate.cut_with(layer) for layer in laminate.layers if layer.turned}
     turned = [index for index in sorted(roots) if laminate.layer(index).turned]
     return layers_in_words(turned) if turned else ""
 
 
 def _legend(laminate: Laminate) -> list[tuple[str, str]]:
-    """Return the words and the hex code of each colour of the solid."""
+    """Return the name and the hex code of each colour of the solid."""
     structural = ", ".join(
         dict.fromkeys(film.material for film in films(laminate) if not film.is_mask)
     )
@@ -138,9 +138,7 @@ def _legend(laminate: Laminate) -> list[tuple[str, str]]:
 
 
 def _other_marks(work: Work) -> dict[str, str]:
-    """Return a letter for each other design that lies on the same sheets, so that labels stay
-    short.
-    """
+    """Return a letter for each other design on the same sheets, so that labels stay short."""
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
@@ -181,7 +179,7 @@ def _facts(work: Work) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class SheetRow:
-    """A sheet as it stands in the cut list; ``note`` tells how a long one is drawn."""
+    """A sheet of the cut list; ``note`` says how a long one is drawn."""
 
     sheet: SheetFile
     film: Film
@@ -196,7 +194,7 @@ class SheetRow:
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
 ) -> list[SheetRow]:
-    """Return the film sheets of a design; patterns go with the mark or the name of theirs."""
+    """Return the film sheets of a design; patterns carry the mark or the name of their design."""
     films = {film.material: film for film in design.films.stock.values()}
     rows = []
     for number, sheet in enumerate(sheets, 1):
@@ -226,7 +224,7 @@ def sheet_rows(
 
 @dataclass(frozen=True)
 class LayUpRow:
-    """One row of the lay-up table; ``repeat`` stands beside the first row of a round.
+    """One row of the lay-up table; ``repeat`` is printed beside the first row of a round.
 
     ``part`` names the part as it is sorted: a folded half is one with the lower half.
     """
@@ -278,28 +276,26 @@ def _round_rows(laminate: Laminate, pins_of: Mapping[int, str], turn: Round) -> 
     return rows
 
 
-# The QR code: which design this sheet of paper belongs to.
+# The QR code: the design that a printed page belongs to.
 
 
 QUIET = 4
-"""Modules left white round the code, as its standard asks."""
+"""Modules left white around the code, as its standard requires."""
 
 
 def code_text(name: str, design_sha256: str, generator: str) -> str:
-    """Return the code's plain text, a line each: name, checksum, generator; it links to nothing."""
+    """Return the code's plain text in three lines: name, checksum, generator; it holds no link."""
     return f"{name}\nsha256 {design_sha256}\n{generator}"
 
 
 def record_text(name: str, design_sha256: str, generator: str) -> str:
-    """Return the code's text for a design that is built, with the command that finds its build
-    records.
-    """
+    """Return the code's text for a built design, with the command that finds its build records."""
     text = code_text(name, design_sha256, generator)
     return f"{text}\nsbafab record --find {design_sha256[:12]}"
 
 
 def code_svg(text: str) -> str:
-    """Return the text as a QR code, inline SVG without a size of its own."""
+    """Return the text as a QR code, inline SVG without a fixed size."""
     import segno
 
     code = segno.make(text, error="m", micro=False)
@@ -310,7 +306,7 @@ def code_svg(text: str) -> str:
 
 
 class PageWarning(NamedTuple):
-    """A warning of a page: a short title, its text, and whether it is of one design alone."""
+    """A warning of a page: a short title, its text, and whether it concerns one design only."""
 
     title: str
     text: str
@@ -323,7 +319,7 @@ def cautions(work: Work) -> list[PageWarning]:
 
 
 def for_the_designer(findings: Iterable[Finding]) -> list[PageWarning]:
-    """Return a pointer to the rules' warnings, which nobody at the press can mend; empty without
+    """Return a pointer to the rules' warnings, which cannot be fixed at the press; empty without
     any.
     """
     rules = {finding.rule for finding in findings if finding.verdict == "warn"}

@@ -49,7 +49,7 @@ from sbafab.reports.traveller.step_pictures import INKS, build_up_svg, exploded,
 from sbafab.reports.underlay import guides
 
 MOST_LINES = 12
-"""Single layers up to which each has a line of its own."""
+"""Up to this many single layers each has its own line."""
 
 BONDS = {
     "flash": "Flash bond: the layers just barely stick together.",
@@ -60,14 +60,14 @@ LOOSE = "No bond: one film and masks, which nothing holds together."
 
 
 SETTLED = 1e-6
-"""mm by which an edge may lie off a circle round its pin, so that a turn about it moves nothing."""
+"""Largest distance of an edge from a circle around its pin for which a turn moves nothing, mm."""
 
 
 @dataclass(frozen=True)
 class StepPage:
-    """One press step as it stands on the page; pictures are inline SVG.
+    """One press step on the page; pictures are inline SVG.
 
-    ``places`` are those of pieces that are laid on a sheet by hand.
+    ``places`` are of pieces laid on a sheet by hand.
     """
 
     step: Step
@@ -121,7 +121,9 @@ def _dials(step: Step, together: int) -> tuple[tuple[str, str], ...]:
 
 
 class StepRow(NamedTuple):
-    """A row of the table of all steps: what is laid, the press's settings, what is held then."""
+    """A row of the table of all steps: the layers laid, the press's settings, and what holds
+    them.
+    """
 
     step: int
     parts: str
@@ -133,7 +135,7 @@ class StepRow(NamedTuple):
 
 
 def step_rows(work: Work) -> list[StepRow]:
-    """Return presses, seams and folds by their number, a row each."""
+    """Return presses, seams and folds by number, one row each."""
     plan = work.schedule
     parts = zip(assembly(work.laminate), plan.steps, strict=True)
     rows = [_press_row(work, part, step) for part, step in parts]
@@ -229,11 +231,11 @@ def every_step(work: Work) -> dict[str, Any]:
 
 
 SLIPPED = {True: "down on its pin", False: "to its edge"}
-"""Where a mask that has slipped is pushed, in steps with pins and without."""
+"""Direction in which a slipped mask is pushed, in steps with pins and without."""
 
 
 class BuildUp(NamedTuple):
-    """A build-up between the platens as a picture, and the steps that have it."""
+    """A build-up between the platens as a picture, and its steps."""
 
     steps: str
     picture: str
@@ -254,7 +256,7 @@ def build_ups(work: Work) -> list[BuildUp]:
 
 
 def _pin_count(step: Step, together: int) -> str:
-    """Return the pins that stand in the plate, at each of the places pressed together."""
+    """Return the pins in the plate, at each of the places pressed together."""
     if not step.pins:
         return "none"
     return f"{len(step.pins)} in" if together == 1 else f"{len(step.pins)} at each place"
@@ -290,7 +292,7 @@ def _bond(work: Work, part: AssemblyStep) -> str:
 
 
 def _notes_of_design(work: Work, part: AssemblyStep) -> tuple[str, ...]:
-    """Return what a drawn design has to say of its lay-up, in the first press step."""
+    """Return the notes of a drawn design on its lay-up, in the first press step."""
     first = assembly(work.laminate)[0]
     if not work.design.form.is_drawn or part.number != first.number:
         return ()
@@ -298,14 +300,14 @@ def _notes_of_design(work: Work, part: AssemblyStep) -> tuple[str, ...]:
 
 
 def _is_loose(work: Work, part: AssemblyStep) -> bool:
-    """Return True for a flash bond of one drawn film and masks that no pin holds."""
+    """Return True for a flash bond of one drawn film and masks without pins."""
     films = [index for index in part.layers if not work.laminate.layer(index).is_mask]
     is_held = part.bond != "flash" or bool(part.pins) or len(films) > 1
     return work.design.form.is_drawn and not is_held
 
 
 def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
-    """Return notes on a step that bonds nothing, and on what the step after it lays instead."""
+    """Return notes on a step that bonds nothing, and on what the next step lays instead."""
     loose = {p.layers: p.number for p in assembly(work.laminate) if _is_loose(work, p)}
     if part.layers in loose:
         return (
@@ -322,8 +324,8 @@ def _loose_notes(work: Work, part: AssemblyStep) -> tuple[str, ...]:
 
 
 def _plate(part: AssemblyStep, is_underlaid: bool) -> Action:
-    """Return the laying of base plate and pins, and of the release film unless an underlay comes
-    first.
+    """Return the laying of base plate and pins, and of the release film unless an underlay
+    precedes.
     """
     text = "Base plate down, cold, cut corner at the back right"
     if part.pins:
@@ -335,9 +337,9 @@ def _plate(part: AssemblyStep, is_underlaid: bool) -> Action:
 
 
 def _underlay(work: Work, part: AssemblyStep) -> list[Action]:
-    """Return the printed page below the release film, in steps in which it has a line to lay by.
+    """Return the printed page below the release film, in steps with a line to align to.
 
-    One print lies in one hot cycle: paper dries and shrinks, and a worn line is no line.
+    A print is used for one hot cycle: paper dries and shrinks, and lines wear.
     """
     patterns = [
         pattern
@@ -363,7 +365,7 @@ def _underlay(work: Work, part: AssemblyStep) -> list[Action]:
 def _actions(
     work: Work, part: AssemblyStep, step: Step, lying: Sequence[Bed], runs: Runs
 ) -> Iterator[Action]:
-    """Yield a step's actions; what it is laid up on comes between base plate and release film."""
+    """Yield a step's actions; lay-up aids come between base plate and release film."""
     laminate = work.laminate
     things = Things(laminate, lying)
     laid = _underlay(work, part)
@@ -384,7 +386,7 @@ def _actions(
 
 
 def closing(work: Work, step: Step) -> Action:
-    """Return cover and start of the clock; a box for each cycle of a batch that has a few."""
+    """Return cover and start of the clock; one box per cycle of a small batch."""
     cycles = tuple(f"cycle {cycle_name(n)}" for n in range(1, work.runs.count + 1))
     return Action(
         f"Cover and close the press. Start the clock, {units.minutes(step.minutes)}, only when the "
@@ -424,7 +426,7 @@ def _lay(things: Things, bed: Bed, pins: Sequence[Pin]) -> Iterator[Action]:
 
 
 def _lay_round(things: Things, turn: Round, pins: Sequence[Pin]) -> Action:
-    """Return the laying of a round with one box for every turn, so that nobody loses count."""
+    """Return the laying of a round with one box per turn, to keep count."""
     order = ", then ".join(_named(layer) for layer in turn.turns[0])
     size = len(turn.places)
     often = f"{turn.count} times the same {size}, lowest first" if size > 1 else "all alike"
@@ -437,7 +439,7 @@ def _lay_round(things: Things, turn: Round, pins: Sequence[Pin]) -> Action:
 
 
 def _lay_many(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> Action:
-    """Return the laying of many layers that do not repeat, short enough for the step's page."""
+    """Return the laying of many layers without repetition, short enough for the step's page."""
     return Action(
         f"Lay layers {layers[0].index} to {layers[-1].index} one by one, lowest first."
         + _by_eye(things, layers, pins),
@@ -447,14 +449,14 @@ def _lay_many(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> A
 
 
 def _by_eye(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> str:
-    """Return sentences on those of the layers that no pin in the plate holds, or one alone."""
+    """Return sentences on layers that no pin in the plate holds, or one pin alone."""
     if not pins:
         return "".join(_along(things, layer) for layer in layers[:1])
     hands = {layer.pattern: _hand(things.laminate, layer, pins) for layer in layers}
     # A pattern may lie on a larger film here and on a smaller one there.
     lines: dict[str, dict[str, list[int]]] = {}
     for layer in layers:
-        # The lowest on a step's only pin gives the angle that the others are turned to.
+        # The lowest layer on a step's only pin sets the angle that the others are aligned to.
         gives_the_angle = len(pins) == 1 and things.is_lowest(layer.index)
         hand = hands[layer.pattern]
         if hand == "lay" or (hand == "turn" and not gives_the_angle):
@@ -471,7 +473,7 @@ def _by_eye(things: Things, layers: Sequence[Layer], pins: Sequence[Pin]) -> str
 
 
 HandTask = Literal["none", "turn", "lay"]
-"""What of a layer the hand decides beside its pins: nothing, its angle, its place."""
+"""What the hand decides about a layer on its pins: nothing, its angle, its place."""
 HAND_WORDS: Mapping[HandTask, tuple[str, str]] = {
     "lay": ("No pin holds", "lay by eye"),
     "turn": ("One pin holds", "turn by eye"),
@@ -479,8 +481,8 @@ HAND_WORDS: Mapping[HandTask, tuple[str, str]] = {
 
 
 def _hand(laminate: Laminate, layer: Layer, pins: Sequence[Pin]) -> HandTask:
-    """Return what a layer on these pins leaves to the hand; a disc turned on its pin is the same
-    disc.
+    """Return what the hand decides about a layer on these pins; a disc turned on its pin is
+    unchanged.
     """
     held = [pin for pin in pins if pin in laminate.pins_holding(layer)]
     if not held:
@@ -501,15 +503,13 @@ def _is_round(outline: Region, centre: Point) -> bool:
 
 
 def _along(things: Things, layer: Layer) -> str:
-    """Return a sentence on the edge along which a layer, or the stack over it, is laid."""
+    """Return a sentence on the edge that a layer, or the stack above it, is aligned with."""
     line = "" if things.is_lowest(layer.index) else things.line_up(layer.index)
     return f" Lay {line}." if line else ""
 
 
 def _turned(laminate: Laminate, layers: Sequence[int]) -> str:
-    """Return the turn of a round stack of which a mask reaches out over the inlet tab; empty for
-    none.
-    """
+    """Return the turn of a round stack whose mask reaches over the inlet tab; empty for none."""
     mask = over_tab(laminate, layers)
     if mask is None:
         return ""
@@ -545,7 +545,7 @@ def _product(laminate: Laminate, part: AssemblyStep) -> str:
     return f"{stack}; {keep} this side up"
 
 
-# Taking down, after the press has opened. The order is ours; the paper gives none.
+# Taking down, after the press opens. The order is ours; the paper gives none.
 
 
 CELL, HIGH, WORDS = 35.0, 24.0, 2.2
@@ -554,14 +554,14 @@ PIN = "#6d737c"
 
 @dataclass(frozen=True)
 class TakingDown:
-    """The order of taking down, once for all steps: a picture and its numbered sentences."""
+    """The order of taking down, common to all steps: a picture and its numbered sentences."""
 
     picture: str
     lines: tuple[str, ...]
 
 
 def order_of(steps: Sequence[Step]) -> TakingDown:
-    """Return order of taking down after every press step, by the numbers that the steps name."""
+    """Return the order of taking down after every press step, by the numbers that the steps use."""
     pinned = any(step.pin_settings for step in steps)
     lines = [
         "Take plate, films and pad out together, level: all are hot. Pad off first, straight up. "
@@ -591,9 +591,9 @@ def order_of(steps: Sequence[Step]) -> TakingDown:
 
 
 def taking_down(step: Step, product: str, is_pinned: bool) -> Iterator[Action]:
-    """Yield the boxes to tick of one step, from the opening of the press to the ``product``.
+    """Yield one step's boxes to tick, from the opening of the press to the ``product``.
 
-    ``is_pinned``: some step of the design has pins, and the order five numbers, not three.
+    ``is_pinned``: a step of the design has pins, so the order has five numbers, not three.
     """
     last = 5 if is_pinned else 3
     yield Action("All out together, hot. Pad off (1); let it cool; upper release film off (2).")
@@ -618,7 +618,7 @@ def _punches(step: Step) -> str:
 
 
 def _soft(step: Step) -> str:
-    """Return the soft support of the films while pins are pushed into it."""
+    """Return the soft support under the films while pins are pushed into it."""
     top = step.top_mm
     out = max(pin.stands_mm + pin.tolerance_mm - top + pin.seat_mm for pin in step.pin_settings)
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD)

@@ -1,4 +1,4 @@
-"""The fields of a device's history, and the tables of a design's record page: paper and form."""
+"""Fields of a device's history, and tables of a design's record page, on paper and as a form."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sbafab.pressing.schedule import Schedule, SeamStep, Step
 
 ADHESIVE = "adhesive"
 TESTS = ("leak test", "proof test", "device")
-"""Steps after the press; the last decides on the whole device."""
+"""Steps after the press; the last one decides on the whole device."""
 
 
 class HistoryField(NamedTuple):
@@ -41,7 +41,7 @@ HISTORY_FIELDS = (
     HistoryField("note", "Note", 18, "Free text."),
     HistoryField("initials", "Initials", 5, "Who did it."),
 )
-"""In the order of the page, of the form and of a table's columns."""
+"""In the order of the page, the form and a table's columns."""
 MATERIAL_FIELDS = ("item", "lot", "expires", "kerf_mm", "initials")
 PRESS_FIELDS = (
     *("step", "temperature_c", "press_force_n", "minutes"),
@@ -51,9 +51,9 @@ DEVICE_FIELDS = ("step", "decision", "reason", "photograph", "note", "initials")
 
 
 class RecordTable(NamedTuple):
-    """A table of the record page: title, fields, and rows with what is printed in them.
+    """A table of the record page: title, fields, and rows with their printed text.
 
-    ``rows`` have the words of each row by field; ``nominal`` the set values of a row.
+    ``rows`` have the text of each row by field; ``nominal`` the set values of a row.
     """
 
     title: str
@@ -95,7 +95,7 @@ def _table(
 
 
 def _nominal(step: Step | SeamStep) -> str:
-    """Return the values that the schedule sets, in words."""
+    """Return the values set by the schedule, as text."""
     heat = "" if step.temperature_c is None else f"{step.temperature_c:g} °C"
     if isinstance(step, SeamStep):
         return heat
@@ -104,4 +104,4 @@ def _nominal(step: Step | SeamStep) -> str:
 
 
 TESTS_TABLE = _table("Tests", DEVICE_FIELDS, "step", TESTS, ["" for _ in TESTS])
-"""The part of the record page that is the same for every device."""
+"""The part of the record page common to all devices."""

@@ -1,8 +1,7 @@
-"""Shared parts of the page's pictures: pattern outlines, labels, rounds of layers, stacks of a
-step.
+"""Shared parts of the page's pictures: pattern outlines, labels, rounds of layers, steps' stacks.
 
-Pictures are inline SVG in millimetres. Masks are hatched as well as coloured, so that a grey print
-still tells them from structural films.
+Pictures are inline SVG in millimetres. Masks are hatched as well as coloured, so that they differ
+from structural films in a grey print.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from sbafab.markup import escape, quoteattr
 from sbafab.reports import drawing as draw
 
 LINE = 0.22
-"""Width in mm on the page of the outline of a part."""
+"""Width of a part's outline on the page, mm."""
 THUMB = (24.0, 12.5)
 HATCH_STEP = 1.3
 PLATE = "#f1f1ef"
 
 
 def definitions(regions: Iterable[tuple[str, Region]]) -> str:
-    """Return the outlines that pictures refer to by id, in a picture that takes no room."""
+    """Return the outlines that pictures refer to by id, in a picture of zero size."""
     paths = (
         f'<path id="{name}" d="{path_data(region)}" fill-rule="evenodd"/>'
         for name, region in regions
@@ -38,7 +37,7 @@ def definitions(regions: Iterable[tuple[str, Region]]) -> str:
 
 
 def pattern_id(pattern: str) -> str:
-    """Return the id of a pattern's outline; "A P03" has a space, which an id has not."""
+    """Return the id of a pattern's outline; "A P03" has a space, which ids must not have."""
     return f"shape-{pattern.replace(' ', '-')}"
 
 
@@ -51,14 +50,14 @@ def pattern_regions(laminate: Laminate) -> Iterable[tuple[str, Region]]:
 
 
 def flat_shape(pattern: str) -> str:
-    """Return what a part that is cut folded out or turned over is called among the shapes."""
+    """Return the shape id of a part that is cut folded out or turned over."""
     return f"{pattern}-flat"
 
 
 class Picture:
-    """An inline SVG in the making: its elements in drawing order, and a hatch of its own.
+    """An inline SVG under construction: its elements in drawing order, and its hatch.
 
-    ``name`` is unique on the page; ``words`` tell what is seen to who does not see it.
+    ``name`` is unique on the page; ``words`` are its text alternative.
     """
 
     def __init__(self, name: str, width: float, height: float, words: str) -> None:
@@ -71,7 +70,7 @@ class Picture:
         self._elements += elements
 
     def part(self, shape: str, film: Film, matrix: tuple[float, ...], look: str) -> None:
-        """Add a shape by its id; ``matrix`` takes its frame to the page, ``look`` is fresh, made
+        """Add a shape by its id; ``matrix`` maps its frame to the page, ``look`` is fresh, made
         (both opaque) or clear.
         """
         scale = abs(matrix[0]) or abs(matrix[1])
@@ -84,7 +83,7 @@ class Picture:
         )
 
     def plate(self, plate: Region, matrix: tuple[float, ...], is_used: bool = True) -> None:
-        """Add the base plate; dashed where it is not used, as it still shows the way round."""
+        """Add the base plate; dashed if it is not used, as it still shows the orientation."""
         scale, moved = matrix[0], " ".join(map(coord, matrix))
         dash = "" if is_used else f' stroke-dasharray="{coord(1.6 / scale)} {coord(1.2 / scale)}"'
         self.add(
@@ -125,12 +124,12 @@ def _hatch(name: str, scale: float, colours: Ink) -> str:
 
 
 def flat(scale: float, at: Point) -> tuple[float, ...]:
-    """Return the matrix of a plan view: the part's origin comes to ``at`` on the page, y upward."""
+    """Return the matrix of a plan view: the part's origin is at ``at`` on the page, y upward."""
     return scale, 0.0, 0.0, -scale, at[0], at[1]
 
 
 def label(at: Point, words: str, size: float = draw.SMALL) -> str:
-    """Return words over a drawing, with a white rim that keeps them legible."""
+    """Return text over a drawing, with a white rim for legibility."""
     x, y = map(coord, at)
     return (
         f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="middle" stroke="#ffffff" '
@@ -155,14 +154,14 @@ def thumbnail(name: str, pattern: str, film: Film, bounds: Bounds) -> str:
 
 LONGEST_ROUND = 12
 STATION = 0.1
-"""mm between the depths at which a channel's walls are looked for."""
+"""Steps in depth at which a channel's walls are searched, mm."""
 INSIDE = 0.1
-"""mm inward of its mouth at which a tab is looked for."""
+"""Distance inward of its mouth at which a tab is searched, mm."""
 
 
 @dataclass(frozen=True)
 class Round:
-    """Layers that are laid repeatedly in one order; ``turns`` holds every turn of it."""
+    """Layers that are laid repeatedly in one order; ``turns`` holds every turn."""
 
     turns: tuple[tuple[Layer, ...], ...]
 
@@ -180,7 +179,7 @@ class Round:
 
     @property
     def places(self) -> tuple[tuple[Layer, ...], ...]:
-        """The layers of all turns that take the same place in the round."""
+        """The layers of all turns at the same place in the round."""
         return tuple(zip(*self.turns, strict=True))
 
     @property
@@ -189,7 +188,7 @@ class Round:
 
 
 def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
-    """Return the layers in order, repetitions gathered; a layer that does not repeat is a round of
+    """Return the layers in order, repetitions grouped; a layer without repetition is a round of
     one.
     """
     keys = [(layer.pattern, layer.role) for layer in layers]
@@ -220,7 +219,7 @@ def _repetition(keys: Sequence[object]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Bed:
-    """One of the stacks that a step lays on each other; ``made_in`` is the step it comes from.
+    """One of the stacks that a step lays on each other; ``made_in`` is the step that made it.
 
     Single layers come off the sheet: ``made_in`` is None.
     """
@@ -258,8 +257,8 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
 
 
 def straight_run(laminate: Laminate, inlet: Inlet) -> float:
-    """Return how far an inlet's channel runs straight and evenly wide inward from its mouth, mm;
-    0 where no channel begins there.
+    """Return the straight run of an inlet's channel inward from its mouth at constant width, mm; 0
+    without a channel there.
     """
     (x, y), (u, v) = inlet.mouth, inlet.direction
 

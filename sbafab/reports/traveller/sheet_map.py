@@ -1,4 +1,4 @@
-"""The map of a film sheet as it lies on the machine, every part labelled with its pattern."""
+"""The map of a film sheet on the machine, with every part labelled by its pattern."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from sbafab.reports import drawing as draw
 from sbafab.reports.traveller.shapes import Picture, label
 
 HIGHEST, BESIDE = 118.0, 90.0
-"""mm on the page that a sheet which is not long may take, down and across: two side by side."""
+"""Size of a sheet that is not long, down and across the page, mm: two fit side by side."""
 ROW, TALLEST, LARGEST = 180.0, 210.0, 0.7
-"""mm on the page that a long sheet may take across and down, and its largest scale."""
+"""Size of a long sheet across and down the page, mm, and its largest scale."""
 LONG = 2.0
-"""Longer side over shorter one from which a sheet is drawn in rows."""
+"""From this ratio of the sides on, a sheet is drawn in rows."""
 GAP = 3.0
 EDGE = 0.5
 QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -29,7 +29,7 @@ QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 class _Strip(NamedTuple):
-    """A rectangle of the sheet (mm of the sheet) and where it lands on the page.
+    """A rectangle of the sheet (mm of the sheet) and its place on the page.
 
     ``turned`` lays the sheet's length across the page, its lower left corner at the upper left.
     """
@@ -60,10 +60,12 @@ class _Strip(NamedTuple):
         return x + (p[0] - self.bounds[0]) * self.scale, y + (self.bounds[3] - p[1]) * self.scale
 
     def matrix(self, placement: Placement) -> tuple[float, ...]:
-        """Return matrix of a quarter turn and a shift in the sheet's frame, then to the page."""
+        """Return the matrix of a quarter turn and a shift in the sheet's frame, then to the
+        page.
+        """
         u, v = QUARTERS[placement.turn]
         s = self.scale
-        # The columns are where the part's axes go.
+        # The columns are the images of the part's axes.
         turned = (s * v, s * u, s * u, -s * v) if self.turned else (s * u, -s * v, -s * v, -s * u)
         return (*turned, *self.at(placement.shift))
 
@@ -89,7 +91,7 @@ def is_long(sheet: SheetFile) -> bool:
 
 
 def picture_note(sheet: SheetFile) -> str:
-    """Return what the picture of a sheet does not show at once: rows, a turn, an empty rest."""
+    """Return what the picture of a sheet does not show directly: rows, a turn, an empty rest."""
     if not is_long(sheet):
         used = _used(sheet)
         return f"the sheet above {used:.0f} mm is empty" if used < sheet.length else ""
@@ -104,7 +106,7 @@ def picture_note(sheet: SheetFile) -> str:
 def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
     """Return the sheet in plan, its lower left corner at the lower left; a long one in rows.
 
-    A part is labelled with its pattern after the mark of its design, or the design's name.
+    The label of a part is its pattern after the mark of its design, or the design's name.
     """
     strips = _strips(sheet)
     width, height = strips[-1].size
@@ -146,7 +148,7 @@ def _strips(sheet: SheetFile) -> list[_Strip]:
 
 
 def _used(sheet: SheetFile) -> float:
-    """Return the length in mm that parts and pins use, with a border more."""
+    """Return the length in mm used by parts and pins, plus a border."""
     nest = sheet.nest
     tops = [nest.region(placement).bounds[3] for placement in nest.on_sheet(sheet.number - 1)]
     tops += [y + diameter / 2 for _, y, diameter in nest.stock.pins]
@@ -154,7 +156,7 @@ def _used(sheet: SheetFile) -> float:
 
 
 def _window(strip: _Strip) -> list[str]:
-    """Return the opening tags of a nested picture that shows nothing beside the strip."""
+    """Return the opening tags of a nested picture clipped to the strip."""
     (x, y), (wide, high) = strip.corner, strip.size
     place = " ".join(map(coord, (x, y, wide, high)))
     return [
@@ -192,7 +194,7 @@ def _label(
     marks: Mapping[str, str],
     visible: Sequence[tuple[Placement, Region]],
 ) -> None:
-    """Label every part; equal parts are labelled equally unless labels would meet."""
+    """Label every part; equal parts get equal labels unless labels would collide."""
     by_placement: dict[tuple[int, int], tuple[Bounds, Iterator[PlacedLabel]]] = {}
     taken: list[Bounds] = []
     page = (*strip.corner, *_far(strip))
@@ -224,28 +226,28 @@ def _meets(bounds: Bounds, strip: _Strip) -> bool:
 
 
 def marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
-    """Return a pattern after the mark of its design, or the design's name where it has none."""
+    """Return a pattern after the mark of its design, or after the design's name without a mark."""
     return f"{marks.get(design, design)} {pattern}".lstrip()
 
 
-# Places for labels: on the part, off its holes and off other labels.
+# Positions of labels: on the part, off its holes and off other labels.
 
 
 LEGIBLE = 1.5
-"""mm on the page: smaller labels help nobody."""
+"""Smallest legible label on the page, mm."""
 STEPS = 6
-"""Places tried from the middle of a part to each of its ends."""
+"""Positions tried from the middle of a part to each of its ends."""
 SIZES = (1.0, 0.8, 0.6)
 OVER = 1.1
-"""Share of its part's width that a label may take."""
+"""Share of its part's width that a label may fill."""
 HIGH = 0.8
-"""Height of a label in sizes of its letters."""
+"""Height of a label, in font sizes."""
 OUTSIDE, HOLE = 3.0, 1.0
-"""What a corner off the part costs, and a hole that is covered; distance from the middle, 1."""
+"""Cost of a corner off the part, and of a covered hole; the distance from the middle costs 1."""
 
 
 class PlacedLabel(NamedTuple):
-    """``at`` is the middle of the words' base line; ``size`` and ``box`` are mm on the page."""
+    """``at`` is the middle of the text's base line; ``size`` and ``box`` are mm on the page."""
 
     at: Point
     size: float
@@ -258,11 +260,10 @@ class PlacedLabel(NamedTuple):
 
 
 def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
-    """Yield places for the words on a part as it is drawn, the best first.
+    """Yield positions for a text on a drawn part, the best first.
 
-    They are off its holes if they can be, near its middle and as large as may be; none are yielded
-    where nobody could read them. A place is measured when its turn has come: the first one is
-    nearly always taken.
+    They are off its holes if possible, near its middle and as large as possible; illegible ones are
+    not yielded. Positions are measured lazily: the first one is nearly always taken.
     """
     low_x, _, high_x, _ = part.bounds
     width = OVER * (high_x - low_x)
@@ -271,7 +272,7 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
     em = draw.text_width(words, 1.0)
     middles = list(_middles(part.bounds))
     sizes = [(1 - share, share * most) for share in SIZES if share * most >= LEGIBLE]
-    # Nearest first for each size, so labels are made only as far as their turn comes.
+    # Nearest first for each size, so labels are only made when needed.
     fresh = merge(*([(far + less, at, size) for far, at in middles] for less, size in sizes))
     ahead = next(fresh, None)
     waiting: list[_Candidate] = []
@@ -291,11 +292,11 @@ def labels(words: str, part: Region) -> Iterator[PlacedLabel]:
 
 
 class _Candidate(NamedTuple):
-    """A label with the least that it can cost: ``far`` off the middle and small, holes ``covered``,
-    points ``off`` the part; what is quickly measured comes first.
+    """A label with its least possible cost: ``far`` from the middle and small, holes ``covered``,
+    points ``off`` the part; quickly measured costs come first.
 
-    ``sides``: points of its box that have not been looked for on the part yet; None where the holes
-    have not been counted either.
+    ``sides``: points of its box not yet tested against the part; None if the holes have not been
+    counted either.
     """
 
     cost: float
@@ -309,9 +310,7 @@ class _Candidate(NamedTuple):
         return self._measured(covered, 0, sides)
 
     def beside(self, part: Region) -> _Candidate:
-        """Return the candidate measured up to its first point that is off the part, which costs
-        much.
-        """
+        """Return the candidate measured up to its first point off the part, which costs much."""
         assert self.sides is not None
         for number, point in enumerate(self.sides):
             if not part.contains(point):
@@ -326,8 +325,8 @@ class _Candidate(NamedTuple):
 def first_free(
     candidates: Iterable[PlacedLabel], page: Bounds, taken: Sequence[Bounds]
 ) -> PlacedLabel | None:
-    """Return the first label that stands on the page and off the boxes of other labels; None for
-    none.
+    """Return the first label that is on the page and off the boxes of other labels; None if none
+    is.
     """
     return next(
         (
@@ -340,7 +339,7 @@ def first_free(
 
 
 def _placed_label(em: float, middle: Point, size: float) -> PlacedLabel:
-    """Return the label of words that are ``em`` sizes of their letters wide."""
+    """Return the label of a text that is ``em`` font sizes wide."""
     x, y = middle
     wide, high = size * em / 2, HIGH * size / 2
     box = x - wide, y - high, x + wide, y + high
@@ -365,7 +364,7 @@ def _grid() -> list[tuple[float, float, float]]:
 
 
 def _sides(box: Bounds, holes: Sequence[Bounds]) -> tuple[Point, ...]:
-    """Return corners and middles of the words' box that stand on no hole of the part."""
+    """Return corners and middles of the text's box that are off the part's holes."""
     points = [(x, y) for y in (box[1], box[3]) for x in (box[0], (box[0] + box[2]) / 2, box[2])]
     return tuple([p for p in points if not any(_meet((*p, *p), hole) for hole in holes)])
 

@@ -32,20 +32,20 @@ from sbafab.reports.traveller.shapes import (
 
 DIRECTIONS = 16
 STEPS = (0.0, 2.0, 4.0, 6.5, 9.0)
-"""mm from where a name would touch its place, in the order in which they are tried."""
+"""Distances of a name from touching its place, mm, in the order tried."""
 LED = 1.5
-"""mm from which on a thin line leads from the name to its place."""
+"""Distance from which a thin line leads from the name to its place, mm."""
 ASIDE, FAR = 0.4, 0.25
-"""What a name out of its direction costs, and a mm of distance, in mm2 of covering."""
+"""Cost of a name out of its direction, and of a mm of distance, in mm2 of covering."""
 ROUNDED = 1e-6
-"""mm2, far more than sums of costs are off."""
+"""Tolerance on sums of costs, mm2: far above their rounding errors."""
 
 
-# Names beside the places of a picture, where they cover neither each other nor what they name.
+# Names beside the places of a picture, covering neither each other nor the places.
 
 
 class PlanName(NamedTuple):
-    """A name to be put beside ``at``, a place ``clear`` mm round, best in the direction ``out``."""
+    """A name to put beside ``at``, a place ``clear`` mm around, best in the direction ``out``."""
 
     words: str
     at: Point
@@ -54,7 +54,7 @@ class PlanName(NamedTuple):
 
 
 def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds]) -> list[str]:
-    """Return the names as SVG, each where it covers least of ``taken`` and of those before it."""
+    """Return the names as SVG, each where it covers least of ``taken`` and of earlier names."""
     taken, drawn = list(taken), []
     for name in names:
         half = draw.text_width(name.words, size) / 2, size / 2
@@ -69,13 +69,13 @@ def named(names: list[PlanName], size: float, room: Bounds, taken: list[Bounds])
 def _best(
     name: PlanName, half: Point, room: Bounds, taken: Sequence[Bounds]
 ) -> tuple[Point, float]:
-    """Return the middle of the cheapest place and its distance; the first of several.
+    """Return the middle of the cheapest position and its distance; the first of equals.
 
     ``half`` of the name's width and height.
     """
     least, best = math.inf, (name.at, 0.0)
     for away in STEPS:
-        # Nothing costs less than the distance alone, but for rounding.
+        # The distance alone is the least cost, up to rounding.
         if FAR * away > least + ROUNDED:
             break
         for middle in _places(name, half, away):
@@ -86,7 +86,7 @@ def _best(
 
 
 def _places(name: PlanName, half: Point, away: float) -> Iterator[Point]:
-    """Yield middles of the name at a distance, from its preferred direction round."""
+    """Yield middles of the name at a distance, around from its preferred direction."""
     reach = name.clear + away
     for step in range(DIRECTIONS):
         turn = 2 * math.pi * step / DIRECTIONS + math.atan2(name.out[1], name.out[0])
@@ -102,7 +102,7 @@ def _box(middle: Point, half: Point) -> Bounds:
 def _cost(
     name: PlanName, middle: Point, half: Point, room: Bounds, taken: Sequence[Bounds]
 ) -> float:
-    """Return the cost of a place without that of its distance, mm2."""
+    """Return the cost of a position without its distance, mm2."""
     box = _box(middle, half)
     covered = sum([_shared(box, neighbour) for neighbour in taken])
     outside = _area(box) - _shared(box, room)
@@ -126,21 +126,21 @@ def _shared(a: Bounds, b: Bounds) -> float:
 
 WIDEST, TALLEST = 64.0, 28.0
 NARROWEST = 66.0
-"""mm: room for the words under the picture."""
+"""Room for the text under the picture, mm."""
 EDGE, HEAD, FOOT = 5.0, 5.0, 5.5
 NAMES = 2.0
 """Height of the names of pins and chambers, mm."""
 FREE = 6.0
-"""mm of air round a laminate that has no base plate."""
+"""Margin around a laminate without a base plate, mm."""
 
 KEY = 19.0
-"""mm of the line under the picture that the marks of pins take."""
+"""Height of the line of pin marks under the picture, mm."""
 AT_DATUM = 1e-3
-"""mm from the datum within which a pin hides it."""
+"""Distance from the datum within which a pin hides it, mm."""
 
 
 _section = cached(section)
-"""Every step of a laminate asks for the same."""
+"""Every step of a laminate needs the same."""
 
 
 class _View(NamedTuple):
@@ -172,7 +172,7 @@ def _view(bounds: Bounds) -> _View:
 
 
 def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: str) -> str:
-    """Return the step from above; earlier stacks grey, what joins in its film's colour."""
+    """Return the step from above; earlier stacks grey, new layers in their film's colour."""
     plate = shown(laminate)
     view = _view(plate.bounds if plate is not None else _widened(laminate.bounds))
     state = "pins in" if step.pins else "no pins"
@@ -190,7 +190,7 @@ def plan(laminate: Laminate, step: AssemblyStep, lying: tuple[Bed, ...], name: s
                 look,
             )
     inlets = inlets_in(laminate, step.layers)
-    # An arrow at its tab names the pin of a chamber, too.
+    # An arrow at its tab also names the pin of a chamber.
     arrow_names = {inlet.chamber for inlet in inlets}
     names, taken = [], []
     for pin in laminate.pins:
@@ -226,15 +226,13 @@ def _radius(pin: Pin, view: _View) -> float:
 
 
 def _outward(pin: Pin) -> Point:
-    """Return the direction on the page from the datum to a pin; upward for the pin that stands
-    there.
-    """
+    """Return the direction on the page from the datum to a pin; upward for the pin at the datum."""
     far = math.hypot(*pin.centre)
     return (pin.centre[0] / far, -pin.centre[1] / far) if far > AT_DATUM else (0.0, -1.0)
 
 
 def _pin(at: Point, r: float, is_in: bool) -> str:
-    """Return a pin that is in as a filled circle, one that is out as a hollow one."""
+    """Return a pin that is in as a filled circle, a removed one as a hollow circle."""
     x, y = at
     fill = draw.DARK if is_in else "#ffffff"
     return (
@@ -244,7 +242,7 @@ def _pin(at: Point, r: float, is_in: bool) -> str:
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
-    """Return the distance in mm by which an inlet's strip passes its mouth at most."""
+    """Return the largest distance in mm by which an inlet's strip passes its mouth."""
     shapes = (layers[0].profile for layers in laminate.patterns.values())
     spans = [span for shape in shapes for span in _section(shape, inlet.mouth, inlet.direction)]
     return max((end for _, end in spans), default=0.0)
@@ -258,7 +256,7 @@ def _arrow(inlet: Inlet, reach: float, view: _View) -> tuple[Point, Point]:
 
 
 def _datum(view: _View) -> list[str]:
-    """Return the cross that every cut file carries at the actuator's axis."""
+    """Return the cross at the actuator's axis, as in every cut file."""
     x, y = view.origin
     return [
         draw.line([(x - 1.6, y), (x + 1.6, y)], width=0.2),
@@ -291,28 +289,28 @@ def _captions(view: _View, plate: bool, pinned: bool, datum: str) -> list[str]:
 
 WIDE = 58.0
 TILT = 0.34
-"""How much of its depth a layer keeps, seen from the front and above."""
+"""Foreshortening of a layer's depth, seen from the front and above."""
 LABELS = 50.0
 TALLEST_STACK = 40.0
 NEAREST, FARTHEST, TWO_LINES = 4.0, 10.0, 6.0
 COLUMN, BRACKET = 4.0, 13.0
 """mm from the layers to their labels, and for a bracket with its count."""
 BOLD = 1.25
-"""How much wider bold letters are, at most."""
+"""Largest ratio of the width of bold letters to normal ones."""
 PAGE = 1.1
 """mm on the page between the layers of a finished stack."""
 MOST = 20
 TOP, STACK_FOOT = 5.0, 2.0
 DEEP = 32.0
 STANDS_OUT = 4.0
-"""mm on the page of a pin above the highest level."""
+"""Height of a pin above the highest level, mm on the page."""
 
 
 @dataclass(frozen=True)
 class Level:
     """The layers at one height, drawn on each other, and their label.
 
-    ``made`` says that an earlier step has bonded them, ``round`` that they are laid repeatedly.
+    ``made``: bonded in an earlier step; ``round``: laid repeatedly.
     """
 
     layers: tuple[Layer, ...]
@@ -324,7 +322,7 @@ class Level:
 
 @dataclass(frozen=True)
 class _Tilted:
-    """The view of a step taken apart: the laminate's origin lands at ``middle`` and ``ground``."""
+    """The view of a step taken apart: the laminate's origin is at ``middle`` and ``ground``."""
 
     scale: float
     middle: float
@@ -338,18 +336,14 @@ class _Tilted:
         return self.scale, 0.0, 0.0, -self.scale * TILT, self.middle, height
 
     def level(self, place: int) -> float:
-        """Return the page height of a level, counted from the lowest; the plate lies under them
-        all.
-        """
+        """Return the page height of a level, counted from the lowest; the plate is below all."""
         return self.ground - self.gap * (place + self.plate)
 
 
 def exploded(laminate: Laminate, step: AssemblyStep, lying: Sequence[Bed], name: str) -> str:
-    """Return the step's layers one over another, lowest first, with numbers and patterns beside
-    them.
+    """Return the step's layers one above the other, lowest first, with numbers and patterns.
 
-    They are drawn from the front and above, so that outlines and tabs show which way round each
-    goes.
+    They are drawn from the front and above, so that outlines and tabs show the orientation of each.
     """
     levels = _shortened([level for bed in lying for level in _levels(laminate, bed)])
     plate = shown(laminate) if step.pins else None
@@ -405,7 +399,7 @@ def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
 
 
 def _shortened(levels: list[Level]) -> list[Level]:
-    """Return few enough levels to draw; the lay-up table has them all."""
+    """Return the levels to draw, few enough; the lay-up table has them all."""
     if len(levels) <= MOST:
         return levels
     hidden = levels[MOST - 5 : -4]
@@ -428,7 +422,7 @@ def _one_line(words: str, detail: str) -> float:
 
 
 def _beside(edge: Point, words: str, detail: str, gap: float) -> list[str]:
-    """Return words with a leader to what they name; on one line where the next are near."""
+    """Return labels with leaders to their features; on one line if the next are near."""
     x, y = edge
     column = WIDE + COLUMN
     leader = draw.line([(min(x, WIDE) + 0.4, y), (column - 0.8, y)], colour=draw.GREY, width=0.12)
@@ -461,7 +455,7 @@ def _pin_stretches(pins: Sequence[Pin], view: _Tilted, under: float, over: float
 
 
 def _brackets(levels: Sequence[Level], view: _Tilted, width: float) -> list[str]:
-    """Return a bracket beside the levels of a round, with their count."""
+    """Return a bracket beside the levels of a round, with the number of turns."""
     parts: list[str] = []
     marked = [(i, level.round) for i, level in enumerate(levels) if level.round is not None]
     for turn in {id(turn): turn for _, turn in marked}.values():
@@ -479,18 +473,18 @@ def _brackets(levels: Sequence[Level], view: _Tilted, width: float) -> list[str]
 
 SECTION_WIDE, SECTION_LABELS, SECTION_EDGE = 26.0, 43.0, 1.0
 THICK = 0.5
-"""mm on the page for one of the base plate and the pad."""
+"""Height of the base plate and of the pad on the page, mm each."""
 PLATEN = 3.0
 FACTORS = (50, 20, 10, 5, 2, 1)
 TALLEST_LAMINATE = 10.0
-"""mm on the page of a laminate at most, where a factor allows it."""
+"""Largest height of a laminate on the page, mm, if a factor allows it."""
 PIN_REACH = 0.7
 """Share of the pad that a pin may reach into on the page."""
 STACK = 8.0, 19.0
-"""Where the laminate lies along x."""
+"""Extent of the laminate along x."""
 GAP = 3.0
 LEAST = 24.0
-"""mm on the page: room for the words beside the section."""
+"""Room for the text beside the section, mm on the page."""
 INKS = {
     "platen": "#c9ccd1",
     BASE_PLATE: "#e3e5e8",
@@ -502,7 +496,7 @@ INKS = {
 
 
 def factor(step: Step) -> int:
-    """Return the enlargement of films: pins that stand over the stack must end inside the pad."""
+    """Return the magnification of films: pins above the stack must end inside the pad."""
     pad = next(item.thickness_mm for item in step.build_up if item.part == PAD) * THICK
     over = max((pin.stands_mm for pin in step.pin_settings), default=step.top_mm) - step.top_mm
     paper = sum(item.thickness_mm for item in step.build_up if item.part == UNDERLAY)
@@ -514,8 +508,8 @@ def factor(step: Step) -> int:
 def build_up_svg(step: Step, name: str) -> str:
     """Return the section of one step, platen to platen, each part with its thickness beside it.
 
-    Base plate and press pad stand 1:2; films, laminate and what of the pins stands over the plate
-    are enlarged by a factor that the picture names. Widths are not to scale.
+    Base plate and press pad are drawn 1:2; films, laminate and the pins above the plate are
+    magnified by a factor stated in the picture. Widths are not to scale.
     """
     thick = {item.part: item for item in step.build_up}
     by = factor(step)
@@ -581,7 +575,7 @@ def build_up_svg(step: Step, name: str) -> str:
 
 
 def _underlay(top: float, bottom: float) -> list[str]:
-    """Return the printed paper between plate and release film; empty where there is none."""
+    """Return the printed paper between plate and release film; empty without one."""
     if top == bottom:
         return []
     return [
@@ -611,7 +605,7 @@ def _plate_words(step: Step, plate: float) -> str:
 
 
 def _pad(top: float, over: float, beside: float, low: float, high: float) -> str:
-    """Return the pad, pressed together over the laminate; beside it, it comes down on the plate."""
+    """Return the pad, compressed above the laminate; beside it, it meets the plate."""
     slope = min(4.0, beside - over)
     path = (
         f"M{SECTION_EDGE} {top}H{SECTION_WIDE}V{beside:.3f}H{high + slope:.3f}L{high} {over:.3f}"
@@ -621,7 +615,7 @@ def _pad(top: float, over: float, beside: float, low: float, high: float) -> str
 
 
 def _release(upper: float, bed: float, release: float, low: float, high: float) -> list[str]:
-    """Return the flat lower film and the upper one, which goes up over the laminate."""
+    """Return the flat lower film and the upper one, which rises over the laminate."""
     slope = min(4.0, bed - 2 * release - (upper - release))
     beside, over = bed - 1.5 * release, upper - release / 2
     ends = [(SECTION_EDGE, beside), (low - slope, beside), (low, over), (high, over)]
@@ -641,7 +635,7 @@ def _section_pins(
     low: float,
     high: float,
 ) -> list[str]:
-    """The pins on the shoulders of their holes, seat 1:2, what stands over the plate enlarged.
+    """The pins on the shoulders of their holes, seat 1:2, the part above the plate magnified.
 
     Below each is its push-out hole; the tips press into the pad.
     """

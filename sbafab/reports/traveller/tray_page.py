@@ -1,4 +1,4 @@
-"""tray.html: the patterns with their counts, to hold on a phone beside the tray."""
+"""tray.html: the patterns with their counts, for a phone beside the tray."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from sbafab.reports.traveller.shapes import (
 
 TEMPLATE = "tray.html.j2"
 MOST_CYCLES = 6
-"""Cycles that have a box each; of more, those of one size share it."""
+"""Up to this many cycles each has a box; otherwise cycles of one size share one."""
 
 
 @dataclass(frozen=True)
 class PatternCard:
-    """A pattern as it is counted: of each laminate, and of each cycle by its name."""
+    """The counts of a pattern: per laminate, and per cycle by its name."""
 
     pattern: str
     picture: str

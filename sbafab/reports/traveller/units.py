@@ -12,11 +12,11 @@ NEWTONS_PER_POUND = 4.4482216152605
 
 
 BLANK = "________"
-"""What is written in by hand."""
+"""A blank to fill in by hand."""
 
 
 ROUND = 10.0
-"""Minutes above which tenths say nothing."""
+"""Above this many minutes tenths are dropped."""
 
 
 DIRECTIONS = (
@@ -45,9 +45,7 @@ def force(newtons: float) -> str:
 
 
 def minutes(value: float | None) -> str:
-    """Return minutes to the tenth below ten, whole ones above: 3 min, 2.4 min, 47 min; a blank for
-    None.
-    """
+    """Return minutes to the tenth below ten, else whole: 3 min, 2.4 min, 47 min; blank for None."""
     if value is None:
         return f"{BLANK} min"
     return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
@@ -69,7 +67,7 @@ def whole_minutes(value: float | None) -> str:
 
 
 def product(number: int, value: float | None) -> float | None:
-    """Return a value so many times, None for None."""
+    """Return a value times a count; None for None."""
     return None if value is None else number * value
 
 
@@ -86,7 +84,7 @@ def count(number: int, noun: str, plural: str = "") -> str:
 
 
 def stacks(number: int) -> str:
-    """Return what follows the definite article: stack, 3 stacks."""
+    """Return the noun phrase after a definite article: stack, 3 stacks."""
     return "stack" if number == 1 else f"{number} stacks"
 
 
